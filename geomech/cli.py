@@ -1,0 +1,228 @@
+"""The command line: geomech run, velocity, connection, ccf, displacement, scenes."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from geomech.problem import SceneError, choose, whole_file
+
+app = typer.Typer(
+    add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, no_args_is_help=True,
+    help="Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait.",
+)  # fmt: skip
+
+DEFAULT_SCENE = "three-link-glass"
+SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")]
+GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
+ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
+PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
+
+
+@app.command()
+def run(
+    name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path("results"),
+):
+    """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
+    from geomech import report
+    from geomech.scene import load
+
+    scene = load(name)
+    with report.whole_folder(out) as folder, progress(f"field of {scene.name}") as bar:
+        tables = report.write(scene, folder, bar)
+    for title, table in tables.items():
+        print(report.text_table(title, table, scene))
+    print(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir() if not p.name.startswith('.')))}")
+
+
+@app.command()
+def velocity(
+    name: SceneArgument,
+    alpha: Annotated[str, typer.Option(help="joint angles in rad, such as 0.5,0.3")],
+    alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0")],
+    as_json: JsonOption = False,
+):
+    """Body velocity for one shape and its rate of change, with its residual and status."""
+    from geomech.scene import load
+
+    scene = load(name)
+    solution = scene.solve(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
+    out = {"xi": solution.xi.tolist(), "status": str(solution.status), "residual": float(solution.residual)}
+    if as_json:
+        print(json.dumps(out))
+    else:
+        print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{scene.unit}, {scene.unit}, rad per unit time")
+        print(f"{out['status']}, residual {out['residual']:.1e}, {int(solution.iterations)} iterations")
+    if out["status"] == "unconverged":
+        raise SceneError(f"{scene.name}: the force balance did not converge: raise [numerics] regularisation")
+
+
+@app.command()
+def connection(
+    name: SceneArgument,
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
+    grid: GridOption = None,
+    extent: ExtentOption = None,
+    plot: PlotOption = None,
+):
+    """The local connection on a grid, with its fit residual and CCF, as NetCDF."""
+    from geomech import plots
+    from geomech.netcdf import save_connection
+
+    scene = _field_scene(name, grid, extent, out, plot)
+    save_connection(out, scene)
+    if plot:
+        plots.save(plots.connection_figure(_two_joints(scene).fitted, scene.unit), plot)
+
+
+@app.command()
+def ccf(
+    name: SceneArgument,
+    plot: Annotated[Path, typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")],
+    grid: GridOption = None,
+    extent: ExtentOption = None,
+):
+    """The CCF map with the scene's gait drawn on it."""
+    from geomech import plots
+
+    scene = _two_joints(_field_scene(name, grid, extent, plot, plot))
+    plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit), plot)
+
+
+@app.command()
+def displacement(
+    name: SceneArgument,
+    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT")],
+    methods: Annotated[Optional[str], typer.Option(help="any of area,path,direct; all by default")] = None,
+    grid: GridOption = None,
+    extent: ExtentOption = None,
+    as_json: JsonOption = False,
+    plot: PlotOption = None,
+):
+    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier."""
+    from geomech import plots, report
+    from geomech.scene import METHODS
+
+    values = _sweep("--amplitudes", amplitudes)
+    chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
+    scene = _loaded(name, grid, extent)
+    _check_outputs(plot, plot)
+    with progress(f"displacement of {scene.name}") as bar:
+        table = scene.study(values, chosen or scene.methods, progress=bar)
+    if plot:
+        fig, axes = plots.figure(4.2, 3.0)
+        plots.displacement(table, scene.unit, axes[0, 0])
+        plots.save(fig, plot)
+    print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))
+
+
+@app.command()
+def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's TOML")] = None):
+    """The scenes that ship with the toolkit, and the named media."""
+    import rft
+    from geomech.scene import builtin_names, load
+
+    if show:
+        print(load(choose("--show", show, builtin_names())).text, end="")
+        return
+    for scene_name in builtin_names():
+        print(f"{scene_name:24} {load(scene_name).text.splitlines()[0].lstrip('# ')}")
+    print("\nmedia for [medium] name = ...")
+    for medium_name, entry in rft.CATALOGUE.items():
+        print(f"{medium_name:24} {entry.source}")
+
+
+@contextlib.contextmanager
+def progress(title: str):
+    """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda fraction: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+def _loaded(name: str, grid: int | None, extent: float | None):
+    from geomech.scene import load
+
+    return load(name).with_numerics(grid=grid, extent=extent)
+
+
+def _field_scene(name, grid, extent, output: Path, plot: Path | None):
+    """The scene with its field computed, once its outputs are known to be writable."""
+    scene = _loaded(name, grid, extent)
+    _check_outputs(output, plot)
+    with progress(f"field of {scene.name}") as bar:
+        scene.compute_field(bar)
+    return scene
+
+
+def _check_outputs(output: Path | None, plot: Path | None) -> None:
+    from geomech import plots
+
+    if plot:
+        plots.check_format(plot)
+    for path in filter(None, {output, plot}):
+        with contextlib.suppress(_Unused), whole_file(path):
+            raise _Unused
+
+
+class _Unused(Exception):
+    """Leaves `whole_file` without writing."""
+
+
+def _two_joints(scene):
+    if scene.body.joints != 2:
+        raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}")
+    return scene
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise SceneError(f"{option}: {text!r} is not a list of numbers such as 0.5,0.3") from None
+
+
+def _sweep(option: str, text: str) -> list[float]:
+    """0.5,1.0 or START:STOP:COUNT, all finite."""
+    import math
+
+    parts = text.split(":")
+    if len(parts) == 1:
+        values = _numbers(option, text)
+    elif len(parts) == 3 and parts[2].isdecimal() and 1 <= int(parts[2]) <= 100_000:
+        (start, stop), count = _numbers(option, ",".join(parts[:2])), int(parts[2])
+        values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
+    else:
+        raise SceneError(f"{option}: {text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10")
+    if not all(map(math.isfinite, values)):
+        raise SceneError(f"{option}: {text!r} must be finite")
+    return values
+
+
+def main() -> None:
+    """Entry point: one line on standard error and exit code 2 for what the user can mend."""
+    try:
+        code = app(standalone_mode=False)
+    except KeyboardInterrupt:
+        print("error: interrupted", file=sys.stderr)
+        code = 130
+    except Exception as error:
+        text = error.format_message() if hasattr(error, "format_message") else str(error)
+        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
+            raise
+        print("error: " + " ".join(text.split()), file=sys.stderr)
+        code = 2
+    sys.exit(code or 0)

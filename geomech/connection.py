@@ -1,0 +1,92 @@
+"""The local connection A(alpha): the linear map from joint rates to body velocity that fits best (paper Sec. III D).
+
+A velocity is any function (alpha (..., d), alphadot (..., d)) -> xi (..., 3): a force balance, a closed form, a
+table from an experiment. It should be odd and homogeneous in alphadot, so that half the directions tell all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.field import Field
+
+Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
+SAMPLES_TOGETHER = 200_000  # velocities asked for in one call
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A on a grid. A: (3, d, N_1, ..., N_d), xi = + A alphadot, in the velocity's units and frame.
+    residual: (3, N_1, ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1;
+    speed: (3, N_1, ..., N_d), rms of xi itself. degree: of the interpolating spline."""
+
+    axes: tuple[np.ndarray, ...]
+    A: np.ndarray
+    residual: np.ndarray
+    speed: np.ndarray
+    degree: int = 3
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.axes, self.A, self.degree)
+
+    def __call__(self, alpha) -> np.ndarray:
+        """A (..., 3, d) at shapes alpha (..., d); ValueError outside the grid."""
+        return self.field(alpha)
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi = A(alpha) alphadot, (..., 3)."""
+        return np.einsum("...ij,...j->...i", self(alpha), np.asarray(alphadot, float))
+
+
+def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
+    """``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
+    if int(points) != points or points < 4:
+        raise ValueError(f"grid must be a whole number of at least 4 points, got {points!r}")
+    if not (np.isfinite(extent) and extent > 0):
+        raise ValueError(f"extent must be a finite angle > 0 in rad, got {extent!r}")
+    return (np.linspace(-extent, extent, int(points)),) * joints
+
+
+def directions(joints: int, count: int) -> np.ndarray:
+    """Unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
+    low-discrepancy sequence for more."""
+    if int(count) != count or count < joints:
+        raise ValueError(f"directions must be a whole number >= the number of joints ({joints}), got {count!r}")
+    if joints == 1:
+        return np.ones((1, 1))
+    if joints == 2:
+        angle = np.pi * np.arange(count) / count
+        return np.stack([np.cos(angle), np.sin(angle)], -1)
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    normal = ndtri(qmc.Halton(joints, scramble=False).random(count + 1)[1:])
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def fit(velocity: Velocity, axes, count: int = 8, degree: int = 3, progress: Callable | None = None) -> Connection:
+    """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
+
+    progress: called with the fraction done. Raises what ``velocity`` raises.
+    """
+    axes = tuple(np.asarray(a, float) for a in axes)
+    unit = directions(len(axes), count)
+    solve = np.linalg.pinv(unit)  # (d, count): A^T = pinv(directions) xi
+    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+    A, residual, speed = (np.empty((len(alpha), *tail)) for tail in ((3, len(axes)), (3,), (3,)))
+    step = max(1, SAMPLES_TOGETHER // len(unit))
+    for k in range(0, len(alpha), step):
+        here = slice(k, k + step)
+        xi = velocity(alpha[here, None], unit)
+        A[here] = np.einsum("jc,sci->sij", solve, xi)
+        off = xi - np.einsum("sij,cj->sci", A[here], unit)
+        residual[here], speed[here] = np.sqrt((off**2).mean(1)), np.sqrt((xi**2).mean(1))
+        if progress:
+            progress(min(1.0, (k + step) / len(alpha)))
+    shape = tuple(len(a) for a in axes)
+    return Connection(axes, *(np.moveaxis(x, 0, -1).reshape(*x.shape[1:], *shape) for x in (A, residual, speed)), degree)

@@ -1,0 +1,86 @@
+"""Functions on shape space, known on a grid and interpolated by tensor-product splines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Field:
+    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending.
+
+    degree: of the spline through them; interpolation is of order degree + 1 in the spacing where the function is
+    smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection.
+    """
+
+    axes: tuple[np.ndarray, ...]
+    values: np.ndarray
+    degree: int = 3
+
+    def __post_init__(self):
+        shape = tuple(len(a) for a in self.axes)
+        if self.values.shape[-len(shape) :] != shape:
+            raise ValueError(f"values {self.values.shape} do not end in the grid's shape {shape}")
+        if min(shape) <= self.degree:
+            raise ValueError(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
+
+    @property
+    def joints(self) -> int:
+        return len(self.axes)
+
+    def _along(self, axis: int):
+        """The one-dimensional spline along a grid axis; that axis comes first."""
+        from scipy.interpolate import make_interp_spline
+
+        rows = np.moveaxis(self.values, axis - self.joints, 0)
+        return make_interp_spline(self.axes[axis], rows, self.degree)
+
+    def derivative(self, axis: int) -> np.ndarray:
+        """d values / d alpha_axis on the grid, of the spline."""
+        return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
+
+    @cached_property
+    def spline(self):
+        return _tensor_spline(self)
+
+    def antiderivative(self, axis: int):
+        """The spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
+        return _tensor_spline(self, integrate=axis)
+
+    def __call__(self, alpha) -> np.ndarray:
+        """Values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the grid."""
+        return self.spline(self.inside(alpha))
+
+    def inside(self, alpha) -> np.ndarray:
+        """alpha as an array, or ValueError naming the first angle that leaves the grid."""
+        alpha = np.asarray(alpha, float)
+        for k, axis in enumerate(self.axes):
+            low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
+            slack = 1e-9 * (axis[-1] - axis[0])
+            if low < axis[0] - slack or high > axis[-1] + slack:
+                worst = low if axis[0] - low > high - axis[-1] else high
+                raise ValueError(
+                    f"alpha_{k + 1} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
+                    "widen the extent or lower the amplitude"
+                )
+        return alpha
+
+
+def _tensor_spline(field: Field, integrate: int | None = None):
+    """Tensor-product spline through a field; along the axis ``integrate``, its antiderivative from the lower end."""
+    from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
+
+    d = field.joints
+    c = np.moveaxis(field.values, range(-d, 0), range(d))
+    knots, degrees = [], []
+    for i, axis in enumerate(field.axes):
+        b = make_interp_spline(axis, np.moveaxis(c, i, 0), field.degree)
+        if i == integrate:
+            b = BSpline(b.t, b.c, b.k).antiderivative()
+        knots.append(b.t)
+        degrees.append(b.k)
+        c = np.moveaxis(b.c[: len(b.t) - b.k - 1], 0, i)
+    return NdBSpline(tuple(knots), np.ascontiguousarray(c), tuple(degrees))

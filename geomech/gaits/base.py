@@ -1,0 +1,73 @@
+"""What a gait is: a closed curve in shape space, run once as the phase t goes from 0 to 2 pi."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
+
+    amplitude: scales the curve about its centre. centre: shape angles (rad), the origin if left empty.
+    reverse: run the curve backwards, t -> -t, from the same start.
+    """
+
+    amplitude: float = 1.0
+    centre: tuple[float, ...] = ()
+    reverse: bool = False
+
+    def __post_init__(self):
+        object.__setattr__(self, "centre", tuple(float(x) for x in self.centre))
+        if not math.isfinite(self.amplitude):
+            raise ValueError(f"amplitude must be finite, got {self.amplitude!r}")
+        if self.centre and len(self.centre) != self.joints:
+            raise ValueError(f"centre must have {self.joints} angles, got {list(self.centre)}")
+        if not all(map(math.isfinite, self.centre)):
+            raise ValueError(f"centre must be finite, got {list(self.centre)}")
+
+    @property
+    def joints(self) -> int:
+        return 2
+
+    def unit(self, t) -> np.ndarray:
+        raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
+
+    def unit_rate(self, t) -> np.ndarray:
+        raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
+
+    def shape(self, t, amplitudes=None) -> np.ndarray:
+        """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
+        centre = np.array(self.centre or (0.0,) * self.joints)
+        return centre + self._times(amplitudes, self.unit(-np.asarray(t, float) if self.reverse else t))
+
+    def rate(self, t, amplitudes=None) -> np.ndarray:
+        """d alpha / dt, shaped like `shape`."""
+        sign = -1.0 if self.reverse else 1.0
+        return self._times(amplitudes, sign * self.unit_rate(sign * np.asarray(t, float)))
+
+    def _times(self, amplitudes, curve):
+        a = np.asarray(self.amplitude if amplitudes is None else amplitudes, float)
+        return a[(..., *([None] * curve.ndim))] * curve
+
+    def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
+        if int(phases) != phases or phases < 4:
+            raise ValueError(f"phases must be a whole number of at least 4, got {phases!r}")
+        t = 2 * np.pi * np.arange(phases) / phases
+        return self.shape(t, amplitudes), self.rate(t, amplitudes)
+
+
+def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
+    """values as a float array of that many dimensions, or ValueError naming it."""
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be numbers in equal rows, got {values!r}") from None
+    if array.ndim != ndim or not array.size or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {values!r}")
+    return array

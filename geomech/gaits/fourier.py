@@ -1,0 +1,91 @@
+"""Gaits that are finite Fourier series, among them the circle, the ellipse and the butterfly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.gaits.base import Gait, finite_array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series(Gait):
+    """unit_j(t) = sum_k cos_jk cos(k t) + sin_jk sin(k t), k = 1, 2 ...; subclasses give `coefficients`."""
+
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
+        """(cos, sin), each (joints, K)."""
+        raise TypeError(f"{type(self).__name__} gives no coefficients")
+
+    @property
+    def joints(self) -> int:
+        return self.coefficients()[0].shape[0]
+
+    def unit(self, t) -> np.ndarray:
+        cos, sin = self.coefficients()
+        kt = np.asarray(t, float)[..., None] * np.arange(1, cos.shape[1] + 1)
+        return np.cos(kt) @ cos.T + np.sin(kt) @ sin.T
+
+    def unit_rate(self, t) -> np.ndarray:
+        cos, sin = self.coefficients()
+        k = np.arange(1, cos.shape[1] + 1)
+        kt = np.asarray(t, float)[..., None] * k
+        return np.cos(kt) @ (k * sin).T - np.sin(kt) @ (k * cos).T
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle(Series):
+    """alpha = centre + amplitude (cos t, sin t): counter-clockwise, amplitude its radius in rad."""
+
+    def coefficients(self):
+        return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ellipse(Series):
+    """Semi-axes (rad at amplitude 1), the first turned counter-clockwise from alpha_1 by tilt (rad)."""
+
+    semi_axes: tuple[float, float] = (1.0, 0.5)
+    tilt: float = 0.0
+
+    def __post_init__(self):
+        axes = finite_array("semi_axes", self.semi_axes, 1)
+        if axes.size != 2 or not math.isfinite(self.tilt):
+            raise ValueError(f"an ellipse needs two semi_axes and a finite tilt, got {self.semi_axes!r}, {self.tilt!r}")
+        super().__post_init__()
+
+    def coefficients(self):
+        (a, b), c, s = self.semi_axes, math.cos(self.tilt), math.sin(self.tilt)
+        return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Butterfly(Series):
+    """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
+    (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
+    at amplitude 1."""
+
+    def coefficients(self):
+        sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
+        difference_sin = np.array([1.052, 0.0, 0.0859, 0.0, 0.0])
+        return np.array([sum_cos, sum_cos]), np.array([difference_sin, -difference_sin])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fourier(Series):
+    """Coefficients of one's own: cos and sin, each a row per joint, harmonics 1, 2 ... along the row (rad)."""
+
+    cos: tuple[tuple[float, ...], ...]
+    sin: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self):
+        cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)
+        if cos.shape != sin.shape:
+            raise ValueError(f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}")
+        for name, x in (("cos", cos), ("sin", sin)):
+            object.__setattr__(self, name, tuple(map(tuple, x.tolist())))
+        super().__post_init__()
+
+    def coefficients(self):
+        return np.array(self.cos), np.array(self.sin)

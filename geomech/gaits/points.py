@@ -1,0 +1,43 @@
+"""A closed curve through given shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.gaits.base import Gait, finite_array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Points(Gait):
+    """The periodic cubic spline through points (P >= 3 rows of joint angles, rad), in order and back to the first,
+    phase running with chord length."""
+
+    points: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self):
+        points = finite_array("points", self.points, 2)
+        if np.array_equal(points[0], points[-1]):
+            points = points[:-1]
+        if len(points) < 3 or not np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1).all():
+            raise ValueError(f"points must be at least 3 shapes, neighbours distinct, got {self.points!r}")
+        object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
+        super().__post_init__()
+
+    @property
+    def joints(self) -> int:
+        return len(self.points[0])
+
+    def _spline(self):
+        from scipy.interpolate import CubicSpline
+
+        loop = np.array([*self.points, self.points[0]])
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
+        return CubicSpline(2 * np.pi * length / length[-1], loop, bc_type="periodic")
+
+    def unit(self, t) -> np.ndarray:
+        return self._spline()(np.asarray(t, float))
+
+    def unit_rate(self, t) -> np.ndarray:
+        return self._spline()(np.asarray(t, float), 1)

@@ -1,0 +1,55 @@
+"""Connections as self-describing NetCDF (classic format, which every NetCDF library opens)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from geomech.problem import whole_file
+from geomech.scene import Scene
+
+COMPONENTS = ("x", "y", "theta")
+
+
+def save_connection(path: str | Path, scene: Scene) -> None:
+    """Write A (component, joint, alpha_1, ...), its fit residual and, for two joints, the CCF, with units and the
+    scene's text. The file appears whole or not at all."""
+    from scipy.io import netcdf_file
+
+    fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
+    with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
+        file.title = f"Local connection and curvature constraint function of the scene {scene.name}"
+        file.Conventions = "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops"
+        file.scene = scene.text or repr(scene)
+        file.numerics = repr(scene.numerics)
+        _coordinates(file, fitted)
+        angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))
+        units = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
+        _variable(file, "A", fitted.A, ("component", "joint", *angles), units, "local connection")
+        name = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
+        _variable(file, "fit_residual", fitted.residual, ("component", *angles), units, name)
+        if len(angles) == 2:
+            units = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
+            name = "curvature constraint function"
+            _variable(file, "ccf", scene.curvature.values, ("component", *angles), units, name)
+
+
+def _coordinates(file, fitted) -> None:
+    width = max(map(len, COMPONENTS))
+    file.createDimension("component", len(COMPONENTS))
+    file.createDimension("component_length", width)
+    variable = file.createVariable("component", "c", ("component", "component_length"))
+    variable[:] = np.array([list(name.ljust(width)) for name in COMPONENTS], "S1")
+    file.createDimension("joint", len(fitted.axes))
+    file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
+    for k, axis in enumerate(fitted.axes):
+        name = f"alpha_{k + 1}"
+        file.createDimension(name, len(axis))
+        _variable(file, name, axis, (name,), "rad", f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}")
+
+
+def _variable(file, name, values, dimensions, units, long_name) -> None:
+    variable = file.createVariable(name, "f8", dimensions)
+    variable[:] = values
+    variable.units, variable.long_name = units, long_name

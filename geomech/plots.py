@@ -1,0 +1,144 @@
+"""Plots: each draws on the Axes it is given, or a new one, and returns it. No pyplot, so no global state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.field import Field
+from geomech.gaits import Gait
+from geomech.problem import SceneError, whole_file
+
+STYLE = {
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "savefig.dpi": 200,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+}
+COMPONENTS = ("x", "y", r"\theta")
+METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and in print by their dashes
+    "area": {"color": "#D55E00", "linestyle": "--"},
+    "path": {"color": "#0072B2", "linestyle": "-."},
+    "direct": {"color": "black", "linestyle": "-"},
+}
+METHOD_LABEL = {"area": "area integral of the CCF", "path": "path integral of A", "direct": "force balance"}
+
+
+def figure(width: float, height: float, columns: int = 1, rows: int = 1):
+    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(STYLE):
+        fig = Figure(figsize=(width, height), layout="constrained")
+        return fig, fig.subplots(rows, columns, squeeze=False)
+
+
+def _axes(ax):
+    return figure(3.4, 3.0)[1][0, 0] if ax is None else ax
+
+
+def shape_space(ax, axes: Sequence[np.ndarray]):
+    """Label a plane of two joint angles and set it to the grid."""
+    ax.set(
+        xlabel=r"$\alpha_1$ (rad)", ylabel=r"$\alpha_2$ (rad)", aspect="equal",
+        xlim=(axes[0][0], axes[0][-1]), ylim=(axes[1][0], axes[1][-1]),
+    )  # fmt: skip
+    return ax
+
+
+def vector_field(connection: Connection, component: int = 0, unit: str = "BL", ax=None, every: int | None = None):
+    """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length."""
+    ax = _axes(ax)
+    step = every or max(1, len(connection.axes[0]) // 16)
+    pick = slice(step // 2, None, step)
+    x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
+    u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
+    arrows = ax.quiver(x, y, u, v, np.hypot(u, v), cmap="viridis", pivot="mid", width=0.006)
+    per = "rad" if component == 2 else unit
+    colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
+    colorbar.set_label(rf"$|\mathbf{{A}}^{{{COMPONENTS[component]}}}|$ ({per}/rad)")
+    return shape_space(ax, connection.axes)
+
+
+def ccf_map(field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None):
+    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)); the colours are centred on zero."""
+    from cmcrameri import cm
+
+    ax = _axes(ax)
+    values = field.values[component]
+    top = float(np.abs(values).max()) or 1.0
+    image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
+    ax.contour(*field.axes, values.T, levels=[0.0], colors="0.35", linewidths=0.6)
+    for gait in gaits:
+        draw_gait(gait, ax)
+    per = "rad" if component == 2 else unit
+    colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85)
+    colorbar.set_label(rf"CCF$_{{{COMPONENTS[component]}}}$ ({per}/rad$^2$)")
+    return shape_space(ax, field.axes)
+
+
+def draw_gait(gait: Gait, ax, color: str = "black"):
+    """The gait's curve with a dot at its start and an arrow along it."""
+    t = np.linspace(0, 2 * np.pi, 400)
+    curve = gait.shape(t)
+    ax.plot(*curve.T, color=color, lw=1.2)
+    ax.plot(*curve[0], "o", color=color, ms=3)
+    ax.annotate("", curve[58], curve[50], arrowprops={"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0})
+    return ax
+
+
+def displacement(table: Mapping, unit: str = "BL", ax=None, label: str = "", marker: str = "", xlabel: str = ""):
+    """Net displacement per cycle against amplitude, a line a tier; ``table`` as `Scene.study` gives it."""
+    ax = _axes(ax)
+    for method, style in METHOD_STYLE.items():
+        if method in table:
+            x, y, _ = np.array(table[method]).T
+            name = f"{label}, {METHOD_LABEL[method]}" if label else METHOD_LABEL[method]
+            ax.plot(table["amplitude"], np.hypot(x, y), label=name, marker=marker, ms=3, **style)
+    ax.set(xlabel=xlabel or "stroke amplitude (rad)", ylabel=f"displacement per cycle ({unit})")
+    ax.set_ylim(bottom=0)
+    ax.legend(loc="upper left")
+    return ax
+
+
+def connection_figure(connection: Connection, unit: str = "BL"):
+    """All three rows of A side by side."""
+    fig, axes = figure(10.5, 3.1, 3)
+    for component, ax in enumerate(axes[0]):
+        vector_field(connection, component, unit, ax)
+    return fig
+
+
+def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL"):
+    """All three components of the CCF side by side, with gaits drawn on them."""
+    fig, axes = figure(10.5, 3.1, 3)
+    for component, ax in enumerate(axes[0]):
+        ccf_map(field, component, gaits, unit, ax)
+    return fig
+
+
+def check_format(path: str | Path) -> Path:
+    """path if its ending is a figure format, else SceneError."""
+    formats = (".png", ".pdf", ".svg")
+    path = Path(path)
+    if path.suffix.lower() not in formats:
+        raise SceneError(f"cannot draw {path}: end the name in {', '.join(formats)}")
+    return path
+
+
+def save(fig, path: str | Path) -> None:
+    """Write a figure; the file appears whole or not at all."""
+    import matplotlib as mpl
+
+    with whole_file(check_format(path)) as part, mpl.rc_context(STYLE):
+        fig.savefig(part, dpi=STYLE["savefig.dpi"])

@@ -1,0 +1,84 @@
+"""What `geomech run` leaves behind: figures, numbers and the scene, in one folder."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from geomech import plots
+from geomech.gaits import Butterfly, Circle, Gait
+from geomech.netcdf import save_connection
+from geomech.problem import SceneError
+from geomech.scene import Scene
+
+AMPLITUDES = 10  # in the study that `run` makes of each gait
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | Path):
+    """A folder to fill; its files move to ``path`` on success and vanish on failure. SceneError if that cannot be."""
+    path = Path(path)
+    try:
+        if path.exists() and not path.is_dir():
+            raise NotADirectoryError("it is not a folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
+    except OSError as error:
+        raise SceneError(f"cannot write the folder {path}: {error.strerror or error}; choose another with -o") from None
+    try:
+        yield part
+        path.mkdir(exist_ok=True)
+        for file in part.iterdir():
+            file.replace(path / file.name)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
+    """Compute everything and write it; returns the displacement tables by gait."""
+    gaits = [scene.gait]
+    if scene.body.joints == 2:
+        gaits += [g for g in (Circle(reverse=True), Butterfly()) if type(g) is not type(scene.gait)]
+        scene.compute_field(progress)
+        save_connection(folder / "connection.nc", scene)
+        _save(plots.connection_figure(scene.fitted, scene.unit), folder / "connection")
+        _save(plots.ccf_figure(scene.curvature, gaits, scene.unit), folder / "ccf")
+    tables = {type(g).__name__.lower(): scene.study(reachable(scene, g), scene.methods, g) for g in gaits}
+    fig, axes = plots.figure(4.2 * len(gaits), 3.2, len(gaits))
+    for ax, (name, table) in zip(axes[0], tables.items()):
+        plots.displacement(table, scene.unit, ax, marker="o").set_title(name, loc="left")
+    _save(fig, folder / "displacement")
+    (folder / "displacement.json").write_text(json.dumps(tables, indent=1) + "\n")
+    (folder / "scene.toml").write_text(scene.text)
+    return tables
+
+
+def reachable(scene: Scene, gait: Gait) -> list[float]:
+    """Amplitudes up to the largest that keeps the gait inside the field and its joints within pi / 1.25."""
+    t = np.linspace(0, 2 * np.pi, 721)
+    room = min(scene.numerics.extent, np.pi / 1.25) - np.abs(np.array(gait.centre or 0.0)).max()
+    top = room / np.abs(gait.unit(t)).max()
+    if top <= 0:
+        raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
+    return [float(f"{a:.3g}") for a in np.floor(top * 1000 * np.arange(1, AMPLITUDES + 1) / AMPLITUDES) / 1000]
+
+
+def _save(fig, stem: Path) -> None:
+    for ending in (".png", ".pdf"):
+        plots.save(fig, stem.with_suffix(ending))
+
+
+def text_table(title: str, table: dict, scene: Scene) -> str:
+    """Amplitude against |displacement| by tier, as plain text."""
+    methods = [m for m in table if m in plots.METHOD_STYLE]
+    lines = [f"{title}: displacement per cycle ({scene.unit})", "amplitude" + "".join(f"{m:>12}" for m in methods)]
+    for k, a in enumerate(table["amplitude"]):
+        lines.append(f"{a:9.4g}" + "".join(f"{np.hypot(*table[m][k][:2]):12.6f}" for m in methods))
+    seconds = ", ".join(f"{k} {v:.3g}" for k, v in table["seconds"].items())
+    return "\n".join([*lines, f"seconds: {seconds}", ""])

@@ -1,0 +1,256 @@
+"""Scenes: a medium, a body, a gait and how finely to compute, from TOML. The one place that joins rft and geomech."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+import rft
+from geomech import connection as conn
+from geomech import predict
+from geomech.curvature import ccf
+from geomech.field import Field
+from geomech.gaits import KINDS as GAITS
+from geomech.gaits import Gait
+from geomech.problem import SceneError, choose
+from rft.bodies import KINDS as BODIES
+from rft.loads import element_load
+from rft.media import LAWS, is_linear
+
+METHODS = ("area", "path", "direct")
+LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How finely to compute; all optional. loads: "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation: body
+    lengths per radian (rft.balance). tolerance: normalised residual. directions: of alphadot in the least-squares
+    fit. grid: points per joint, extent: rad on either side. interpolation: spline degree. phases: per cycle."""
+
+    loads: str = "exact"
+    regularisation: float = 1e-6
+    tolerance: float = 1e-10
+    directions: int = 8
+    grid: int = 31
+    extent: float = 2.5
+    interpolation: int = 3
+    phases: int = 256
+
+    def __post_init__(self):
+        for name in ("regularisation", "tolerance", "extent"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and 0 < value <= 10):
+                raise ValueError(f"{name} must be a number > 0 and at most 10, got {value!r}")
+        for name, low, high in (("directions", 1, 4096), ("grid", 4, 4096), ("phases", 4, 1_000_000)):
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} must be a whole number from {low} to {high}, got {getattr(self, name)!r}")
+        if self.interpolation not in (1, 2, 3, 4, 5) or self.interpolation >= self.grid:
+            raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A medium, a body and a gait. text: the TOML it was read from, kept with every result."""
+
+    medium: rft.Medium
+    body: rft.Body
+    gait: Gait
+    numerics: Numerics = Numerics()
+    name: str = "scene"
+    text: str = ""
+
+    def __post_init__(self):
+        if self.gait.joints != self.body.joints:
+            kind = type(self.gait).__name__.lower()
+            raise SceneError(
+                f"{self.name}: [gait] {kind} moves {self.gait.joints} joints but [body] has {self.body.joints}: "
+                "give the body one link more than the gait has joints, or another gait"
+            )
+        try:
+            element_load(self.medium, self.numerics.loads)
+        except ValueError as error:
+            raise SceneError(f"{self.name}: [numerics] {error}") from None
+
+    def solve(self, alpha, alphadot) -> rft.Solution:
+        """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`."""
+        n = self.numerics
+        return rft.body_velocity(
+            self.medium, self.body, alpha, alphadot,
+            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
+        )  # fmt: skip
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) in the body's frame; RuntimeError if any sample did not converge."""
+        return self.solve(alpha, alphadot).checked().xi
+
+    @property
+    def unit(self) -> str:
+        """Of lengths in this scene: body lengths, or metres where the body has a size."""
+        return "BL" if self.body.length == 1.0 else "m"
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The tiers this body allows: the area tier takes two joints."""
+        return METHODS if self.body.joints == 2 else METHODS[1:]
+
+    def connection(self, progress: Callable | None = None) -> conn.Connection:
+        """The least-squares connection on the scene's grid."""
+        n, joints = self.numerics, self.body.joints
+        if n.grid**joints > LARGEST_GRID:
+            raise SceneError(
+                f"{self.name}: a field of {n.grid}^{joints} shapes is too large: lower [numerics] grid, or use "
+                "methods = direct, which needs no field"
+            )
+        return conn.fit(self.velocity, conn.grid(joints, n.grid, n.extent), n.directions, n.interpolation, progress)
+
+    @cached_property
+    def fitted(self) -> conn.Connection:
+        """`connection`, computed once."""
+        return self.connection()
+
+    def compute_field(self, progress: Callable | None = None) -> None:
+        """Fill `fitted` now, telling ``progress`` the fraction done."""
+        if "fitted" not in self.__dict__:
+            self.__dict__["fitted"] = self.connection(progress)
+
+    @cached_property
+    def curvature(self) -> Field:
+        """The CCF of `fitted`, for joints 1 and 2."""
+        return ccf(self.fitted)
+
+    def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+        """Net pose per cycle (..., 3) by one tier ("area", "path", "direct") for amplitudes (...,), gait or the scene's."""
+        gait, phases = gait or self.gait, self.numerics.phases
+        choose("methods", method, METHODS)
+        if method not in self.methods:
+            raise SceneError(f"{self.name}: the area tier takes a body of two joints: use path or direct")
+        if method == "area":
+            return predict.area(self.curvature, gait, amplitudes, phases)
+        if method == "path" and self.needs_field(method):
+            return predict.path(self.fitted, gait, amplitudes, phases)
+        # In a linear medium xi = A alphadot holds exactly: the path needs no field, and is the direct tier.
+        return predict.direct(self.velocity, gait, amplitudes, phases)
+
+    def needs_field(self, method: str) -> bool:
+        """Whether a tier looks the connection up on the grid."""
+        return method == "area" or (method == "path" and not is_linear(self.medium))
+
+    def study(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None) -> dict:
+        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "seconds": {...}}; the field is timed on its own."""
+        out: dict = {"amplitude": [float(a) for a in amplitudes]}
+        seconds = {}
+        if any(map(self.needs_field, methods)):
+            seconds["field"] = _timed(lambda: self.compute_field(progress))[1]
+        for method in methods:
+            values, seconds[method] = _timed(lambda m=method: self.displacement(m, gait, np.array(amplitudes, float)))
+            out[method] = values.tolist()
+        return {**out, "seconds": seconds}
+
+    def with_numerics(self, **changes) -> Scene:
+        """This scene with some of its [numerics] changed; None keeps a value."""
+        changes = {k: v for k, v in changes.items() if v is not None}
+        try:
+            return dataclasses.replace(self, numerics=dataclasses.replace(self.numerics, **changes))
+        except ValueError as error:
+            raise SceneError(f"{self.name}: {error}") from None
+
+
+def _timed(f: Callable):
+    start = time.perf_counter()
+    value = f()
+    return value, time.perf_counter() - start
+
+
+def builtin_names() -> list[str]:
+    """Names of the scenes that ship with the package."""
+    return sorted(p.name.removesuffix(".toml") for p in _folder().iterdir() if p.name.endswith(".toml"))
+
+
+def _folder():
+    return resources.files("geomech") / "scenes"
+
+
+def load(scene: str | Path) -> Scene:
+    """The scene of a built-in name or a TOML file; SceneError, one line, if it is not one."""
+    names = builtin_names()
+    if str(scene) in names:
+        return parse((_folder() / f"{scene}.toml").read_text(), str(scene))
+    path = Path(scene)
+    if path.suffix != ".toml" and not path.exists():
+        choose("scene", str(scene), names)
+    try:
+        text = path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise SceneError(f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}") from None
+    return parse(text, str(scene))
+
+
+def parse(text: str, name: str = "scene") -> Scene:
+    """The scene of a TOML text; SceneError if it is not one."""
+    try:
+        tables = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise SceneError(f"{name} is not TOML: {' '.join(str(error).split())}") from None
+    for table in tables:
+        choose(f"{name}: table", table, ("medium", "body", "gait", "numerics"))
+    for table in ("medium", "body", "gait"):
+        if table not in tables:
+            raise SceneError(f"{name}: the table [{table}] is missing: add it, see 'geomech scenes --show NAME'")
+    for table, value in tables.items():
+        if not isinstance(value, dict):
+            raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
+    return Scene(
+        medium=_medium(f"{name}: [medium]", tables["medium"]),
+        body=_of_kind(f"{name}: [body]", tables["body"], "kind", BODIES),
+        gait=_of_kind(f"{name}: [gait]", tables["gait"], "kind", GAITS),
+        numerics=_build(f"{name}: [numerics]", tables.get("numerics", {}), Numerics),
+        name=name,
+        text=text,
+    )
+
+
+def _medium(place: str, table: dict) -> rft.Medium:
+    if "name" not in table:
+        return _of_kind(place, table, "law", LAWS)
+    if extra := sorted(set(table) - {"name"}):
+        raise SceneError(f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'")
+    return rft.CATALOGUE[choose(f"{place} name", table["name"], rft.CATALOGUE)].medium
+
+
+def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type]):
+    if key not in table:
+        raise SceneError(f"{place} has no {key!r}: add {key} = one of {', '.join(kinds)}")
+    kind = kinds[choose(f"{place} {key}", table[key], kinds)]
+    return _build(place, {k: v for k, v in table.items() if k != key}, kind)
+
+
+def _build(place: str, table: dict, kind: type):
+    """A dataclass from a table: keys are its fields, an angle ``x`` may be given as ``x_deg``; SceneError on anything else."""
+    names = [f.name for f in dataclasses.fields(kind)]
+    values = {}
+    for key, value in table.items():
+        field, scale = key, None
+        if key not in names and key.endswith("_deg"):
+            field, scale = key.removesuffix("_deg"), math.pi / 180
+        choose(f"{place} key", field if field in names else key, names)
+        if field in values:
+            raise SceneError(f"{place}: {field} is given twice: keep one of {field} and {field}_deg")
+        if scale is not None and isinstance(value, (int, float)) and not isinstance(value, bool):
+            value = value * scale
+        values[field] = value
+    try:
+        return msgspec.convert(values, kind)
+    except (msgspec.ValidationError, OverflowError) as error:
+        text = " ".join(str(error).split())
+        raise SceneError(f"{place} {text.replace(' - at `$', ' - at `').replace(' - at ``', '')}") from None

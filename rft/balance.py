@@ -1,0 +1,288 @@
+"""Body velocity for a shape and its rate of change: the zero of the medium's force and moment (paper Eq. 5).
+
+One batch holds all samples; each follows its own path. A dry medium is first taken with its kinks rounded off
+widely (``eps``, a speed), where the problem is easy, then with less and less rounding down to the wanted
+``regularisation``; the tangent dx/d(eps) carries the solution from one level to the next. On a level the steps are
+Newton's, halved while the residual does not fall; samples that need too many go back to the start and come down
+in smaller strides. Element velocities are carried beside xi and updated by small steps, so that an element at rest
+keeps all its digits.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.bodies.base import Body, Motion
+from rft.loads import LoadLaw, element_load, parse
+from rft.media.base import Medium
+
+LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
+HALVINGS = 12  # of one step; then it is taken all the same
+STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
+ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
+
+# glibc hands freed memory back to the system, page by page, until it has once seen a large block freed. Then it keeps
+# up to twice that much for the next temporaries: half the solver's time on Linux, nothing elsewhere.
+np.empty(2**21)
+
+
+class Descent(NamedTuple):
+    """How an attempt comes down to the wanted regularisation."""
+
+    widest: float  # the first rounding of the kinks, in body lengths per radian
+    ratio: float  # of the rounding from one level to the next
+    loose: float  # residual at which a level is left
+    budget: int  # iterations allowed
+
+
+ATTEMPTS = (
+    Descent(0.03, 0.03, 1e-3, 60),
+    Descent(0.1, 0.1, 1e-4, 150),
+    Descent(0.3, 0.3, 1e-6, 500),
+    Descent(1.0, 0.6, 1e-8, 3000),
+)
+
+
+class Solution(NamedTuple):
+    """Body velocities. xi: (..., 3), body frame, (length/time, length/time, rad/time). residual: (...), the larger
+    of force over the whole body's axial yield force (its drag at unit speed in a viscous medium) and moment over
+    that times the body's length. status: (...), "sliding", "stuck" (some element at rest) or "unconverged".
+    iterations: (...), evaluations of the load."""
+
+    xi: np.ndarray
+    residual: np.ndarray
+    status: np.ndarray
+    iterations: np.ndarray
+
+    def checked(self) -> Solution:
+        """This solution, or RuntimeError if any sample is unconverged."""
+        bad = int(np.count_nonzero(self.status == "unconverged"))
+        if bad:
+            worst = float(np.max(self.residual))
+            raise RuntimeError(
+                f"{bad} of {self.status.size} force balances did not converge (worst residual {worst:.1e}): "
+                "raise 'regularisation', or report the scene"
+            )
+        return self
+
+
+def body_velocity(
+    medium: Medium,
+    body: Body,
+    alpha,
+    alphadot,
+    *,
+    loads: str = "exact",
+    regularisation: float = 1e-6,
+    tolerance: float = 1e-10,
+    threads: int | None = None,
+) -> Solution:
+    """Body velocity at which the medium's net force and moment on the body vanish.
+
+    alpha, alphadot: (..., joints), rad and rad/time; they broadcast. loads: "exact", or "midpoint:N", "gauss:N".
+    regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
+    off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
+    threads: workers, by default one per core. Raises ValueError for shapes or values that make no sense.
+    """
+    alpha, alphadot = _checked_input(body, alpha, alphadot, regularisation, tolerance)
+    batch = alpha.shape[:-1]
+    alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
+    speed = np.sqrt((alphadot * alphadot).sum(0)) if alphadot.size else np.zeros(alpha.shape[1])
+    moving = speed > 0
+    xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
+    iterations, stuck = np.zeros(speed.size, int), ~moving
+    if moving.any():
+        problem = _Problem(medium, body, loads, regularisation, tolerance)
+        solved = problem.solve(alpha[:, moving], alphadot[:, moving] / speed[moving], threads)
+        scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
+        xi[:, moving] = solved.xi * scale
+        residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
+        limit = problem.limit
+    else:
+        limit = tolerance
+    status = np.where(residual <= limit, np.where(stuck, "stuck", "sliding"), "unconverged")
+    return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))
+
+
+def _checked_input(body, alpha, alphadot, regularisation, tolerance):
+    for name, value in (("regularisation", regularisation), ("tolerance", tolerance)):
+        if not (np.isscalar(value) and np.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be a finite number > 0, got {value!r}")
+    arrays = []
+    for name, x in (("alpha", alpha), ("alphadot", alphadot)):
+        x = np.asarray(x, float)
+        if x.ndim == 0 or x.shape[-1] != body.joints:
+            raise ValueError(f"{name} must have shape (..., {body.joints}) for this body, got {x.shape}")
+        if not np.isfinite(x).all():
+            raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+        arrays.append(x)
+    try:
+        return np.broadcast_arrays(*arrays)
+    except ValueError:
+        raise ValueError(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
+
+
+class _Solved(NamedTuple):
+    xi: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+    stuck: np.ndarray
+
+
+@dataclass
+class _State:
+    """Samples under way. Every array has them on its last axis."""
+
+    index: np.ndarray
+    motion: Motion
+    xi: np.ndarray  # (3, B)
+    dx: np.ndarray  # (3, B) the step to try
+    v: np.ndarray  # (3, n, B) element velocities at xi
+    eps: np.ndarray  # the rounding at xi
+    eps_next: np.ndarray  # the rounding to try
+    halved: np.ndarray  # how often this step has been
+    residual: np.ndarray
+    iterations: np.ndarray
+
+    def take(self, keep: np.ndarray) -> _State:
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _State(**{k: x.take(keep) if k == "motion" else x[..., keep] for k, x in parts.items()})
+
+    @staticmethod
+    def join(states: list[_State]) -> _State:
+        parts = {f.name: [getattr(s, f.name) for s in states] for f in fields(_State) if f.name != "motion"}
+        motion = Motion.join([s.motion for s in states])
+        return _State(motion=motion, **{k: np.concatenate(x, -1) for k, x in parts.items()})
+
+
+class _Problem:
+    """A medium, a body and how finely to solve; `solve` takes samples as (joints, B), alphadot of norm 1."""
+
+    def __init__(self, medium: Medium, body: Body, loads: str, regularisation: float, tolerance: float):
+        self.body, self.regularisation = body, regularisation
+        self.load: LoadLaw = element_load(medium, loads)
+        self.nodes = parse(loads)[1]
+        axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
+        self.unit = axial
+        self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
+        self.linear = medium.dry == ()
+
+    def solve(self, alpha, alphadot, threads) -> _Solved:
+        size = alpha.shape[1]
+        out = _Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
+        todo = np.arange(size)
+        for descent in ATTEMPTS:
+            self._attempt(alpha, alphadot, todo, descent, out, threads)
+            todo = np.flatnonzero(out.residual > self.limit)
+            if not todo.size:
+                break
+        return out
+
+    def _attempt(self, alpha, alphadot, todo, descent: Descent, out: _Solved, threads) -> None:
+        """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
+        elements = self.body.motion(alpha[:, :1], alphadot[:, :1]).half.shape[0] * self.nodes
+        batch = max(16, ELEMENTS_TOGETHER // elements)
+
+        def work(share):
+            queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
+            while queue or state is not None:
+                while queue and (state is None or state.index.size <= batch // 2):
+                    index = queue.pop()
+                    fresh = self._start(descent.widest, index, self.body.motion(alpha[:, index], alphadot[:, index]))
+                    state = fresh if state is None else _State.join([state, fresh])
+                state = self._advance(state, descent, out)
+
+        _map(work, np.array_split(todo, _workers(threads, todo.size // (2 * batch))))
+
+    def _start(self, widest: float, index, motion: Motion) -> _State:
+        """The viscous solution, which is a dry law rounded off without end, as the first step from rest."""
+        size = index.size
+        load = self.load(*motion.v, np.full(size, 1e3))
+        first = self.regularisation if self.linear else max(widest, self.regularisation)
+        eps = np.full(size, first)
+        dx = -_solve3(motion.assembled(load.tangent), motion.total(load.force))
+        at_rest = np.zeros((3, size))
+        worst, count = np.full(size, np.inf), np.zeros(size, int)
+        return _State(index, motion, at_rest, dx, motion.v, eps, eps, count, worst, count)
+
+    def _advance(self, s: _State, descent: Descent, out: _Solved) -> _State | None:
+        """One step of all samples; those that end are written to ``out`` and leave. None when none are left."""
+        kept = self._step(s, descent)
+        ended = kept & (s.eps <= self.regularisation) & (s.residual <= self.limit)
+        ended |= s.iterations >= descent.budget
+        if ended.any():
+            self._write(s, ended, out)
+            s = s.take(np.flatnonzero(~ended))
+        return s if s.index.size else None
+
+    def _step(self, s: _State, descent: Descent) -> np.ndarray:
+        """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
+        v = s.v + s.motion.carried(s.dx)
+        load = self.load(*v, s.eps_next)
+        force = s.motion.total(load.force)
+        residual = np.abs(force).max(0) / self.unit
+        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.halved >= HALVINGS)
+        s.iterations = s.iterations + 1
+        s.xi = np.where(kept, s.xi + s.dx, s.xi)
+        s.v = np.where(kept, v, s.v)
+        s.residual = np.where(kept, residual, s.residual)
+        s.eps = s.eps_next
+        s.halved = np.where(kept, 0, s.halved + 1)
+        s.dx = np.where(kept, self._next_step(s, load, force, kept, descent), 0.5 * s.dx)
+        return kept
+
+    def _next_step(self, s: _State, load, force, kept, descent: Descent) -> np.ndarray:
+        """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
+        down = kept & (s.eps > self.regularisation) & (s.residual < descent.loose)
+        right = -force
+        if down.any():
+            s.eps_next = np.where(down, np.maximum(descent.ratio * s.eps, self.regularisation), s.eps)
+            d = np.flatnonzero(down)
+            # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v.
+            slope = np.einsum("ijnb,jnb->inb", load.tangent[..., d], s.v[..., d])
+            right[:, d] += (s.eps_next[d] / s.eps[d] - 1.0) * s.motion.take(d).total(slope)
+        dx = _solve3(s.motion.assembled(load.tangent), right)
+        return np.clip(dx, -LARGEST_STEP, LARGEST_STEP)
+
+    def _write(self, s: _State, ended: np.ndarray, out: _Solved) -> None:
+        i = s.index[ended]
+        out.xi[:, i], out.residual[i] = s.xi[:, ended], s.residual[ended]
+        out.iterations[i] += s.iterations[ended]
+        a, m, w = s.v[..., ended]
+        ends = np.sqrt(a * a + (np.abs(m) + np.abs(w)) ** 2)
+        out.stuck[i] = False if self.linear else ends.min(0) < STUCK_BELOW * self.regularisation
+
+
+def _workers(threads: int | None, useful: int) -> int:
+    return max(1, min(threads or os.cpu_count() or 1, useful))
+
+
+def _map(f: Callable, shares: list) -> None:
+    """f of each share, side by side: NumPy lets go of the interpreter inside its loops."""
+    if len(shares) == 1:
+        f(shares[0])
+    else:
+        with ThreadPoolExecutor(len(shares)) as pool:
+            list(pool.map(f, shares))
+
+
+def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """x (3, B) with matrix x = right, by Cramer's rule on (3, 3, B); a singular matrix gives no step."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    A, B, C = e * i - f * h, f * g - d * i, d * h - e * g
+    det = a * A + b * B + c * C
+    inverse = np.where(det == 0.0, 0.0, 1.0 / np.where(det == 0.0, 1.0, det))
+    x, y, z = right
+    rows = (
+        A * x + (c * h - b * i) * y + (b * f - c * e) * z,
+        B * x + (a * i - c * g) * y + (c * d - a * f) * z,
+        C * x + (b * g - a * h) * y + (a * e - b * d) * z,
+    )
+    return np.stack(rows) * inverse

@@ -1,0 +1,78 @@
+"""What a body is: straight elements, and how they move when the shape changes and the frame is held."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+
+class Motion(NamedTuple):
+    """Elements of a body, in body lengths, in the body frame; each array (n, B): elements by samples.
+
+    c, s: cosine and sine of the element's heading. r_t, r_n: along and across the element, the velocity its centre
+    takes from a unit turn of the frame. half: half lengths (n, 1). v: (3, n, B), the element's own
+    (a, m, w) of `rft.loads` while the frame is held still.
+    """
+
+    c: np.ndarray
+    s: np.ndarray
+    r_t: np.ndarray
+    r_n: np.ndarray
+    half: np.ndarray
+    v: np.ndarray
+
+    @classmethod
+    def of(cls, along, place, velocity, turn, half) -> Motion:
+        """From complex headings, places and velocities (n, B), turning rates (n, B) and half lengths (n, 1)."""
+        own = velocity * along.conj()
+        lever = 1j * place * along.conj()
+        v = np.stack([own.real, own.imag, turn * half])
+        return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, v)
+
+    def take(self, keep: np.ndarray) -> Motion:
+        """The samples that ``keep`` (an index or mask over B) selects."""
+        c, s, r_t, r_n, half, v = self
+        return Motion(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, v[:, :, keep])
+
+    @staticmethod
+    def join(motions: list[Motion]) -> Motion:
+        """The samples of several motions of one body, side by side."""
+        c, s, r_t, r_n, halves, v = zip(*motions)
+        return Motion(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), halves[0], np.concatenate(v, -1))
+
+    def carried(self, xi: np.ndarray) -> np.ndarray:
+        """(3, n, B): what the body velocity xi (3, B) adds to every element's (a, m, w)."""
+        x, y, turn = xi
+        out = np.empty_like(self.v)
+        np.add(self.c * x + self.s * y, self.r_t * turn, out=out[0])
+        np.add(self.c * y - self.s * x, self.r_n * turn, out=out[1])
+        np.multiply(self.half, turn, out=out[2])
+        return out
+
+    def total(self, force: np.ndarray) -> np.ndarray:
+        """(3, ..., B): force and moment on the frame from element averages (3, ..., n, B); the transpose of `carried`."""
+        f_t, f_n, f_s = 2.0 * self.half * force
+        parts = np.empty_like(force)
+        np.subtract(self.c * f_t, self.s * f_n, out=parts[0])
+        np.add(self.s * f_t, self.c * f_n, out=parts[1])
+        np.add(self.r_t * f_t + self.r_n * f_n, self.half * f_s, out=parts[2])
+        return parts.sum(-2)
+
+    def assembled(self, matrix: np.ndarray) -> np.ndarray:
+        """(3, 3, ..., B): sum over elements of J^T H J, from H (3, 3, ..., n, B), J the matrix of `carried`."""
+        to_t, to_n, to_w = matrix[:, 0], matrix[:, 1], matrix[:, 2]
+        columns = np.empty_like(matrix)
+        np.subtract(self.c * to_t, self.s * to_n, out=columns[:, 0])
+        np.add(self.s * to_t, self.c * to_n, out=columns[:, 1])
+        np.add(self.r_t * to_t + self.r_n * to_n, self.half * to_w, out=columns[:, 2])
+        return self.total(columns)
+
+
+class Body(Protocol):
+    """Any body whose shape is ``joints`` numbers and which is made of straight elements."""
+
+    length: float
+    joints: int
+
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion: ...

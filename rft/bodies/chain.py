@@ -1,0 +1,93 @@
+"""A chain of straight links joined by hinges: the three-link swimmer and its longer relatives (paper Fig. 11)."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.bodies.base import Motion
+from rft.media.base import require
+
+
+@dataclass(frozen=True)
+class Chain:
+    """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
+
+    lengths: relative link lengths, all > 0, at least two. length: the whole body, in the unit wanted for
+    displacement (1: body lengths; else metres). frame: "mean" (centre of mass of a uniform body, length-weighted
+    mean heading: the paper's) or "link-1", "link-2" ... (centre and heading of that link).
+    """
+
+    lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
+    length: float = 1.0
+    frame: str = "mean"
+
+    def __post_init__(self):
+        object.__setattr__(self, "lengths", tuple(float(x) for x in self.lengths))
+        require(len(self.lengths) >= 2, f"lengths needs at least two links, got {len(self.lengths)}")
+        good = all(math.isfinite(x) and x > 0 for x in self.lengths)
+        require(good, f"lengths must all be finite and > 0, got {list(self.lengths)}")
+        require(math.isfinite(self.length) and self.length > 0, f"length must be finite and > 0, got {self.length!r}")
+        self._link_of(self.frame)
+
+    @property
+    def joints(self) -> int:
+        return len(self.lengths) - 1
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Link lengths over the body's, shape (n,)."""
+        lengths = np.asarray(self.lengths)
+        return lengths / lengths.sum()
+
+    def _link_of(self, frame: str) -> int | None:
+        """Index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
+        if frame == "mean":
+            return None
+        found = re.fullmatch(r"link-([1-9]\d*)", str(frame))
+        n = len(self.lengths)
+        require(
+            bool(found) and int(found[1]) <= n,
+            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {frame!r}",
+        )
+        return int(found[1]) - 1
+
+    def _of_frame(self, x: np.ndarray, frame: str) -> np.ndarray:
+        """The frame's own value from per-link values (n, ...): its link's, or the length-weighted mean."""
+        link = self._link_of(frame)
+        return x[link] if link is not None else np.tensordot(self.fractions, x, 1)
+
+    def _links(self, alpha, alphadot):
+        """Headings (n, B), their rates, and complex places and velocities of the link centres in the body frame."""
+        zero = np.zeros_like(alpha[:1])
+        heading = np.concatenate([zero, np.cumsum(alpha, 0)])
+        turn = np.concatenate([zero, np.cumsum(alphadot, 0)])
+        heading, turn = (x - self._of_frame(x, self.frame) for x in (heading, turn))
+        half_links = (self.fractions / 2)[:, None] * np.exp(1j * heading)  # complex numbers carry the plane here
+        place, velocity = _centres(half_links, zero), _centres(half_links * (1j * turn), zero)
+        return heading, turn, *(x - self._of_frame(x, self.frame) for x in (place, velocity))
+
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion:
+        """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
+        heading, turn, place, velocity = self._links(alpha, alphadot)
+        return Motion.of(np.exp(1j * heading), place, velocity, turn, (self.fractions / 2)[:, None])
+
+    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """Pose h of another frame of this body in the body's own, and dh/dt: each (..., 3), in length units and rad.
+
+        alpha, alphadot: (..., joints). With `geomech.coordinates` this changes velocities and connections of frame.
+        """
+        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        links = self._links(*(np.moveaxis(x, -1, 0) for x in (alpha, alphadot)))
+        heading, turn, place, velocity = (self._of_frame(x, frame) for x in links)
+        place, velocity = self.length * place, self.length * velocity
+        h, hdot = (place.real, place.imag, heading), (velocity.real, velocity.imag, turn)
+        return np.stack(h, -1), np.stack(hdot, -1)
+
+
+def _centres(half_links: np.ndarray, zero: np.ndarray) -> np.ndarray:
+    """Link centres from half-link vectors (n, B), the first at the origin; velocities from their rates alike."""
+    return np.concatenate([zero + 0j, np.cumsum(half_links[:-1] + half_links[1:], 0)])

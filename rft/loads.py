@@ -1,0 +1,218 @@
+"""Force of the medium on straight elements: exact where a closed form exists, by quadrature elsewhere.
+
+An element of unit length slides along itself with speed ``a`` and sideways with ``u(s) = m + w s``,
+``s`` in [-1, 1] from tail to head, so ``w`` is its rate of turning times its half length. A load takes
+(a, m, w), arrays of one shape, and returns the averages over s
+
+    f[0] = <f_t>,  f[1] = <f_n>,  f[2] = <s f_n>
+
+of the drag per unit length, positive along the velocity it opposes, and the tangent d f / d (a, m, w).
+
+Closed form. With R = sqrt(A^2 + u^2), A^2 = q^2 a^2 + eps^2, the end values R1, R2 and S = R1 + R2 give
+elliptic coordinates mu = 2 m / S, t = 2 w / S in which A^2 = S^2 (1 - mu^2)(1 - t^2) / 4, and every average
+is elementary in mu, t and one function k(t) = (atanh t - t) / t^3:
+
+    <1/R> = (2/S)(1 + t^2 k)    <u/R> = mu    <s u/R> = (1 - mu^2) t h / 2,   h = 1 - (1 - t^2) k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.media.base import Medium
+
+TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
+SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
+SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
+
+
+class Load(NamedTuple):
+    """Averages over elements (n) of samples (B). force: (3, n, B). tangent: (3, 3, n, B)."""
+
+    force: np.ndarray
+    tangent: np.ndarray
+
+
+LoadLaw = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Load]
+
+
+def k_function(z: np.ndarray, one_minus_z: np.ndarray) -> np.ndarray:
+    """k = (atanh t - t) / t^3 for z = t^2 in [0, 1). ``one_minus_z`` is passed for its digits near z = 1."""
+    small = np.minimum(z, SERIES_BELOW)
+    series = np.full_like(z, SERIES[-1])
+    for c in SERIES[-2::-1]:
+        series *= small
+        series += c
+    t = np.sqrt(np.maximum(z, SERIES_BELOW))
+    atanh = 0.5 * np.log((1.0 + t) ** 2 / np.maximum(one_minus_z, TINY))
+    return np.where(z < SERIES_BELOW, series, (atanh - t) / (t * t * t))
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Elliptic coordinates of an element and the pieces all averages share (see the module's heading)."""
+
+    S: np.ndarray
+    mu: np.ndarray
+    t: np.ndarray
+    c_mu: np.ndarray  # 1 - mu^2
+    c_t: np.ndarray  # 1 - t^2
+    k: np.ndarray
+    h: np.ndarray
+
+    @classmethod
+    def of(cls, A2: np.ndarray, m: np.ndarray, w: np.ndarray) -> Ends:
+        abs_m, abs_w = np.abs(m), np.abs(w)
+        u_near, u_far = np.abs(abs_m - abs_w), abs_m + abs_w
+        R_near, R_far = np.sqrt(A2 + u_near * u_near), np.sqrt(A2 + u_far * u_far)
+        S = R_near + R_far + TINY
+        # S - 2 max(|m|, |w|) as a sum of positive terms: S - 2|m| and S - 2|w| would cancel.
+        excess = A2 / (R_near + u_near + TINY) + A2 / (R_far + u_far + TINY)
+        lead = abs_m - abs_w
+        inv = 1.0 / S
+        mu, t = 2.0 * m * inv, 2.0 * w * inv
+        c_mu = (excess + 2.0 * np.maximum(-lead, 0.0)) * (1.0 + np.abs(mu)) * inv
+        c_t = (excess + 2.0 * np.maximum(lead, 0.0)) * (1.0 + np.abs(t)) * inv
+        k = k_function(t * t, c_t)
+        return cls(S, mu, t, c_mu, c_t, k, 1.0 - c_t * k)
+
+
+def exact(medium: Medium) -> LoadLaw:
+    """The closed-form load of a medium made of dry and viscous terms (paper Eqs. 2-3 among them).
+
+    Raises ValueError if the medium has a law without such terms; use 'gauss:N' or 'midpoint:N' there.
+    """
+    if medium.dry is None or medium.viscous is None:
+        raise ValueError(f"{type(medium).__name__} has no closed-form link integral: use loads='gauss:24'")
+    terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)  # those with an axial part first
+    axial = sum(k_t != 0.0 for _, k_t, _ in terms)
+    q, k_t, k_n = np.array(terms).reshape(-1, 3).T
+    q2, k_t = (q * q)[:, None, None], k_t[:axial]
+
+    def load(a, m, w, eps):
+        force, tangent = _viscous(medium.viscous, a, m, w)
+        if terms:
+            ends = Ends.of(q2 * (a * a) + eps * eps, m, w)
+            _add_dry(force, tangent, ends, q2 * a, k_t, k_n, a)
+        return Load(force, tangent)
+
+    return load
+
+
+def _viscous(coefficients, a, m, w):
+    c_t, c_n = coefficients
+    force, tangent = np.zeros((3, *a.shape)), np.zeros((3, 3, *a.shape))
+    if c_t or c_n:
+        for i, (c, x) in enumerate(((c_t, a), (c_n, m), (c_n / 3.0, w))):
+            force[i], tangent[i, i] = c * x, c
+    return force, tangent
+
+
+def _add_dry(force, tangent, e: Ends, qa, k_t, k_n, a) -> None:
+    """Add sum over terms of f_t = k_t a / R, f_n = k_n u / R; ``e`` and ``qa`` = q^2 a have the terms on axis 0."""
+
+    def add(k, *targets):
+        """Add to each target the sum over terms of k times its source."""
+        for to, source in targets:
+            to += (k @ source[: k.size].reshape(k.size, -1)).reshape(to.shape)
+
+    z = e.t * e.t
+    two_S = 2.0 / e.S
+    inverse = two_S * (1.0 + z * e.k)  # <1/R>
+    p = 1.0 / (e.c_mu + e.mu * e.mu * e.c_t + TINY)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
+    cmp = e.c_mu * p
+    four_S2 = two_S * two_S
+    per_c_t = four_S2 / (e.c_t + TINY)
+    mixed_m = -four_S2 * e.mu * p  # d<1/R>/dm = -<u/R^3>
+    mixed_w = -per_c_t * e.t * (cmp - e.h)  # d<1/R>/dw = -<s u/R^3>
+    if k_t.size:
+        first = slice(0, k_t.size)
+        cube = per_c_t[first] * two_S[first] * p[first]  # <1/R^3>
+        add(
+            k_t,
+            (force[0], a * inverse[first]),
+            (tangent[0, 0], inverse[first] - qa[first] * a * cube),
+            (tangent[0, 1], a * mixed_m[first]),
+            (tangent[0, 2], a * mixed_w[first]),
+        )
+    normal = two_S * cmp
+    add(
+        k_n,
+        (force[1], e.mu),
+        (force[2], 0.5 * e.c_mu * e.t * e.h),
+        (tangent[1, 0], qa * mixed_m),
+        (tangent[2, 0], qa * mixed_w),
+        (tangent[1, 1], normal),
+        (tangent[1, 2], -e.mu * e.t * normal),
+        (tangent[2, 2], two_S * e.c_mu * (p - e.h)),
+    )
+    tangent[2, 1] = tangent[1, 2]
+
+
+def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:
+    """The load by a quadrature rule on [-1, 1] (weights summing to 1), for any medium with a `traction`."""
+    s, weight = (np.asarray(x, float)[:, None, None] for x in (nodes, weights))
+
+    def load(a, m, w, eps):
+        u = m + w * s
+        a = np.broadcast_to(a, u.shape)
+        (f_t, f_n), slopes = _pointwise(medium, a, u, eps)
+        (tt, tn), (nt, nn) = slopes
+
+        def mean(x):
+            return (weight * x).sum(0)
+
+        force = np.stack([mean(f_t), mean(f_n), mean(s * f_n)])
+        tangent = [
+            [mean(tt), mean(tn), mean(s * tn)],
+            [mean(nt), mean(nn), mean(s * nn)],
+            [mean(s * nt), mean(s * nn), mean(s * s * nn)],
+        ]
+        return Load(force, np.array(tangent))
+
+    return load
+
+
+def _pointwise(medium, v_t, v_n, eps):
+    """Traction and its 2 x 2 derivative; by central differences where the medium offers no `derivatives`."""
+    value = medium.traction(v_t, v_n, eps)
+    if hasattr(medium, "derivatives"):
+        return value, medium.derivatives(v_t, v_n, eps)
+    h = 1e-6 * np.sqrt(v_t * v_t + v_n * v_n + eps * eps) + TINY
+    along = [(p - q) / (2 * h) for p, q in zip(medium.traction(v_t + h, v_n, eps), medium.traction(v_t - h, v_n, eps))]
+    across = [(p - q) / (2 * h) for p, q in zip(medium.traction(v_t, v_n + h, eps), medium.traction(v_t, v_n - h, eps))]
+    return value, ((along[0], across[0]), (along[1], across[1]))
+
+
+def midpoint(medium: Medium, segments: int) -> LoadLaw:
+    """Each element cut into equal segments that move like their midpoints: the paper's way. Order 2 in 1/segments."""
+    nodes = (2.0 * np.arange(segments) + 1.0) / segments - 1.0
+    return quadrature(medium, nodes, np.full(segments, 1.0 / segments))
+
+
+def gauss(medium: Medium, nodes: int) -> LoadLaw:
+    """Gauss-Legendre nodes on each element; slow to converge where the pivot lies in the element (the law has a kink there)."""
+    x, weights = np.polynomial.legendre.leggauss(nodes)
+    return quadrature(medium, x, weights / 2.0)
+
+
+def parse(how: str) -> tuple[str, int]:
+    """('exact', 1), ('midpoint', n) or ('gauss', n) from 'exact', 'midpoint:n', 'gauss:n'. ValueError for other text."""
+    kind, _, count = str(how).partition(":")
+    if how == "exact":
+        return "exact", 1
+    if kind in ("midpoint", "gauss") and count.isdecimal() and 1 <= int(count) <= 10_000:
+        return kind, int(count)
+    raise ValueError(f"loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 10000, got {how!r}")
+
+
+def element_load(medium: Medium, how: str = "exact") -> LoadLaw:
+    """The load of a medium on an element, ``how`` as in `parse`."""
+    kind, count = parse(how)
+    if kind == "exact":
+        return exact(medium)
+    return {"midpoint": midpoint, "gauss": gauss}[kind](medium, count)

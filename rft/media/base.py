@@ -1,0 +1,75 @@
+"""What a medium is: the drag per unit length on a piece of body that slides along and across itself."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+
+class Medium(Protocol):
+    """A force law of the horizontal plane. Forces are in units of the medium's own axial drag.
+
+    ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
+
+        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + eps^2),
+
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the
+    closed-form link integrals of `rft.loads`. A law of another form sets both to None, supplies
+    `traction` alone and is integrated by quadrature.
+    """
+
+    dry: tuple[tuple[float, float, float], ...] | None
+    viscous: tuple[float, float] | None
+
+    def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
+        ...
+
+
+class TermLaw:
+    """Base of media that are a sum of dry and viscous terms: `traction` follows from the terms."""
+
+    dry: tuple[tuple[float, float, float], ...] = ()
+    viscous: tuple[float, float] = (0.0, 0.0)
+
+    def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
+        v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
+        f_t, f_n = self.viscous[0] * v_t, self.viscous[1] * v_n
+        for q, k_t, k_n in self.dry:
+            R = np.sqrt((q * v_t) ** 2 + v_n**2 + eps**2)
+            R = np.where(R == 0.0, 1.0, R)
+            f_t, f_n = f_t + k_t * v_t / R, f_n + k_n * v_n / R
+        return f_t, f_n
+
+    def derivatives(self, v_t, v_n, eps=0.0):
+        """((df_t/dv_t, df_t/dv_n), (df_n/dv_t, df_n/dv_n)); infinite slopes at rest are returned as 0."""
+        (tt, nn), (tn, nt) = self.viscous, (0.0, 0.0)
+        for q, k_t, k_n in self.dry:
+            R2 = (q * v_t) ** 2 + v_n**2 + eps**2
+            inverse = 1.0 / np.sqrt(np.where(R2 == 0.0, np.inf, R2))
+            cube = inverse**3
+            tt = tt + k_t * (v_n**2 + eps**2) * cube
+            tn = tn - k_t * v_t * v_n * cube
+            nt = nt - k_n * q * q * v_t * v_n * cube
+            nn = nn + k_n * ((q * v_t) ** 2 + eps**2) * cube
+        return tuple(np.broadcast_arrays(x, v_t * v_n)[0] for x in (tt, tn)), tuple(
+            np.broadcast_arrays(x, v_t * v_n)[0] for x in (nt, nn)
+        )
+
+
+def is_linear(medium: Medium) -> bool:
+    """Whether drag is proportional to velocity, so that the body velocity is linear in alphadot."""
+    return medium.dry == ()
+
+
+def require(condition: bool, text: str) -> None:
+    """Raise ValueError(text) unless the condition holds."""
+    if not condition:
+        raise ValueError(text)
+
+
+def finite_positive(x: float) -> bool:
+    return isinstance(x, (int, float)) and math.isfinite(x) and x > 0

@@ -1,0 +1,50 @@
+"""Named media, each with the source of every number."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rft.media.base import Medium
+from rft.media.coulomb import Coulomb
+from rft.media.granular import Granular
+from rft.media.viscous import Viscous
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A named medium. axial_stress: axial drag over projected area in Pa at 7.62 cm depth, or None if unknown."""
+
+    medium: Medium
+    source: str
+    axial_stress: float | None = None
+
+
+ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
+FITTED = (
+    "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to rod drag at 7.62 cm depth, "
+    "as written in third-party code; "
+)
+
+CATALOGUE = {
+    "glass-0.3mm-loose": Entry(
+        Granular(C=1.8, gamma0=math.radians(13.8)), f"{ZHANG_GOLDMAN}, Eq. 3: C = 1.8, gamma0 = 13.8 degrees", 2770.0
+    ),
+    "glass-0.3mm-loose-fitted": Entry(
+        Granular(C=0.5108 / 0.2770, gamma0=math.atan(1 / 4.0587)),
+        FITTED + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with glass-0.3mm-loose",
+        2770.0,
+    ),
+    "glass-0.3mm-close": Entry(
+        Granular(C=0.77 / 0.59, gamma0=math.radians(12.21)),
+        FITTED + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close packing is an inference",
+        5900.0,
+    ),
+    "glass-0.3mm-surface": Entry(
+        Granular(C=0.198 / 0.15, gamma0=math.atan(math.sqrt(0.00389))),
+        "Schiebel et al., eLife 9, e51412 (2020): plate 8 mm deep at the surface of 0.3 mm glass; "
+        "0.198 N against 0.15 N, tan^2 g0 = 0.00389",
+    ),
+    "viscous-2": Entry(Viscous(2.0), "Gray and Hancock, J. Exp. Biol. 32, 802 (1955): slender-body limit, 2 : 1"),
+    "coulomb": Entry(Coulomb(), "isotropic dry friction; a model, no measured constant"),
+}

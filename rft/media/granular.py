@@ -1,0 +1,38 @@
+"""Dry granular media in the horizontal plane: Eqs. 2 and 3 of Zhang and Goldman (2014)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rft.media.base import TermLaw, require
+
+
+@dataclass(frozen=True)
+class Granular(TermLaw):
+    """Resistive force per unit length of a slender body in dry grains, opposing the velocity.
+
+        f_n = (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
+
+    v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
+    Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
+
+    C: the extra normal force (no unit), >= 0. gamma0: the angle at which it saturates, in radians,
+    strictly between 0 and pi/2.
+    """
+
+    C: float
+    gamma0: float
+
+    def __post_init__(self):
+        require(math.isfinite(self.C) and self.C >= 0, f"C must be a finite number >= 0, got {self.C!r}")
+        require(
+            math.isfinite(self.gamma0) and 0 < self.gamma0 < math.pi / 2,
+            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees",
+        )
+
+    @property
+    def dry(self):
+        # With v_t^2 + v_n^2 written out, C (v.n) / sqrt(tan^2 g0 + (v.n)^2)
+        # = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2): a second dry term.
+        return (1.0, 1.0, 1.0), (math.sin(self.gamma0), 0.0, self.C * math.cos(self.gamma0))

@@ -1,0 +1,25 @@
+"""Low-Reynolds-number drag, the paper's comparison (Fig. 5(c)): linear in the velocity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rft.media.base import TermLaw, require
+
+
+@dataclass(frozen=True)
+class Viscous(TermLaw):
+    """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
+
+    ratio: normal over axial drag, > 0; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+    """
+
+    ratio: float = 2.0
+
+    def __post_init__(self):
+        require(math.isfinite(self.ratio) and self.ratio > 0, f"ratio must be a finite number > 0, got {self.ratio!r}")
+
+    @property
+    def viscous(self):
+        return 1.0, float(self.ratio)
