@@ -117,8 +117,8 @@ def displacement(
     with progress(f"displacement of {scene.name}") as bar:
         table = scene.study(values, chosen or scene.methods, progress=bar)
     if plot:
-        fig, axes = plots.figure(4.2, 3.0)
-        plots.displacement(table, scene.unit, axes[0, 0])
+        fig, axes = plots.figure(3.6, 3.4)
+        plots.displacement(table, scene.unit, axes[0, 0], gait=scene.gait, marker="o")
         plots.save(fig, plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))
 

@@ -15,7 +15,7 @@ import numpy as np
 from geomech.field import Field
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
-SAMPLES_TOGETHER = 200_000  # velocities asked for in one call
+SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
 
 
 @dataclass(frozen=True)
@@ -69,24 +69,33 @@ def directions(joints: int, count: int) -> np.ndarray:
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
-def fit(velocity: Velocity, axes, count: int = 8, degree: int = 3, progress: Callable | None = None) -> Connection:
+def fit(
+    velocity: Velocity, axes, count: int = 8, degree: int = 3, progress: Callable | None = None, mirror: bool = False
+) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
-    progress: called with the fraction done. Raises what ``velocity`` raises.
+    progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that
+    xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half.
+    Raises what ``velocity`` raises.
     """
     axes = tuple(np.asarray(a, float) for a in axes)
+    mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
     unit = directions(len(axes), count)
     solve = np.linalg.pinv(unit)  # (d, count): A^T = pinv(directions) xi
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
     A, residual, speed = (np.empty((len(alpha), *tail)) for tail in ((3, len(axes)), (3,), (3,)))
+    todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
     step = max(1, SAMPLES_TOGETHER // len(unit))
-    for k in range(0, len(alpha), step):
-        here = slice(k, k + step)
+    for k in range(0, todo, step):
+        here = slice(k, min(k + step, todo))
         xi = velocity(alpha[here, None], unit)
         A[here] = np.einsum("jc,sci->sij", solve, xi)
         off = xi - np.einsum("sij,cj->sci", A[here], unit)
         residual[here], speed[here] = np.sqrt((off**2).mean(1)), np.sqrt((xi**2).mean(1))
         if progress:
-            progress(min(1.0, (k + step) / len(alpha)))
+            progress(here.stop / todo)
+    rest = slice(todo, None)  # in C order, alpha -> -alpha is the grid read backwards
+    A[rest] = np.array([-1.0, 1.0, 1.0])[:, None] * A[: len(alpha) - todo][::-1]
+    residual[rest], speed[rest] = residual[: len(alpha) - todo][::-1], speed[: len(alpha) - todo][::-1]
     shape = tuple(len(a) for a in axes)
     return Connection(axes, *(np.moveaxis(x, 0, -1).reshape(*x.shape[1:], *shape) for x in (A, residual, speed)), degree)

@@ -40,7 +40,8 @@ def _coordinates(file, fitted) -> None:
     file.createDimension("component", len(COMPONENTS))
     file.createDimension("component_length", width)
     variable = file.createVariable("component", "c", ("component", "component_length"))
-    variable[:] = np.array([list(name.ljust(width)) for name in COMPONENTS], "S1")
+    variable[:] = np.array([list(name.ljust(width, "\0")) for name in COMPONENTS], "S1")
+    variable._Encoding = "ascii"
     file.createDimension("joint", len(fitted.axes))
     file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
     for k, axis in enumerate(fitted.axes):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -22,7 +23,7 @@ STYLE = {
     "axes.spines.right": False,
     "savefig.dpi": 200,
     "svg.fonttype": "none",
-    "pdf.fonttype": 42,
+    "lines.markersize": 3,
 }
 COMPONENTS = ("x", "y", r"\theta")
 METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and in print by their dashes
@@ -33,14 +34,27 @@ METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and
 METHOD_LABEL = {"area": "area integral of the CCF", "path": "path integral of A", "direct": "force balance"}
 
 
+def styled(draw):
+    """Make a drawing function use the project's style, whatever the caller's is."""
+
+    @functools.wraps(draw)
+    def in_style(*args, **kwargs):
+        import matplotlib as mpl
+
+        with mpl.rc_context(STYLE):
+            return draw(*args, **kwargs)
+
+    return in_style
+
+
+@styled
 def figure(width: float, height: float, columns: int = 1, rows: int = 1):
     """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap."""
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context(STYLE):
-        fig = Figure(figsize=(width, height), layout="constrained")
-        return fig, fig.subplots(rows, columns, squeeze=False)
+    fig = Figure(figsize=(width, height), layout="constrained")
+    fig.get_layout_engine().set(wspace=0.06)
+    return fig, fig.subplots(rows, columns, squeeze=False)
 
 
 def _axes(ax):
@@ -56,20 +70,22 @@ def shape_space(ax, axes: Sequence[np.ndarray]):
     return ax
 
 
+@styled
 def vector_field(connection: Connection, component: int = 0, unit: str = "BL", ax=None, every: int | None = None):
     """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length."""
     ax = _axes(ax)
-    step = every or max(1, len(connection.axes[0]) // 16)
+    step = every or max(1, len(connection.axes[0]) // 12)
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
-    arrows = ax.quiver(x, y, u, v, np.hypot(u, v), cmap="viridis", pivot="mid", width=0.006)
+    arrows = ax.quiver(x, y, u, v, np.hypot(u, v), cmap="viridis", pivot="mid", width=0.007)
     per = "rad" if component == 2 else unit
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
     colorbar.set_label(rf"$|\mathbf{{A}}^{{{COMPONENTS[component]}}}|$ ({per}/rad)")
     return shape_space(ax, connection.axes)
 
 
+@styled
 def ccf_map(field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None):
     """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)); the colours are centred on zero."""
     from cmcrameri import cm
@@ -87,6 +103,7 @@ def ccf_map(field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: 
     return shape_space(ax, field.axes)
 
 
+@styled
 def draw_gait(gait: Gait, ax, color: str = "black"):
     """The gait's curve with a dot at its start and an arrow along it."""
     t = np.linspace(0, 2 * np.pi, 400)
@@ -97,31 +114,39 @@ def draw_gait(gait: Gait, ax, color: str = "black"):
     return ax
 
 
-def displacement(table: Mapping, unit: str = "BL", ax=None, label: str = "", marker: str = "", xlabel: str = ""):
-    """Net displacement per cycle against amplitude, a line a tier; ``table`` as `Scene.study` gives it."""
+@styled
+def displacement(table: Mapping, unit: str = "BL", ax=None, label: str = "", gait: Gait | None = None, **style):
+    """Net displacement per cycle (`net`) against amplitude, a line a tier; ``table`` as `Scene.study` gives it."""
     ax = _axes(ax)
-    for method, style in METHOD_STYLE.items():
+    for method in METHOD_STYLE:
         if method in table:
-            x, y, _ = np.array(table[method]).T
             name = f"{label}, {METHOD_LABEL[method]}" if label else METHOD_LABEL[method]
-            ax.plot(table["amplitude"], np.hypot(x, y), label=name, marker=marker, ms=3, **style)
-    ax.set(xlabel=xlabel or "stroke amplitude (rad)", ylabel=f"displacement per cycle ({unit})")
-    ax.set_ylim(bottom=0)
-    ax.legend(loc="upper left")
+            ax.plot(table["amplitude"], net(table[method]), label=name, **{**METHOD_STYLE[method], **style})
+    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    ax.set(xlabel=gait.amplitude_label if gait else "amplitude", ylabel=f"displacement per cycle ({unit})")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     return ax
 
 
+def net(poses) -> np.ndarray:
+    """Signed displacement (...,) of poses (..., 3): the distance, negative where it points backwards (x < 0)."""
+    poses = np.asarray(poses, float)
+    return np.copysign(np.hypot(poses[..., 0], poses[..., 1]), poses[..., 0])
+
+
+@styled
 def connection_figure(connection: Connection, unit: str = "BL"):
     """All three rows of A side by side."""
-    fig, axes = figure(10.5, 3.1, 3)
+    fig, axes = figure(10.8, 3.0, 3)
     for component, ax in enumerate(axes[0]):
         vector_field(connection, component, unit, ax)
     return fig
 
 
+@styled
 def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL"):
     """All three components of the CCF side by side, with gaits drawn on them."""
-    fig, axes = figure(10.5, 3.1, 3)
+    fig, axes = figure(10.8, 3.0, 3)
     for component, ax in enumerate(axes[0]):
         ccf_map(field, component, gaits, unit, ax)
     return fig
@@ -136,9 +161,8 @@ def check_format(path: str | Path) -> Path:
     return path
 
 
+@styled
 def save(fig, path: str | Path) -> None:
     """Write a figure; the file appears whole or not at all."""
-    import matplotlib as mpl
-
-    with whole_file(check_format(path)) as part, mpl.rc_context(STYLE):
+    with whole_file(check_format(path)) as part:
         fig.savefig(part, dpi=STYLE["savefig.dpi"])

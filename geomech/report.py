@@ -50,9 +50,9 @@ def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
         _save(plots.connection_figure(scene.fitted, scene.unit), folder / "connection")
         _save(plots.ccf_figure(scene.curvature, gaits, scene.unit), folder / "ccf")
     tables = {type(g).__name__.lower(): scene.study(reachable(scene, g), scene.methods, g) for g in gaits}
-    fig, axes = plots.figure(4.2 * len(gaits), 3.2, len(gaits))
-    for ax, (name, table) in zip(axes[0], tables.items()):
-        plots.displacement(table, scene.unit, ax, marker="o").set_title(name, loc="left")
+    fig, axes = plots.figure(3.6 * len(gaits), 3.4, len(gaits))
+    for ax, gait, table in zip(axes[0], gaits, tables.values()):
+        plots.displacement(table, scene.unit, ax, gait=gait, marker="o")
     _save(fig, folder / "displacement")
     (folder / "displacement.json").write_text(json.dumps(tables, indent=1) + "\n")
     (folder / "scene.toml").write_text(scene.text)
@@ -75,10 +75,11 @@ def _save(fig, stem: Path) -> None:
 
 
 def text_table(title: str, table: dict, scene: Scene) -> str:
-    """Amplitude against |displacement| by tier, as plain text."""
+    """Amplitude against net displacement (`plots.net`) by tier, as plain text."""
     methods = [m for m in table if m in plots.METHOD_STYLE]
     lines = [f"{title}: displacement per cycle ({scene.unit})", "amplitude" + "".join(f"{m:>12}" for m in methods)]
-    for k, a in enumerate(table["amplitude"]):
-        lines.append(f"{a:9.4g}" + "".join(f"{np.hypot(*table[m][k][:2]):12.6f}" for m in methods))
+    columns = [plots.net(table[m]) for m in methods]
+    for amplitude, *row in zip(table["amplitude"], *columns):
+        lines.append(f"{amplitude:9.4g}" + "".join(f"{x:12.6f}" for x in row))
     seconds = ", ".join(f"{k} {v:.3g}" for k, v in table["seconds"].items())
     return "\n".join([*lines, f"seconds: {seconds}", ""])

@@ -111,7 +111,8 @@ class Scene:
                 f"{self.name}: a field of {n.grid}^{joints} shapes is too large: lower [numerics] grid, or use "
                 "methods = direct, which needs no field"
             )
-        return conn.fit(self.velocity, conn.grid(joints, n.grid, n.extent), n.directions, n.interpolation, progress)
+        axes = conn.grid(joints, n.grid, n.extent)
+        return conn.fit(self.velocity, axes, n.directions, n.interpolation, progress, self.medium.mirror)
 
     @cached_property
     def fitted(self) -> conn.Connection:

@@ -67,16 +67,16 @@ class Ends:
     @classmethod
     def of(cls, A2: np.ndarray, m: np.ndarray, w: np.ndarray) -> Ends:
         abs_m, abs_w = np.abs(m), np.abs(w)
-        u_near, u_far = np.abs(abs_m - abs_w), abs_m + abs_w
+        lead = abs_m - abs_w
+        u_near, u_far = np.abs(lead), abs_m + abs_w
         R_near, R_far = np.sqrt(A2 + u_near * u_near), np.sqrt(A2 + u_far * u_far)
         S = R_near + R_far + TINY
         # S - 2 max(|m|, |w|) as a sum of positive terms: S - 2|m| and S - 2|w| would cancel.
         excess = A2 / (R_near + u_near + TINY) + A2 / (R_far + u_far + TINY)
-        lead = abs_m - abs_w
         inv = 1.0 / S
         mu, t = 2.0 * m * inv, 2.0 * w * inv
-        c_mu = (excess + 2.0 * np.maximum(-lead, 0.0)) * (1.0 + np.abs(mu)) * inv
-        c_t = (excess + 2.0 * np.maximum(lead, 0.0)) * (1.0 + np.abs(t)) * inv
+        c_mu = (excess + (u_near - lead)) * (1.0 + np.abs(mu)) * inv
+        c_t = (excess + (u_near + lead)) * (1.0 + np.abs(t)) * inv
         k = k_function(t * t, c_t)
         return cls(S, mu, t, c_mu, c_t, k, 1.0 - c_t * k)
 

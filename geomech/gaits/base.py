@@ -34,6 +34,11 @@ class Gait:
     def joints(self) -> int:
         return 2
 
+    @property
+    def amplitude_label(self) -> str:
+        """For an axis of amplitudes."""
+        return f"amplitude of the {type(self).__name__.lower()} (scale)"
+
     def unit(self, t) -> np.ndarray:
         raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
 

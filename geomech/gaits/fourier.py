@@ -38,6 +38,10 @@ class Series(Gait):
 class Circle(Series):
     """alpha = centre + amplitude (cos t, sin t): counter-clockwise, amplitude its radius in rad."""
 
+    @property
+    def amplitude_label(self) -> str:
+        return "radius of the circle (rad)"
+
     def coefficients(self):
         return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
 

@@ -52,11 +52,13 @@ class Motion(NamedTuple):
 
     def total(self, force: np.ndarray) -> np.ndarray:
         """(3, ..., B): force and moment on the frame from element averages (3, ..., n, B); the transpose of `carried`."""
-        f_t, f_n, f_s = 2.0 * self.half * force
+        f_t, f_n, f_s = force
+        length = 2.0 * self.half
+        c, s = length * self.c, length * self.s
         parts = np.empty_like(force)
-        np.subtract(self.c * f_t, self.s * f_n, out=parts[0])
-        np.add(self.s * f_t, self.c * f_n, out=parts[1])
-        np.add(self.r_t * f_t + self.r_n * f_n, self.half * f_s, out=parts[2])
+        np.subtract(c * f_t, s * f_n, out=parts[0])
+        np.add(s * f_t, c * f_n, out=parts[1])
+        np.add(length * self.r_t * f_t + length * self.r_n * f_n, length * self.half * f_s, out=parts[2])
         return parts.sum(-2)
 
     def assembled(self, matrix: np.ndarray) -> np.ndarray:

@@ -81,8 +81,8 @@ class Chain:
         alpha, alphadot: (..., joints). With `geomech.coordinates` this changes velocities and connections of frame.
         """
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        links = self._links(*(np.moveaxis(x, -1, 0) for x in (alpha, alphadot)))
-        heading, turn, place, velocity = (self._of_frame(x, frame) for x in links)
+        links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
+        heading, turn, place, velocity = (self._of_frame(x, frame).reshape(alpha.shape[:-1]) for x in links)
         place, velocity = self.length * place, self.length * velocity
         h, hdot = (place.real, place.imag, heading), (velocity.real, velocity.imag, turn)
         return np.stack(h, -1), np.stack(hdot, -1)

@@ -22,6 +22,7 @@ class Medium(Protocol):
 
     dry: tuple[tuple[float, float, float], ...] | None
     viscous: tuple[float, float] | None
+    mirror: bool  # left and right are alike: f_n is odd, f_t even in v_n
 
     def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -33,6 +34,7 @@ class TermLaw:
 
     dry: tuple[tuple[float, float, float], ...] = ()
     viscous: tuple[float, float] = (0.0, 0.0)
+    mirror = True
 
     def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""

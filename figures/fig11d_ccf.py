@@ -1,0 +1,25 @@
+"""Fig. 11(d): the x component of the CCF of the three-link swimmer, with a circle and a butterfly gait."""
+
+from __future__ import annotations
+
+from figures import main
+from geomech import plots
+from geomech.gaits import Butterfly
+from geomech.scene import load
+
+
+def compute(scene: str = "three-link-glass", **numerics) -> dict:
+    """The CCF on its grid (a Field with values (3, N, N)) and the gaits."""
+    loaded = load(scene).with_numerics(**numerics)
+    return {"ccf": loaded.curvature, "gaits": [loaded.gait, Butterfly()], "unit": loaded.unit}
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(4.2, 3.4)
+    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], numbers["unit"], axes[0, 0])
+    return fig
+
+
+if __name__ == "__main__":
+    main("fig11d", compute, draw)

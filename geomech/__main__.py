@@ -1,0 +1,3 @@
+from geomech.cli import main
+
+main()

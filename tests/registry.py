@@ -1,0 +1,38 @@
+"""Everything the property tests run over. A new medium, body or gait is added here, in one line."""
+
+import math
+
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
+from rft import Chain, Coulomb, Granular, Viscous
+from rft.media import CATALOGUE
+
+MEDIA = {
+    **{name: entry.medium for name, entry in CATALOGUE.items()},
+    "sharp": Granular(C=1.8, gamma0=math.radians(0.1)),
+    "blunt": Granular(C=1.8, gamma0=math.radians(89.9)),
+    "no-extra": Granular(C=0.0, gamma0=0.3),
+    "strong": Granular(C=1e3, gamma0=0.24),
+    "viscous-1": Viscous(1.0),
+    "viscous-slippery": Viscous(1e4),
+}
+DRY = {k: m for k, m in MEDIA.items() if m.dry}
+LINEAR = {k: m for k, m in MEDIA.items() if not m.dry}
+
+BODIES = {
+    "two": Chain((1, 2)),
+    "three": Chain((1, 1, 1)),
+    "three-middle": Chain((1, 1, 1), frame="link-2"),
+    "uneven": Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
+    "five": Chain((1,) * 5),
+}
+
+GAITS = {
+    "circle": Circle(amplitude=0.9, centre=(0.2, -0.1)),
+    "ellipse": Ellipse(semi_axes=(1.0, 0.4), tilt=0.7),
+    "butterfly": Butterfly(amplitude=0.8),
+    "backwards": Butterfly(reverse=True),
+    "fourier": Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0))),
+    "points": Points(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9))),
+}
+
+assert Coulomb in {type(m) for m in MEDIA.values()}

@@ -1,0 +1,184 @@
+"""Body velocities: closed form, an independent solver, symmetries, status, bad input."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from registry import BODIES, DRY, LINEAR, MEDIA
+
+from geomech import symbolic
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity
+from rft.balance import ATTEMPTS
+from rft.symbolic import viscous_chain
+
+GLASS = MEDIA["glass-0.3mm-loose"]
+THREE = Chain()
+
+
+def samples(body, count, seed=0, spread=2.8):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-spread, spread, (count, body.joints)), rng.normal(size=(count, body.joints))
+
+
+def test_viscous_swimmer_in_its_middle_link_frame():
+    """A(0, 0) of Purcell's swimmer at 2 : 1, exactly."""
+    xi = body_velocity(Viscous(2.0), Chain(frame="link-2"), [0.0, 0.0], np.eye(2)).xi
+    np.testing.assert_allclose(xi.T, [[0, 0], [-1 / 18, -1 / 18], [7 / 27, -7 / 27]], atol=1e-15)
+
+
+@pytest.mark.parametrize("link", [1, 2, 3])
+def test_viscous_chain_agrees_with_sympy(link):
+    A, alpha = viscous_chain((2, 3, 4), ratio=1.7, link=link)
+    shapes, rates = samples(THREE, 40)
+    got = body_velocity(Viscous(1.7), Chain((2, 3, 4), frame=f"link-{link}"), shapes, rates)
+    np.testing.assert_allclose(got.xi, symbolic.velocity(A, alpha)(shapes, rates), rtol=1e-11, atol=1e-13)
+    assert (got.iterations == 1).all()
+
+
+@pytest.mark.parametrize("medium", MEDIA)
+@pytest.mark.parametrize("body", BODIES)
+def test_everything_converges(medium, body):
+    solution = body_velocity(MEDIA[medium], BODIES[body], *samples(BODIES[body], 200))
+    assert set(solution.status.tolist()) <= {"sliding", "stuck"}
+    assert solution.residual.max() < 1e-9
+    assert solution.iterations.max() < sum(a.budget for a in ATTEMPTS)
+    if medium in LINEAR:
+        assert (solution.iterations == 1).all()
+        assert (solution.status == "sliding").all()
+
+
+def plain_force(medium, lengths, alpha, alphadot, xi, eps, nodes=4000):
+    """Net force and moment in the middle link's frame of a three-link body, written out anew: midpoint segments."""
+    force = np.zeros(3)
+    half = np.array(lengths) / sum(lengths) / 2
+    s = (np.arange(nodes) + 0.5) / nodes * 2 - 1
+    for heading, turn, joint, sign, h in (
+        (-alpha[0], -alphadot[0], -half[1], -1, half[0]),
+        (0.0, 0.0, 0.0, 0, half[1]),
+        (alpha[1], alphadot[1], half[1], 1, half[2]),
+    ):
+        along, normal = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+        arm = (s + sign)[:, None] * h * along  # from the joint
+        place = np.array([joint, 0.0]) + arm
+        velocity = xi[:2] + xi[2] * place @ [[0, 1], [-1, 0]] + turn * arm @ [[0, 1], [-1, 0]]
+        f_t, f_n = medium.traction(velocity @ along, velocity @ normal, eps)
+        f = 2 * h / nodes * (f_t[:, None] * along + f_n[:, None] * normal)
+        force += [*f.sum(0), (place[:, 0] * f[:, 1] - place[:, 1] * f[:, 0]).sum()]
+    return force
+
+
+@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "viscous-2"])
+def test_forces_vanish_by_an_independent_sum(medium):
+    body = Chain((1, 2, 1.5), frame="link-2")
+    alpha, alphadot = samples(body, 12, seed=3)
+    alphadot /= np.linalg.norm(alphadot, axis=1, keepdims=True)
+    eps = 1e-3
+    xi = body_velocity(MEDIA[medium], body, alpha, alphadot, regularisation=eps).xi
+    for a, d, x in zip(alpha, alphadot, xi):
+        residual = plain_force(MEDIA[medium], body.lengths, a, d, x, eps)
+        assert np.abs(residual).max() < 1e-5  # of the order 2 midpoint rule
+        moved = plain_force(MEDIA[medium], body.lengths, a, d, x + [0.01, 0, 0], eps)
+        assert np.abs(moved).max() > 1e-4  # the test can tell
+
+
+@pytest.mark.parametrize("rule", ["midpoint", "gauss"])
+def test_quadrature_loads_approach_the_exact_ones(rule):
+    alpha, alphadot = samples(THREE, 60, seed=4)
+    exact = body_velocity(GLASS, THREE, alpha, alphadot, regularisation=1e-3).xi
+    errors = []
+    for nodes in (10, 40, 160):
+        other = body_velocity(GLASS, THREE, alpha, alphadot, regularisation=1e-3, loads=f"{rule}:{nodes}").checked()
+        errors.append(np.sqrt(np.mean((other.xi - exact) ** 2)))
+    assert errors[2] < 1e-3
+    assert errors[1] < errors[0] / 2
+    assert errors[2] < errors[1] / 2
+
+
+@pytest.mark.parametrize("medium", DRY)
+def test_dry_media_do_not_know_time(medium):
+    alpha, alphadot = samples(THREE, 20)
+    one = body_velocity(DRY[medium], THREE, alpha, alphadot).xi
+    for c in (1e-12, 1e12):
+        off = body_velocity(DRY[medium], THREE, alpha, c * alphadot).xi / c - one
+        assert (np.linalg.norm(off, axis=1) < 1e-12 * np.linalg.norm(one, axis=1)).all()
+
+
+@pytest.mark.parametrize("medium", MEDIA)
+def test_mirror_and_reversal(medium):
+    alpha, alphadot = samples(THREE, 50)
+    solve = lambda a, d: body_velocity(MEDIA[medium], THREE, a, d, tolerance=1e-12).xi  # noqa: E731
+    xi = solve(alpha, alphadot)
+    np.testing.assert_allclose(solve(alpha, -alphadot), -xi, atol=1e-9)
+    np.testing.assert_allclose(solve(-alpha, -alphadot), xi * [1, -1, -1], atol=1e-9)
+    np.testing.assert_allclose(solve(-alpha[:, ::-1], -alphadot[:, ::-1]), xi * [-1, -1, 1], atol=1e-9)
+
+
+def test_the_body_that_stays_put():
+    """alpha = (1.5, 1.5), both joints driven alike: the middle link does not move, the others only turn."""
+    solution = body_velocity(GLASS, Chain(frame="link-2"), [1.5, 1.5], [1.0, 1.0])
+    assert solution.status == "stuck"
+    assert np.abs(solution.xi).max() < 3e-6
+
+
+def test_four_percent_of_random_samples_stick():
+    solution = body_velocity(GLASS, THREE, *samples(THREE, 4000))
+    assert np.mean(solution.status == "stuck") == pytest.approx(0.04, abs=0.01)
+
+
+def test_no_motion_without_joint_motion():
+    solution = body_velocity(GLASS, THREE, [[0.3, 1.0], [0.3, 1.0]], [[0.0, 0.0], [1.0, 0.0]])
+    assert np.array_equal(solution.xi[0], np.zeros(3))
+    assert solution.status.tolist() == ["stuck", "sliding"]
+
+
+def test_batches_broadcast_and_keep_their_shape():
+    alpha, alphadot = np.zeros((4, 1, 2)) + 0.3, np.eye(2)
+    solution = body_velocity(GLASS, THREE, alpha, alphadot)
+    assert solution.xi.shape == (4, 2, 3)
+    assert solution.residual.shape == solution.status.shape == solution.iterations.shape == (4, 2)
+    single = body_velocity(GLASS, THREE, alpha[0, 0], alphadot[1])
+    np.testing.assert_allclose(single.xi, solution.xi[0, 1], atol=1e-9)
+    assert body_velocity(GLASS, THREE, np.zeros((0, 2)), np.zeros((0, 2))).xi.shape == (0, 3)
+
+
+def test_length_scales_translation_only():
+    alpha, alphadot = samples(THREE, 10)
+    one, tiny = (body_velocity(GLASS, dataclasses.replace(THREE, length=x), alpha, alphadot).xi for x in (1.0, 1e-6))
+    np.testing.assert_allclose(tiny, one * [1e-6, 1e-6, 1.0], rtol=1e-13)
+
+
+def test_a_starved_solver_says_so(monkeypatch):
+    monkeypatch.setattr("rft.balance.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
+    solution = body_velocity(GLASS, THREE, *samples(THREE, 20))
+    assert (solution.status == "unconverged").all()
+    assert (solution.residual > 1e-10).all()
+    with pytest.raises(RuntimeError, match="20 of 20 force balances did not converge"):
+        solution.checked()
+
+
+@pytest.mark.parametrize(
+    ("alpha", "alphadot", "kwargs", "said"),
+    [
+        ([0.0], [1.0], {}, r"alpha must have shape \(\.\.\., 2\) for this body, got \(1,\)"),
+        ([0.0, np.nan], [1.0, 0.0], {}, "alpha must be finite, got nan"),
+        ([0.0, 0.0], [1.0, np.inf], {}, "alphadot must be finite, got inf"),
+        (np.zeros((3, 2)), np.zeros((4, 2)), {}, "do not broadcast"),
+        ([0.0, 0.0], [1.0, 0.0], {"regularisation": 0.0}, "regularisation must be a finite number > 0, got 0.0"),
+        ([0.0, 0.0], [1.0, 0.0], {"loads": "best"}, "loads must be"),
+    ],
+)
+def test_bad_input_is_refused(alpha, alphadot, kwargs, said):
+    with pytest.raises(ValueError, match=said):
+        body_velocity(GLASS, THREE, alpha, alphadot, **kwargs)
+
+
+def test_threads_give_the_same_answer():
+    alpha, alphadot = samples(THREE, 40_000)
+    one, two = (body_velocity(Coulomb(), THREE, alpha, alphadot, threads=n).xi for n in (1, 2))
+    np.testing.assert_allclose(two, one, atol=1e-9)
+
+
+def test_granular_with_no_extra_force_is_coulomb():
+    alpha, alphadot = samples(THREE, 50)
+    a, b = (body_velocity(m, THREE, alpha, alphadot).xi for m in (Granular(0.0, 0.3), Coulomb()))
+    np.testing.assert_allclose(a, b, atol=1e-9)

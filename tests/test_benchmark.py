@@ -1,0 +1,77 @@
+"""Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock time."""
+
+import time
+
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+
+from geomech import connection
+from rft import CATALOGUE, Chain, body_velocity
+
+pytestmark = pytest.mark.benchmark
+GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+
+
+def field_samples(points=31, count=8, extent=2.5):
+    axis, angle = np.linspace(-extent, extent, points), np.pi * np.arange(count) / count
+    alpha = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1)[:, :, None]
+    return np.broadcast_arrays(alpha, np.stack([np.cos(angle), np.sin(angle)], -1))
+
+
+def one_scipy_solve(alpha, alphadot, segments=20, tan2=np.tan(np.radians(13.8)) ** 2, C=1.8):
+    """What a user writes today: midpoint segments in the middle link's frame, Eqs. 2-3 as printed, fsolve."""
+    half = 1 / 6
+    s = ((np.arange(segments) + 0.5) / segments * 2 - 1) * half
+    headings = np.array([-alpha[0], 0.0, alpha[1]])
+    turns = np.array([-alphadot[0], 0.0, alphadot[1]])
+    t = np.stack([np.cos(headings), np.sin(headings)], -1)[:, None]
+    n = np.stack([-t[..., 1], t[..., 0]], -1)
+    joints = np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0]])[:, None]
+    arms = (s + np.array([-half, 0.0, half])[:, None])[..., None] * t
+    place = joints + arms
+
+    def force(xi):
+        spin = xi[2] * np.stack([-place[..., 1], place[..., 0]], -1)
+        swing = turns[:, None, None] * np.stack([-arms[..., 1], arms[..., 0]], -1)
+        v = xi[:2] + spin + swing
+        v = v / (np.sqrt((v**2).sum(-1, keepdims=True)) + 1e-12)
+        vn, vt = (v * n).sum(-1, keepdims=True), (v * t).sum(-1, keepdims=True)
+        f = (1 + C / np.sqrt(tan2 + vn**2)) * vn * n + vt * t
+        moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
+        return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
+
+    return fsolve(force, np.zeros(3), full_output=True)
+
+
+def test_field_against_a_loop_of_fsolve():
+    alpha, alphadot = field_samples()
+    flat = alpha.reshape(-1, 2), alphadot.reshape(-1, 2)
+    some = np.random.default_rng(0).choice(len(flat[0]), 400, replace=False)
+    middle = Chain(frame="link-2")
+    plain, ours, theirs = [], [], []
+    for part in np.split(some, 4):  # in turn, so that both meet the same moods of the machine
+        start = time.perf_counter()
+        solution = body_velocity(GLASS, middle, *flat)
+        plain.append((time.perf_counter() - start) / len(flat[0]))
+        start = time.perf_counter()
+        connection.fit(lambda a, d: body_velocity(GLASS, middle, a, d).xi, connection.grid(2), 8, mirror=True)
+        ours.append((time.perf_counter() - start) / len(flat[0]))
+        start = time.perf_counter()
+        answers = [one_scipy_solve(flat[0][i], flat[1][i]) for i in part]
+        theirs.append((time.perf_counter() - start) / len(part))
+    flags = np.array([a[2] == 1 for a in answers])
+    off = np.abs(np.array([a[0] for a in answers]) - solution.xi[part]).max(-1)
+    ratio, ratio_plain = (np.median(theirs) / np.median(x) for x in (ours, plain))
+    print(f"\n31 x 31 x 8 loose glass, exact integrals: field {1e6 * np.median(ours):.1f} us a sample (half by mirror symmetry),")
+    print(f"  every sample solved {1e6 * np.median(plain):.1f} us, all converged")
+    print(f"fsolve, 20 midpoints a link: {1e6 * np.median(theirs):.0f} us a sample, says it failed in {100 * np.mean(~flags):.0f} %,")
+    print(f"  is off by more than 0.01 in {100 * np.mean(off > 0.01):.0f} %")
+    print(f"ratio {ratio:.0f} for the field, {ratio_plain:.0f} with every sample solved")
+    assert (solution.status != "unconverged").all()
+    assert ratio > 200
+
+
+def test_linear_in_the_number_of_samples(benchmark):
+    alpha, alphadot = field_samples()
+    benchmark(lambda: body_velocity(GLASS, Chain(), alpha, alphadot))

@@ -1,0 +1,80 @@
+"""The chain: its geometry against a drawing made link by link, its frames, its bounds."""
+
+import numpy as np
+import pytest
+from registry import BODIES
+
+from rft import Chain
+
+
+def by_hand(body, alpha):
+    """Headings (n,) and centres (n, 2) of the links in the body's frame, one link after the other; unit body."""
+    lengths = np.array(body.lengths) / sum(body.lengths)
+    headings, centres, tip = [], [], np.zeros(2)
+    heading = 0.0
+    for k, length in enumerate(lengths):
+        heading += alpha[k - 1] if k else 0.0
+        along = np.array([np.cos(heading), np.sin(heading)])
+        headings.append(heading)
+        centres.append(tip + length / 2 * along)
+        tip = tip + length * along
+    headings, centres = np.array(headings), np.array(centres)
+    if body.frame == "mean":
+        zero, origin = lengths @ headings, lengths @ centres
+    else:
+        k = int(body.frame[5:]) - 1
+        zero, origin = headings[k], centres[k]
+    c, s = np.cos(zero), np.sin(zero)
+    return headings - zero, (centres - origin) @ np.array([[c, -s], [s, c]])
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_links_are_where_they_should_be(name):
+    body, rng = BODIES[name], np.random.default_rng(0)
+    alpha = rng.uniform(-3, 3, (body.joints, 7))
+    motion = body.motion(alpha, np.zeros_like(alpha))
+    for b in range(7):
+        headings, centres = by_hand(body, alpha[:, b])
+        np.testing.assert_allclose([motion.c[:, b], motion.s[:, b]], [np.cos(headings), np.sin(headings)], atol=1e-14)
+        lever = np.stack([-centres[:, 1], centres[:, 0]], -1)  # velocity of the centres under a unit turn
+        np.testing.assert_allclose(motion.r_t[:, b], (lever * np.stack([motion.c, motion.s], -1)[:, b]).sum(-1), atol=1e-14)
+        np.testing.assert_allclose(motion.r_n[:, b], (lever * np.stack([-motion.s, motion.c], -1)[:, b]).sum(-1), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_velocities_are_the_rates_of_places(name):
+    body, rng, h = BODIES[name], np.random.default_rng(1), 1e-6
+    alpha, alphadot = rng.uniform(-2, 2, (2, body.joints))
+    motion = body.motion(alpha[:, None], alphadot[:, None])
+    (h1, p1), (h0, p0) = by_hand(body, alpha + h * alphadot), by_hand(body, alpha - h * alphadot)
+    velocity, turn = (p1 - p0) / (2 * h), (h1 - h0) / (2 * h)
+    c, s = motion.c[:, 0], motion.s[:, 0]
+    own = c * velocity[:, 0] + s * velocity[:, 1], c * velocity[:, 1] - s * velocity[:, 0], turn * motion.half[:, 0]
+    np.testing.assert_allclose(motion.v[..., 0], own, atol=1e-9)
+
+
+def test_carried_and_total_are_transposes():
+    body, rng = BODIES["uneven"], np.random.default_rng(2)
+    motion = body.motion(*rng.normal(size=(2, 2, 6)))
+    xi, force = rng.normal(size=(3, 6)), rng.normal(size=(3, 3, 6))
+    power = (2 * motion.half * force * motion.carried(xi)).sum((0, 1))
+    np.testing.assert_allclose(power, (xi * motion.total(force)).sum(0), rtol=1e-12)
+    H = rng.normal(size=(3, 3, 3, 6))
+    columns = [motion.total(np.einsum("ijnb,jnb->inb", H, motion.carried(e[:, None] * np.ones(6)))) for e in np.eye(3)]
+    np.testing.assert_allclose(motion.assembled(H), np.stack(columns, 1), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Chain((1,)), "at least two links, got 1"),
+        (lambda: Chain((1, -2)), r"finite and > 0, got \[1.0, -2.0\]"),
+        (lambda: Chain((1, float("inf"))), "finite and > 0"),
+        (lambda: Chain(length=0.0), "length must be finite and > 0, got 0.0"),
+        (lambda: Chain(frame="link-4"), "'link-1' ... 'link-3', got 'link-4'"),
+        (lambda: Chain(frame="head"), "got 'head'"),
+    ],
+)
+def test_bad_chains_are_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()

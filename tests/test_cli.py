@@ -1,0 +1,141 @@
+"""The command line as a user meets it, in processes of its own where exit codes and streams matter."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray
+
+from geomech import scene
+
+SMALL = ["--grid", "9"]
+
+
+def geomech(*args, cwd=None):
+    done = subprocess.run([sys.executable, "-m", "geomech", *map(str, args)], capture_output=True, text=True, cwd=cwd)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_velocity_speaks_json():
+    code, out, err = geomech("velocity", "three-link-viscous", "--alpha", "0,0", "--alphadot", "-1,0", "--json")
+    assert (code, err) == (0, "")
+    result = json.loads(out)
+    np.testing.assert_allclose(result["xi"], [0, 1 / 18, -7 / 27], atol=1e-14)
+    assert result["status"] == "sliding"
+    assert result["residual"] < 1e-12
+
+
+def test_connection_is_a_self_describing_file(tmp_path):
+    file, plot = tmp_path / "a.nc", tmp_path / "a.svg"
+    code, _, err = geomech("connection", "three-link-glass", *SMALL, "--extent", "2.0", "-o", file, "--plot", plot)
+    assert (code, err) == (0, "")
+    with xarray.open_dataset(file) as data:
+        assert data.A.dims == ("component", "joint", "alpha_1", "alpha_2")
+        assert data.ccf.dims == data.fit_residual.dims == ("component", "alpha_1", "alpha_2")
+        assert data.component.values.tolist() == ["x", "y", "theta"]
+        assert (data.alpha_1.values[[0, -1]] == [-2.0, 2.0]).all()
+        assert all("units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1"))
+        again = scene.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0).fitted
+        np.testing.assert_array_equal(data.A, again.A)
+    assert plot.read_text().lstrip().startswith("<?xml")
+    assert {p.name for p in tmp_path.iterdir()} == {"a.nc", "a.svg"}
+
+
+def test_displacement_by_every_tier(tmp_path):
+    plot = tmp_path / "d.png"
+    code, out, err = geomech(
+        "displacement", "three-link-glass", "--amplitudes", "0.5:1.0:2", *SMALL, "--json", "--plot", plot
+    )
+    assert (code, err) == (0, "")
+    table = json.loads(out)
+    assert table["amplitude"] == [0.5, 1.0]
+    assert {m: np.shape(table[m]) for m in ("area", "path", "direct")} == dict.fromkeys(("area", "path", "direct"), (2, 3))
+    assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
+    assert plot.stat().st_size > 10_000
+    code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--methods", "direct")
+    assert code == 0
+    assert "direct" in out
+    assert "area" not in out
+
+
+def test_ccf_draws(tmp_path):
+    code, out, err = geomech("ccf", "butterfly-glass", *SMALL, "--plot", tmp_path / "c.pdf")
+    assert (code, out, err) == (0, "", "")
+    assert (tmp_path / "c.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_run_leaves_everything(tmp_path):
+    code, out, err = geomech("run", "-o", tmp_path / "deep" / "dir")
+    assert (code, err) == (0, "")
+    files = {p.name for p in (tmp_path / "deep" / "dir").iterdir()}
+    assert files == {
+        "scene.toml", "connection.nc", "displacement.json",
+        *(f"{stem}.{end}" for stem in ("connection", "ccf", "displacement") for end in ("png", "pdf")),
+    }  # fmt: skip
+    assert "circle: displacement per cycle (BL)" in out
+    assert "butterfly: displacement per cycle (BL)" in out
+    assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
+    tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
+    assert set(tables) == {"circle", "butterfly"}
+
+
+def test_scenes_are_listed():
+    code, out, _ = geomech("scenes")
+    assert code == 0
+    assert all(name in out for name in scene.builtin_names())
+    assert "glass-0.3mm-loose" in out
+    assert geomech("scenes", "--show", "three-link-glass")[1] == scene.load("three-link-glass").text
+
+
+BAD = [
+    (["velocity", "nothing", "--alpha", "0,0", "--alphadot", "1,0"], "scene: 'nothing' is unknown"),
+    (["velocity", "three-link-glass", "--alpha", "0", "--alphadot", "1"], r"alpha must have shape (..., 2)"),
+    (["velocity", "three-link-glass", "--alpha", "0,x", "--alphadot", "1,0"], "--alpha: '0,x' is not a list of numbers"),
+    (["velocity", "three-link-glass", "--alpha", "0,nan", "--alphadot", "1,0"], "alpha must be finite, got nan"),
+    (["velocity", "three-link-glass", "--alpha", "0,0"], "Missing option '--alphadot'"),
+    (["displacement", "three-link-glass", "--amplitudes", "2.6"], "lies outside the field's -2.5 to 2.5"),
+    (["displacement", "three-link-glass", "--amplitudes", "1:2"], "nor START:STOP:COUNT"),
+    (["displacement", "three-link-glass", "--amplitudes", "inf"], "must be finite"),
+    (["displacement", "three-link-glass", "--amplitudes", "1", "--methods", "guess"], "--methods: 'guess' is unknown"),
+    (["displacement", "three-link-glass", "--amplitudes", "1", "--grid", "2"], "grid must be a whole number from 4"),
+    (["connection", "three-link-glass", "-o", "no/such/a.nc"], "cannot write no/such/a.nc: No such file or directory"),
+    (["connection", "three-link-glass", "-o", "a.nc", "--plot", "a.bmp"], "end the name in .png, .pdf, .svg"),
+    (["ccf", "three-link-glass", "--plot", "."], "cannot draw"),
+    (["run", "broken.toml"], "broken.toml is not TOML"),
+    (["run", "-o", "broken.toml"], "cannot write the folder broken.toml"),
+    (["fly"], "No such command 'fly'"),
+    (["run", "--fast"], "No such option: --fast"),
+]
+
+
+@pytest.mark.parametrize(("args", "said"), BAD)
+def test_bad_input_gets_one_line_and_exit_code_2(args, said, tmp_path):
+    (tmp_path / "broken.toml").write_text("[medium\n")
+    code, out, err = geomech(*args, cwd=tmp_path)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert said in err
+    assert [p.name for p in tmp_path.iterdir()] == ["broken.toml"]
+
+
+def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
+    from geomech import plots, report
+
+    def fail(*args, **kwargs):
+        raise ValueError("half way")
+
+    monkeypatch.setattr(plots, "displacement", fail)
+    small = scene.load("three-link-glass").with_numerics(grid=5)
+    with pytest.raises(ValueError, match="half way"), report.whole_folder(tmp_path / "out") as folder:
+        report.write(small, folder, None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_starts_without_the_heavy_libraries():
+    code = "import sys, geomech.cli; print([m for m in ('numpy', 'scipy', 'matplotlib', 'sympy', 'rich.progress') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"

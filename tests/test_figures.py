@@ -1,0 +1,68 @@
+"""Each published figure: its sourced numbers, and that it draws."""
+
+import math
+
+import numpy as np
+import pytest
+
+from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement
+
+
+def drawn(module, numbers, tmp_path):
+    from geomech import plots
+
+    file = tmp_path / "figure.png"
+    plots.save(module.draw(numbers), file)
+    return file.stat().st_size > 10_000
+
+
+def test_fig05c(tmp_path):
+    numbers = fig05c_force_law.compute()
+    # Eq. 3 at psi = 90 degrees with C = 1.8, gamma0 = 13.8 degrees.
+    assert numbers["loose"][1, -1] == pytest.approx(1 + 1.8 * math.cos(math.radians(13.8)), rel=1e-12)
+    assert numbers["viscous"][1, -1] == pytest.approx(2.0)
+    assert (numbers["loose"][1, 1:] > numbers["viscous"][1, 1:]).all()  # "F_perp is enhanced in GM"
+    fit = numbers["fit"]  # C = 1.49, gamma0 = 12.6 degrees, k = 2.49, 0.056 N: the fit that came with the data
+    assert (fit["C"], math.degrees(fit["gamma0"]), fit["k"]) == pytest.approx((1.49, 12.6, 2.49), rel=0.005)
+    assert fit["rms_N"] == pytest.approx(0.056, abs=0.001)
+    assert drawn(fig05c_force_law, numbers, tmp_path)
+
+
+def test_fig11c(tmp_path):
+    closed = fig11c_connection.compute("three-link-viscous", grid=21, extent=1.0)["connection"]
+    np.testing.assert_allclose(closed.A[:, :, 10, 10], [[0, 0], [-1 / 18, -1 / 18], [7 / 27, -7 / 27]], atol=1e-14)
+    assert drawn(fig11c_connection, fig11c_connection.compute(), tmp_path)
+
+
+def test_the_misfit_of_the_plane_in_loose_glass(tmp_path):
+    """26 to 33 % rms of each component in the middle-link frame."""
+    import dataclasses
+
+    from geomech.scene import load
+
+    glass = load("three-link-glass").with_numerics(directions=24)
+    fitted = dataclasses.replace(glass, body=dataclasses.replace(glass.body, frame="link-2")).fitted
+    misfit = np.sqrt((fitted.residual**2).mean((1, 2)) / (fitted.speed**2).mean((1, 2)))
+    assert misfit.min() == pytest.approx(0.26, abs=0.005)
+    assert misfit.max() == pytest.approx(0.33, abs=0.005)
+
+
+def test_fig11d(tmp_path):
+    closed = fig11d_ccf.compute("three-link-viscous", grid=41, extent=1.0, interpolation=5)["ccf"]
+    assert closed.values[0, 20, 20] == pytest.approx(-5 / 243, rel=1e-6)
+    numbers = fig11d_ccf.compute()
+    mirrored = numbers["ccf"].values[0, ::-1, ::-1]
+    np.testing.assert_allclose(numbers["ccf"].values[0], mirrored, atol=1e-6)
+    assert drawn(fig11d_ccf, numbers, tmp_path)
+
+
+def test_fig11e(tmp_path):
+    amplitudes = {"circle": [0.5, 1.0, 1.75], "butterfly": [0.5, 1.0]}
+    numbers = fig11e_displacement.compute(amplitudes=amplitudes)
+    from geomech import plots
+
+    tables = numbers["tables"]
+    np.testing.assert_allclose(plots.net(tables["circle"]["direct"]), [0.0121, 0.0638, 0.1378], rtol=0.01)
+    # The butterfly is the better gait (Fig. 11(e)): at its published size it outdoes every circle.
+    assert plots.net(tables["butterfly"]["direct"])[1] > 1.5 * 0.1378
+    assert drawn(fig11e_displacement, numbers, tmp_path)

@@ -1,0 +1,66 @@
+"""Gaits: rates are derivatives, amplitudes scale about the centre, the butterfly is the published one."""
+
+import numpy as np
+import pytest
+from registry import GAITS
+
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
+
+T = np.linspace(0, 2 * np.pi, 33)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_rate_is_the_derivative_of_shape(name):
+    gait, h = GAITS[name], 1e-5
+    slope = (gait.shape(T + h) - gait.shape(T - h)) / (2 * h)
+    np.testing.assert_allclose(gait.rate(T), slope, atol=1e-8)
+    np.testing.assert_allclose(gait.shape(0.0), gait.shape(2 * np.pi), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_amplitudes_are_a_batch_axis(name):
+    gait = GAITS[name]
+    alpha, alphadot = gait.cycle(16, [0.5, 2.0])
+    assert alpha.shape == alphadot.shape == (2, 16, gait.joints)
+    centre = np.array(gait.centre or (0.0,) * gait.joints)
+    np.testing.assert_allclose((alpha[1] - centre) / 4, alpha[0] - centre, atol=1e-15)
+    np.testing.assert_allclose(gait.cycle(16)[0], gait.shape(2 * np.pi * np.arange(16) / 16), atol=1e-12)
+
+
+def test_butterfly_is_the_published_one():
+    a1, a2 = Butterfly().shape(T).T
+    np.testing.assert_allclose((a1 + a2) / 2, 1.0908 * np.cos(T) - 0.2508 * np.cos(3 * T) - 0.18 * np.cos(5 * T), atol=1e-14)
+    np.testing.assert_allclose((a1 - a2) / 2, 1.052 * np.sin(T) + 0.0859 * np.sin(3 * T), atol=1e-14)
+
+
+def test_orientation_start_and_reversal():
+    np.testing.assert_allclose(Circle(amplitude=2.0).shape([0, np.pi / 2]), [[2, 0], [0, 2]], atol=1e-15)
+    np.testing.assert_allclose(Circle(reverse=True).shape(T), Circle().shape(-T), atol=1e-15)
+    np.testing.assert_allclose(Ellipse(semi_axes=(2, 1), tilt=np.pi / 2).shape(0.0), [0, 2], atol=1e-15)
+
+
+def test_points_are_passed_through_in_order():
+    points = GAITS["points"].points
+    curve = GAITS["points"].shape(np.linspace(0, 2 * np.pi, 20001))
+    nearest = [np.linalg.norm(curve - p, axis=1).argmin() for p in points]
+    assert max(np.linalg.norm(curve - p, axis=1).min() for p in points) < 1e-3
+    assert nearest == sorted(nearest)
+    assert Points(points=(*points, points[0])) == GAITS["points"]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Circle(amplitude=float("nan")), "amplitude must be finite"),
+        (lambda: Circle(centre=(1.0,)), "centre must have 2 angles"),
+        (lambda: Ellipse(semi_axes=(1.0,)), "two semi_axes"),
+        (lambda: Fourier(cos=((1.0,),), sin=((1.0, 2.0),)), "one shape"),
+        (lambda: Fourier(cos=((1.0,), (1.0, 2.0)), sin=((1.0,),)), "equal rows"),
+        (lambda: Points(points=((0, 0), (1, 1))), "at least 3 shapes"),
+        (lambda: Points(points=((0, 0), (0, 0), (1, 1), (1, 0))), "neighbours distinct"),
+        (lambda: Circle().cycle(3), "phases must"),
+    ],
+)
+def test_bad_gaits_are_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()

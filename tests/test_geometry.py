@@ -1,0 +1,214 @@
+"""Connection, curvature, frames and the three tiers, on swimmers with a closed form."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import sympy as sp
+from registry import GAITS, MEDIA
+
+from geomech import connection, coordinates, curvature, predict, se2, simulate, symbolic
+from geomech.field import Field
+from geomech.gaits import Circle, Ellipse, Fourier
+from rft import Chain, Viscous, body_velocity
+from rft.symbolic import viscous_chain
+
+A_MIDDLE, ALPHA = viscous_chain((1, 1, 1), 2, link=2)
+MIDDLE = symbolic.velocity(A_MIDDLE, ALPHA)
+
+
+def viscous(frame="mean", ratio=2.0):
+    return lambda a, d: body_velocity(Viscous(ratio), Chain(frame=frame), a, d).checked().xi
+
+
+def around(centre, reach, points=41):
+    return tuple(np.linspace(c - reach, c + reach, points) for c in centre)
+
+
+def test_fit_recovers_a_linear_swimmer():
+    fitted = connection.fit(MIDDLE, connection.grid(2, 41, 2.0), 8, degree=5)
+    assert fitted.residual.max() < 1e-15
+    shapes = np.random.default_rng(0).uniform(-1.8, 1.8, (50, 2))
+    exact = np.stack([MIDDLE(shapes, e) for e in np.eye(2)], -1)
+    np.testing.assert_allclose(fitted(shapes), exact, atol=2e-6)
+
+
+@pytest.mark.parametrize("joints", [1, 3])
+def test_fit_takes_any_number_of_joints(joints):
+    rng = np.random.default_rng(1)
+    M = rng.normal(size=(3, joints))
+    swimmer = lambda a, d: np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])  # noqa: E731
+    fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 8)
+    assert fitted.A.shape == (3, joints, *(9,) * joints)
+    np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
+
+
+@pytest.mark.parametrize("points", [6, 7])
+def test_half_the_grid_tells_the_other_half(points):
+    glass = lambda a, d: body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d).checked().xi  # noqa: E731
+    whole, half = (connection.fit(glass, connection.grid(2, points), mirror=m) for m in (False, True))
+    for name in ("A", "residual", "speed"):
+        np.testing.assert_allclose(getattr(half, name), getattr(whole, name), atol=1e-7)
+
+
+def test_fit_residual_is_the_rms_misfit():
+    swimmer = lambda a, d: np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]  # noqa: E731
+    fitted = connection.fit(swimmer, connection.grid(2, 5, 1.0), 16)
+    # cos^3 = (3 cos + cos 3)/4: the plane keeps 3/4 cos, the misfit is cos 3t / 4, rms sqrt(1/32).
+    np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
+    np.testing.assert_allclose(fitted.residual[0], np.sqrt(1 / 32), atol=1e-14)
+    np.testing.assert_allclose(fitted.residual[1], 0, atol=1e-14)
+
+
+def test_ccf_at_the_straight_pose_for_any_ratio():
+    r = sp.symbols("r", positive=True)
+    A, alpha = viscous_chain(ratio=r)
+    straight = symbolic.ccf(A, alpha).subs(dict.fromkeys(alpha, 0))
+    assert sp.simplify(straight[0] + 5 * (r - 1) / 243) == 0
+    assert sp.simplify(straight[1]) == 0
+    for ratio in (1.0, 2.0, 7.5):
+        fitted = connection.fit(viscous("link-2", ratio), around((0, 0), 0.3), degree=5)
+        assert curvature.ccf(fitted).values[0, 20, 20] == pytest.approx(-5 * (ratio - 1) / 243, abs=1e-9)
+
+
+def test_ccf_agrees_with_sympy_everywhere():
+    fitted = connection.fit(MIDDLE, connection.grid(2, 61, 1.5), degree=5)
+    exact = sp.lambdify(ALPHA, list(symbolic.ccf(A_MIDDLE, ALPHA)), "numpy", cse=True)
+    a1, a2 = np.meshgrid(*fitted.axes, indexing="ij")
+    np.testing.assert_allclose(curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6)
+
+
+def test_small_circles_follow_the_ccf():
+    """|displacement| -> 5 (r - 1) / 243 times the area."""
+    for ratio in (2.0, 4.0):
+        g = predict.direct(viscous("link-2", ratio), Circle(), [0.01, 0.001])
+        limit = 5 * (ratio - 1) / 243 * np.pi * np.array([0.01, 0.001]) ** 2
+        np.testing.assert_allclose(np.hypot(g[:, 0], g[:, 1]), limit, rtol=2e-4)
+
+
+@pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3"])
+def test_unit_circle_in_every_frame(frame):
+    g = predict.direct(viscous(frame), Circle())
+    assert np.hypot(g[0], g[1]) == pytest.approx(0.0512808243, abs=5e-11)
+    fitted = connection.fit(viscous(frame), connection.grid(2, 61, 1.2), degree=5)
+    path = predict.path(fitted, Circle())
+    assert np.hypot(path[0], path[1]) == pytest.approx(0.0512808243, abs=1e-8)
+
+
+def slope(x, y):
+    return np.polyfit(np.log(x), np.log(y), 1)[0]
+
+
+@pytest.mark.parametrize(("centre", "frame", "order"), [((0.5, -0.8), "link-1", 3.0), ((0.9, 0.4), "mean", 3.0)])
+def test_area_tier_is_of_order_three_in_a_generic_frame(centre, frame, order):
+    fitted = connection.fit(viscous(frame), around(centre, 0.35, 61), degree=5)
+    ccf = curvature.ccf(fitted)
+    sizes = np.geomspace(0.01, 0.05, 7)
+    gait = Ellipse(centre=centre, semi_axes=(1.0, 0.7), tilt=0.3)
+    error = np.linalg.norm(predict.area(ccf, gait, sizes) - predict.path(viscous(frame), gait, sizes), axis=-1)
+    assert slope(sizes, error) == pytest.approx(order, abs=0.1)
+    wrong = Field(fitted.axes, curvature.exterior_derivative(fitted) - curvature.lie_bracket(fitted), 5)
+    error = np.linalg.norm(predict.area(wrong, gait, sizes) - predict.path(viscous(frame), gait, sizes), axis=-1)
+    assert slope(sizes, error) == pytest.approx(2.0, abs=0.1)  # the test can tell the bracket's sign
+
+
+def test_area_counts_winding_numbers():
+    """A figure-eight cancels, a circle run twice counts twice, a reversed gait counts against."""
+    ones = np.ones((3, 31, 31)) * np.array([0.01, 0.0, 0.0])[:, None, None]
+    ccf = Field(connection.grid(2, 31, 2.5), ones)
+    circle = predict.area(ccf, Circle())
+    assert circle[0] == pytest.approx(0.01 * np.pi, rel=1e-12)
+    eight = Fourier(cos=((0.0, 0.0), (0.0, 0.0)), sin=((1.0, 0.0), (0.0, 1.0)))
+    twice = Fourier(cos=((0.0, 1.0), (0.0, 0.0)), sin=((0.0, 0.0), (0.0, 1.0)))
+    assert predict.area(ccf, eight)[0] == pytest.approx(0.0, abs=1e-15)
+    assert predict.area(ccf, twice)[0] == pytest.approx(2 * circle[0], rel=1e-12)
+    assert predict.area(ccf, Circle(reverse=True))[0] == pytest.approx(-circle[0], rel=1e-12)
+
+
+def test_leaving_the_field_is_an_error_that_names_the_angle():
+    fitted = connection.fit(MIDDLE, connection.grid(2, 11, 1.0))
+    for tier in (lambda: predict.path(fitted, Circle(amplitude=1.3)), lambda: predict.area(curvature.ccf(fitted), Circle(), 1.3)):
+        with pytest.raises(ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"):
+            tier()
+
+
+@pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
+def test_changing_frame_is_solving_in_that_frame(medium):
+    mean, rng = Chain((1, 2, 1), length=0.4), np.random.default_rng(2)
+    alpha, alphadot = rng.uniform(-2, 2, (30, 2)), rng.normal(size=(30, 2))
+    solve = lambda body, a, d: body_velocity(MEDIA[medium], body, a, d).xi  # noqa: E731
+    for frame in ("link-1", "link-2", "link-3"):
+        other = dataclasses.replace(mean, frame=frame)
+        carried = coordinates.in_frame(lambda a, d: solve(mean, a, d), lambda a, d: mean.frame_pose(frame, a, d))  # noqa: B023
+        np.testing.assert_allclose(carried(alpha, alphadot), solve(other, alpha, alphadot), atol=1e-8)
+
+
+def test_connections_change_frame_like_velocities():
+    body, alpha = Chain((1, 2, 1)), np.array([0.4, -1.1])
+    A = np.stack([viscous()(alpha, e) for e in np.eye(2)], -1)
+    poses = [Chain().frame_pose("link-3", alpha, e) for e in np.eye(2)]
+    changed = coordinates.change_connection(A, poses[0][0], np.stack([p[1] for p in poses], -1))
+    np.testing.assert_allclose(changed, np.stack([viscous("link-3")(alpha, e) for e in np.eye(2)], -1), atol=1e-12)
+    assert body.frame_pose("mean", alpha, alpha)[0] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_displacement_is_conjugated_by_the_frame(name):
+    gait = GAITS[name]
+    mean, link = (predict.direct(viscous(f), gait, phases=1024) for f in ("mean", "link-3"))
+    h = Chain().frame_pose("link-3", gait.shape(0.0), gait.rate(0.0))[0]
+    np.testing.assert_allclose(se2.compose(se2.compose(se2.inverse(h), mean), h), link, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_a_reversed_gait_undoes_the_gait(name):
+    forth = GAITS[name]
+    back = dataclasses.replace(forth, reverse=not forth.reverse)
+    g, h = (predict.direct(viscous(), x) for x in (forth, back))
+    np.testing.assert_allclose(se2.compose(g, h), 0, atol=1e-12)
+
+
+def stepwise(velocity, gait, steps):
+    """Displacement by many short exponentials, midpoint rule: order 2."""
+    g = np.zeros(3)
+    for t in (np.arange(steps) + 0.5) / steps * 2 * np.pi:
+        g = se2.compose(g, se2.exp(velocity(gait.shape(t), gait.rate(t)) * 2 * np.pi / steps))
+    return g
+
+
+def test_spectral_integration_against_short_steps():
+    gait = Ellipse(centre=(0.3, 0.6), semi_axes=(1.1, 0.5))
+    spectral = predict.direct(MIDDLE, gait)
+    coarse, fine = (stepwise(MIDDLE, gait, n) for n in (400, 800))
+    np.testing.assert_allclose(spectral, (4 * fine - coarse) / 3, atol=1e-9)
+
+
+def test_trajectory_ends_where_the_displacement_says():
+    gait = Circle(centre=(0.5, 0.2))
+    for phases in (50, 51, 200):
+        xi = MIDDLE(*gait.cycle(phases))
+        path = simulate.trajectory(xi, [0.0, np.pi, 2 * np.pi])
+        np.testing.assert_allclose(path[0], 0, atol=1e-15)
+        np.testing.assert_allclose(path[2], simulate.displacement(xi), atol=1e-13)
+    half = stepwise(MIDDLE, Fourier(cos=((0.5, 0.0),) * 2, sin=((0.0, 0.0),) * 2), 4)
+    assert np.isfinite(half).all()
+
+
+def test_full_turns_are_integrated_too():
+    """A constant turn: circles in closed form, whole turns included."""
+    for turn in (0.0, 0.3, 1.0, 2.0, -1.5):
+        xi = np.broadcast_to([0.2, -0.1, turn], (8, 3))
+        np.testing.assert_allclose(simulate.displacement(xi), se2.exp(2 * np.pi * xi[0]), atol=1e-14)
+
+
+def test_bad_shapes_are_refused():
+    with pytest.raises(ValueError, match=r"got \(2, 3\)"):
+        simulate.displacement(np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="grid must"):
+        connection.grid(2, 3)
+    with pytest.raises(ValueError, match="extent must"):
+        connection.grid(2, 9, float("nan"))
+    with pytest.raises(ValueError, match="directions must"):
+        connection.directions(3, 2)
+    with pytest.raises(ValueError, match="two joints"):
+        curvature.ccf(connection.fit(lambda a, d: np.zeros((*np.broadcast_shapes(a.shape, d.shape)[:-1], 3)), (np.linspace(0, 1, 9),)))

@@ -1,0 +1,84 @@
+"""Force laws: Eqs. 2-3 as printed, limits, and what every medium must satisfy."""
+
+import math
+
+import numpy as np
+import pytest
+from registry import DRY, MEDIA
+
+from rft import CATALOGUE, Coulomb, Granular, Viscous
+
+DIRECTIONS = np.linspace(-np.pi, np.pi, 41)
+
+
+def test_granular_is_equation_3():
+    C, gamma0 = 1.8, math.radians(13.8)
+    speed = 3.7
+    v_t, v_n = speed * np.cos(DIRECTIONS), speed * np.sin(DIRECTIONS)
+    f_t, f_n = Granular(C, gamma0).traction(v_t, v_n)
+    sine = np.sin(DIRECTIONS)
+    np.testing.assert_allclose(f_n, (1 + C / np.sqrt(math.tan(gamma0) ** 2 + sine**2)) * sine, rtol=1e-14, atol=1e-15)
+    np.testing.assert_allclose(f_t, np.cos(DIRECTIONS), rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", DRY)
+def test_dry_media_do_not_know_speed(name):
+    v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
+    slow, fast = (DRY[name].traction(c * v[0], c * v[1]) for c in (1e-9, 1e9))
+    np.testing.assert_allclose(slow, fast, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_drag_is_odd_and_takes_power(name):
+    v_t, v_n = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
+    f_t, f_n = MEDIA[name].traction(v_t, v_n)
+    back = MEDIA[name].traction(-v_t, -v_n)
+    np.testing.assert_array_equal([f_t, f_n], np.negative(back))
+    assert (f_t * v_t + f_n * v_n > 0).all()
+    assert np.shape(MEDIA[name].traction(0.0, 0.0)) == (2,)
+    assert np.all(np.array(MEDIA[name].traction(0.0, 0.0)) == 0)
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_derivatives_are_the_slopes_of_traction(name):
+    rng = np.random.default_rng(3)
+    v, eps, h = rng.normal(size=(2, 50)), 0.3, 1e-6
+    (tt, tn), (nt, nn) = MEDIA[name].derivatives(*v, eps)
+    for k, (dt, dn) in enumerate(((tt, nt), (tn, nn))):
+        step = h * np.eye(2)[k][:, None]
+        up, down = (np.array(MEDIA[name].traction(*(v + sign * step), eps)) for sign in (1, -1))
+        np.testing.assert_allclose((up - down) / (2 * h), [dt, dn], rtol=2e-6, atol=2e-6 * np.abs(up).max())
+
+
+def test_catalogue_agrees_with_its_sources():
+    loose, fitted = CATALOGUE["glass-0.3mm-loose"].medium, CATALOGUE["glass-0.3mm-loose-fitted"].medium
+    assert loose == Granular(1.8, math.radians(13.8))
+    assert fitted.C == pytest.approx(1.844, abs=5e-4)
+    psi = np.linspace(0, np.pi / 2, 50)
+    form = np.sin(psi) + (0.5108 / 0.2770) * np.sin(np.arctan(4.0587 * np.sin(psi)))
+    np.testing.assert_allclose(fitted.traction(np.cos(psi), np.sin(psi))[1], form, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(loose.traction(np.cos(psi), np.sin(psi))[1], form, rtol=0.03, atol=1e-14)
+    # The paper's k = 2.5 gives the fitted axial stress at the fitted depth: k rho g |z|, glass at 2500 kg/m^3.
+    assert CATALOGUE["glass-0.3mm-loose"].axial_stress == pytest.approx(2.5 * 0.58 * 2500 * 9.81 * 0.0762, rel=0.03)
+    assert all(entry.source for entry in CATALOGUE.values())
+
+
+def test_limits():
+    v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
+    np.testing.assert_allclose(Granular(0.0, 0.2).traction(*v), Coulomb().traction(*v), atol=1e-15)
+    np.testing.assert_allclose(Viscous(3.0).traction(*v), [v[0], 3 * v[1]], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Granular(-1, 0.2), "C must"),
+        (lambda: Granular(math.nan, 0.2), "C must"),
+        (lambda: Granular(1, 0.0), "gamma0 must"),
+        (lambda: Granular(1, 2.0), "114.592 degrees"),
+        (lambda: Viscous(0.0), "ratio must"),
+    ],
+)
+def test_bad_parameters_are_named(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()

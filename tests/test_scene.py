@@ -1,0 +1,129 @@
+"""Scenes: built-in ones run, bad ones are refused with one line that names the place and the cure."""
+
+import math
+
+import numpy as np
+import pytest
+
+from geomech import scene
+from geomech.problem import SceneError
+from rft import Chain, Granular, Viscous
+
+GOOD = """
+[medium]
+law = "granular"
+C = 1.8
+gamma0_deg = 13.8
+
+[body]
+kind = "chain"
+lengths = [1, 2, 1]
+length = 0.4
+frame = "link-2"
+
+[gait]
+kind = "ellipse"
+semi_axes = [1.0, 0.5]
+tilt_deg = 45
+
+[numerics]
+grid = 21
+"""
+
+
+@pytest.mark.parametrize("name", scene.builtin_names())
+def test_builtin_scenes_move(name):
+    loaded = scene.load(name).with_numerics(grid=11, phases=64)
+    table = loaded.study([0.8], loaded.methods)
+    assert all(np.isfinite(table[m]).all() and abs(table[m][0][0]) > 1e-3 for m in loaded.methods)
+    assert set(table["seconds"]) >= set(loaded.methods)
+    assert all(v >= 0 for v in table["seconds"].values())
+
+
+def test_every_key_arrives():
+    read = scene.parse(GOOD, "good")
+    assert read.medium == Granular(1.8, math.radians(13.8))
+    assert read.body == Chain((1, 2, 1), 0.4, "link-2")
+    assert read.gait.tilt == pytest.approx(math.pi / 4)
+    assert (read.numerics.grid, read.name, read.unit) == (21, "good", "m")
+    assert scene.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).medium.gamma0 == 0.24
+    assert scene.load("three-link-viscous").medium == Viscous(2.0)
+
+
+BAD = [
+    ("[medium", "scene is not TOML"),
+    (GOOD + "[water]\nx = 1", "table: 'water' is unknown; use one of medium, body, gait, numerics"),
+    (GOOD.replace("[gait]", "[giat]"), "table: 'giat' is unknown; did you mean 'gait'"),
+    ("x = 1", "table: 'x' is unknown"),
+    (GOOD.split("[gait]")[0], r"the table \[gait\] is missing"),
+    ("gait = 3" + GOOD.split("[gait]")[0], r"gait must be a table"),
+    (GOOD.replace('law = "granular"', 'law = "granluar"'), r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'"),
+    (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
+    (GOOD.replace('law = "granular"', 'name = "glass"'), "takes no 'C'"),
+    (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),
+    (GOOD.replace("C = 1.8", ""), r"\[medium\] .*missing required field `C`"),
+    (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),
+    (GOOD.replace("C = 1.8", "C = nan"), r"\[medium\] C must be a finite number"),
+    (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 90"), "gamma0 must lie between 0 and 90 degrees, got 90 degrees"),
+    (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 13.8\ngamma0 = 0.2"), "gamma0 is given twice"),
+    (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, -2, 1]"), r"\[body\] lengths must all be finite and > 0"),
+    (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, 2]"), r"ellipse moves 2 joints but \[body\] has 1"),
+    (GOOD.replace("length = 0.4", "lenght = 0.4"), "'lenght' is unknown; did you mean 'length"),
+    (GOOD.replace("link-2", "link-9"), "frame must be 'mean' or 'link-1' ... 'link-3', got 'link-9'"),
+    (GOOD.replace("tilt_deg = 45", "tilt_deg = inf"), r"\[gait\] an ellipse needs"),
+    (GOOD.replace("grid = 21", "grid = 3"), r"\[numerics\] grid must be a whole number from 4"),
+    (GOOD.replace("grid = 21", 'loads = "simpson"'), r"\[numerics\] loads must be"),
+    (GOOD.replace("grid = 21", "regularisation = 0"), "regularisation must be a number > 0"),
+]
+
+
+@pytest.mark.parametrize(("text", "said"), BAD)
+def test_bad_scenes_are_refused_in_one_line(text, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        scene.parse(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_names_and_files():
+    with pytest.raises(SceneError, match="did you mean 'three-link-glass'"):
+        scene.load("three-link-glas")
+    with pytest.raises(SceneError, match="cannot read scene 'nowhere.toml': No such file"):
+        scene.load("nowhere.toml")
+
+
+def test_the_path_of_a_linear_medium_needs_no_field():
+    viscous = scene.load("three-link-viscous")
+    table = viscous.study([1.0], ["path", "direct"])
+    assert "field" not in table["seconds"]
+    assert math.hypot(*table["path"][0][:2]) == pytest.approx(0.0512808243, abs=5e-11)
+    assert table["path"] == table["direct"]
+
+
+def test_four_links_have_no_area_tier():
+    text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
+    four = scene.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
+    assert four.methods == ("path", "direct")
+    assert np.isfinite(four.displacement("direct")).all()
+    with pytest.raises(SceneError, match="two joints"):
+        four.displacement("area")
+
+
+def test_loose_glass_circles():
+    """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
+    got = scene.load("three-link-glass").displacement("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
+    np.testing.assert_allclose(np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01)
+
+
+def test_a_large_field_converges_everywhere_in_little_memory():
+    """101 x 101 x 16 samples of loose glass over +-2.8 rad."""
+    import resource
+
+    glass = scene.load("three-link-glass")
+    axis = np.linspace(-2.8, 2.8, 101)
+    alpha = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1)[:, :, None]
+    angle = np.pi * np.arange(16) / 16
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    solution = glass.solve(alpha, np.stack([np.cos(angle), np.sin(angle)], -1))
+    assert solution.residual.max() < 1e-9
+    assert not (solution.status == "unconverged").any()
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000  # kB more than the interpreter had

@@ -1,0 +1,63 @@
+"""The group of planar motions: axioms, 50-digit arithmetic, the bracket as a commutator."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from geomech import se2
+
+mp.mp.dps = 50
+reals = st.floats(-3.0, 3.0)
+poses = st.tuples(reals, reals, reals).map(np.array)
+
+ANGLES = np.concatenate([10.0 ** np.arange(-16, 0.5), np.pi - 10.0 ** np.arange(-12, 0), [0.0, 1.0, 3.0]])
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_exp_and_log_in_fifty_digits(angle, sign):
+    theta = mp.mpf(float(sign * angle))
+    x, y = mp.mpf("0.7"), mp.mpf("-1.3")
+    a = mp.sin(theta) / theta if theta else mp.mpf(1)
+    b = (1 - mp.cos(theta)) / theta if theta else mp.mpf(0)
+    truth = [float(v) for v in (a * x - b * y, b * x + a * y, theta)]
+    got = se2.exp([0.7, -1.3, sign * angle])
+    np.testing.assert_allclose(got, truth, rtol=1e-15, atol=4e-16)
+    c = (theta / 2) / mp.tan(theta / 2) if theta else mp.mpf(1)
+    truth = [float(v) for v in (c * x + theta / 2 * y, c * y - theta / 2 * x, theta)]
+    np.testing.assert_allclose(se2.log([0.7, -1.3, sign * angle]), truth, rtol=1e-15, atol=4e-16)
+
+
+@given(poses, poses, poses)
+def test_group_axioms(f, g, h):
+    np.testing.assert_allclose(se2.compose(se2.compose(f, g), h), se2.compose(f, se2.compose(g, h)), atol=1e-13)
+    np.testing.assert_allclose(se2.compose(g, se2.inverse(g)), 0, atol=1e-14)
+
+
+@given(poses, poses)
+def test_adjoint_is_conjugation(g, xi):
+    xi = 0.3 * xi
+    conjugated = se2.compose(se2.compose(g, se2.exp(xi)), se2.inverse(g))
+    np.testing.assert_allclose(se2.exp(se2.adjoint(g) @ xi), conjugated, atol=1e-12)
+    np.testing.assert_allclose(se2.log(se2.exp(xi)), xi, atol=1e-14)
+
+
+@settings(max_examples=30)
+@given(poses, poses)
+def test_bracket_is_the_commutator_of_matrices(X, Y):
+    def matrix(xi):
+        return np.array([[0, -xi[2], xi[0]], [xi[2], 0, xi[1]], [0, 0, 0]])
+
+    commutator = matrix(X) @ matrix(Y) - matrix(Y) @ matrix(X)
+    np.testing.assert_allclose(matrix(se2.bracket(X, Y)), commutator, atol=1e-13)
+
+
+def test_batches_and_shapes():
+    g = np.random.default_rng(0).normal(size=(4, 1, 3))
+    h = np.random.default_rng(1).normal(size=(5, 3))
+    assert se2.compose(g, h).shape == (4, 5, 3)
+    assert se2.adjoint(g).shape == (4, 1, 3, 3)
+    with pytest.raises(ValueError, match=r"shape \(\.\.\., 3\), got \(2,\)"):
+        se2.exp([1.0, 2.0])
