@@ -59,7 +59,11 @@ def draw(numbers: dict):
     """Solid: across the rod, dashed: along it."""
     fig, axes = plots.figure(6.0, 3.0)
     ax, degrees = axes[0, 0], np.degrees(numbers["psi"])
-    styles = {"loose": ("#D55E00", "loose 0.3 mm glass"), "close": ("#0072B2", "close 0.3 mm glass"), "viscous": ("0.5", "viscous, 2 : 1")}
+    styles = {
+        "loose": ("#D55E00", "loose 0.3 mm glass"),
+        "close": ("#0072B2", "close 0.3 mm glass"),
+        "viscous": ("0.5", "viscous, 2 : 1"),
+    }
     for name, (colour, label) in styles.items():
         along, across = numbers[name]
         ax.plot(degrees, across, color=colour, label=label)

@@ -18,7 +18,9 @@ app = typer.Typer(
 )  # fmt: skip
 
 DEFAULT_SCENE = "three-link-glass"
-SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")]
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")
+]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
@@ -28,7 +30,9 @@ JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing
 @app.command()
 def run(
     name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path("results"),
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
+        "results"
+    ),
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech import report
@@ -184,7 +188,9 @@ class _Unused(Exception):
 
 def _two_joints(scene):
     if scene.body.joints != 2:
-        raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}")
+        raise SceneError(
+            f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
+        )
     return scene
 
 

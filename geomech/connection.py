@@ -98,4 +98,6 @@ def fit(
     A[rest] = np.array([-1.0, 1.0, 1.0])[:, None] * A[: len(alpha) - todo][::-1]
     residual[rest], speed[rest] = residual[: len(alpha) - todo][::-1], speed[: len(alpha) - todo][::-1]
     shape = tuple(len(a) for a in axes)
-    return Connection(axes, *(np.moveaxis(x, 0, -1).reshape(*x.shape[1:], *shape) for x in (A, residual, speed)), degree)
+    return Connection(
+        axes, *(np.moveaxis(x, 0, -1).reshape(*x.shape[1:], *shape) for x in (A, residual, speed)), degree
+    )

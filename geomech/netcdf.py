@@ -47,7 +47,9 @@ def _coordinates(file, fitted) -> None:
     for k, axis in enumerate(fitted.axes):
         name = f"alpha_{k + 1}"
         file.createDimension(name, len(axis))
-        _variable(file, name, axis, (name,), "rad", f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}")
+        _variable(
+            file, name, axis, (name,), "rad", f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
+        )
 
 
 def _variable(file, name, values, dimensions, units, long_name) -> None:

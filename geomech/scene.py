@@ -146,7 +146,9 @@ class Scene:
         """Whether a tier looks the connection up on the grid."""
         return method == "area" or (method == "path" and not is_linear(self.medium))
 
-    def study(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None) -> dict:
+    def study(
+        self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
+    ) -> dict:
         """{"amplitude": [...], method: [[x, y, theta], ...], ..., "seconds": {...}}; the field is timed on its own."""
         out: dict = {"amplitude": [float(a) for a in amplitudes]}
         seconds = {}
@@ -193,7 +195,9 @@ def load(scene: str | Path) -> Scene:
         text = path.read_text()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
-        raise SceneError(f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}") from None
+        raise SceneError(
+            f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
+        ) from None
     return parse(text, str(scene))
 
 
@@ -225,7 +229,9 @@ def _medium(place: str, table: dict) -> rft.Medium:
     if "name" not in table:
         return _of_kind(place, table, "law", LAWS)
     if extra := sorted(set(table) - {"name"}):
-        raise SceneError(f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'")
+        raise SceneError(
+            f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'"
+        )
     return rft.CATALOGUE[choose(f"{place} name", table["name"], rft.CATALOGUE)].medium
 
 

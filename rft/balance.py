@@ -24,7 +24,8 @@ from rft.loads import LoadLaw, element_load, parse
 from rft.media.base import Medium
 
 LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
-HALVINGS = 12  # of one step; then it is taken all the same
+SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
+LENGTHEN = 2.0  # the next part to try, after a success
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
 
@@ -148,7 +149,7 @@ class _State:
     v: np.ndarray  # (3, n, B) element velocities at xi
     eps: np.ndarray  # the rounding at xi
     eps_next: np.ndarray  # the rounding to try
-    halved: np.ndarray  # how often this step has been
+    stride: np.ndarray  # the part of a Newton step to try
     residual: np.ndarray
     iterations: np.ndarray
 
@@ -205,13 +206,12 @@ class _Problem:
     def _start(self, widest: float, index, motion: Motion) -> _State:
         """The viscous solution, which is a dry law rounded off without end, as the first step from rest."""
         size = index.size
-        load = self.load(*motion.v, np.full(size, 1e3))
+        net = motion.assembled(self.load(*motion.v, np.full(size, 1e3)))
         first = self.regularisation if self.linear else max(widest, self.regularisation)
         eps = np.full(size, first)
-        dx = -_solve3(motion.assembled(load.tangent), motion.total(load.force))
-        at_rest = np.zeros((3, size))
-        worst, count = np.full(size, np.inf), np.zeros(size, int)
-        return _State(index, motion, at_rest, dx, motion.v, eps, eps, count, worst, count)
+        dx = -_solve3(net[:, 1:], net[:, 0])
+        at_rest, worst = np.zeros((3, size)), np.full(size, np.inf)
+        return _State(index, motion, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
 
     def _advance(self, s: _State, descent: Descent, out: _Solved) -> _State | None:
         """One step of all samples; those that end are written to ``out`` and leave. None when none are left."""
@@ -227,22 +227,23 @@ class _Problem:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.motion.carried(s.dx)
         load = self.load(*v, s.eps_next)
-        force = s.motion.total(load.force)
-        residual = np.abs(force).max(0) / self.unit
-        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.halved >= HALVINGS)
+        net = s.motion.assembled(load)
+        residual = np.abs(net[:, 0]).max(0) / self.unit
+        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
         s.iterations = s.iterations + 1
         s.xi = np.where(kept, s.xi + s.dx, s.xi)
         s.v = np.where(kept, v, s.v)
         s.residual = np.where(kept, residual, s.residual)
         s.eps = s.eps_next
-        s.halved = np.where(kept, 0, s.halved + 1)
-        s.dx = np.where(kept, self._next_step(s, load, force, kept, descent), 0.5 * s.dx)
+        halved = 0.5 * s.dx
+        s.stride = np.where(kept, np.minimum(1.0, LENGTHEN * s.stride), 0.5 * s.stride)
+        s.dx = np.where(kept, self._next_step(s, load, net, kept, descent), halved)
         return kept
 
-    def _next_step(self, s: _State, load, force, kept, descent: Descent) -> np.ndarray:
+    def _next_step(self, s: _State, load, net, kept, descent: Descent) -> np.ndarray:
         """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
         down = kept & (s.eps > self.regularisation) & (s.residual < descent.loose)
-        right = -force
+        right = -s.stride * net[:, 0]
         if down.any():
             d = np.flatnonzero(down)
             # Where every element moves much faster than the rounding, its kinks no longer matter: go all the way.
@@ -252,10 +253,10 @@ class _Problem:
             s.eps_next[d] = np.maximum(ratio * s.eps[d], self.regularisation)
             # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v. An element at rest creeps
             # in proportion to eps; one that slides feels eps^2.
-            slope = np.einsum("ijnb,jnb->inb", load.tangent[..., d], s.v[..., d])
+            slope = np.einsum("ijnb,jnb->inb", load[:, 1:][..., d], s.v[..., d])
             change = s.eps_next[d] / s.eps[d]
             right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.motion.take(d).total(slope)
-        dx = _solve3(s.motion.assembled(load.tangent), right)
+        dx = _solve3(net[:, 1:], right)
         return np.clip(dx, -LARGEST_STEP, LARGEST_STEP)
 
     def _write(self, s: _State, ended: np.ndarray, out: _Solved) -> None:

@@ -6,7 +6,8 @@ An element of unit length slides along itself with speed ``a`` and sideways with
 
     f[0] = <f_t>,  f[1] = <f_n>,  f[2] = <s f_n>
 
-of the drag per unit length, positive along the velocity it opposes, and the tangent d f / d (a, m, w).
+of the drag per unit length, positive along the velocity it opposes, beside their tangent: an array
+(3, 4, ...) whose column 0 is f and whose columns 1 to 3 are d f / d (a, m, w).
 
 Closed form. With R = sqrt(A^2 + u^2), A^2 = q^2 a^2 + eps^2, the end values R1, R2 and S = R1 + R2 give
 elliptic coordinates mu = 2 m / S, t = 2 w / S in which A^2 = S^2 (1 - mu^2)(1 - t^2) / 4, and every average
@@ -19,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,14 +30,7 @@ SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses a
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
-class Load(NamedTuple):
-    """Averages over elements (n) of samples (B). force: (3, n, B). tangent: (3, 3, n, B)."""
-
-    force: np.ndarray
-    tangent: np.ndarray
-
-
-LoadLaw = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], Load]
+LoadLaw = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (a, m, w, eps) -> (3, 4, n, B)
 
 
 def k_function(z: np.ndarray, one_minus_z: np.ndarray) -> np.ndarray:
@@ -94,63 +87,49 @@ def exact(medium: Medium) -> LoadLaw:
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
     def load(a, m, w, eps):
-        force, tangent = _viscous(medium.viscous, a, m, w)
+        out = np.zeros((3, 4, *a.shape))
+        if any(medium.viscous):
+            _add_viscous(out, medium.viscous, a, m, w)
         if terms:
             ends = Ends.of(q2 * (a * a) + eps * eps, m, w)
-            _add_dry(force, tangent, ends, q2 * a, k_t, k_n, a)
-        return Load(force, tangent)
+            _add_dry(out, ends, a, q2 * a, k_t, k_n)
+        return out
 
     return load
 
 
-def _viscous(coefficients, a, m, w):
+def _add_viscous(out, coefficients, a, m, w) -> None:
     c_t, c_n = coefficients
-    force, tangent = np.zeros((3, *a.shape)), np.zeros((3, 3, *a.shape))
-    if c_t or c_n:
-        for i, (c, x) in enumerate(((c_t, a), (c_n, m), (c_n / 3.0, w))):
-            force[i], tangent[i, i] = c * x, c
-    return force, tangent
+    for i, (c, x) in enumerate(((c_t, a), (c_n, m), (c_n / 3.0, w))):
+        out[i, 0] += c * x
+        out[i, i + 1] += c
 
 
-def _add_dry(force, tangent, e: Ends, qa, k_t, k_n, a) -> None:
+def _add_dry(out, e: Ends, a, qa, k_t, k_n) -> None:
     """Add sum over terms of f_t = k_t a / R, f_n = k_n u / R; ``e`` and ``qa`` = q^2 a have the terms on axis 0."""
-
-    def add(k, *targets):
-        """Add to each target the sum over terms of k times its source."""
-        for to, source in targets:
-            to += (k @ source[: k.size].reshape(k.size, -1)).reshape(to.shape)
-
-    z = e.t * e.t
     two_S = 2.0 / e.S
-    inverse = two_S * (1.0 + z * e.k)  # <1/R>
+    inverse = two_S * (1.0 + e.t * e.t * e.k)  # <1/R>
     p = 1.0 / (e.c_mu + e.mu * e.mu * e.c_t + TINY)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
     cmp = e.c_mu * p
     four_S2 = two_S * two_S
     per_c_t = four_S2 / (e.c_t + TINY)
-    mixed_m = -four_S2 * e.mu * p  # d<1/R>/dm = -<u/R^3>
-    mixed_w = -per_c_t * e.t * (cmp - e.h)  # d<1/R>/dw = -<s u/R^3>
-    if k_t.size:
-        first = slice(0, k_t.size)
-        cube = per_c_t[first] * two_S[first] * p[first]  # <1/R^3>
-        add(
-            k_t,
-            (force[0], a * inverse[first]),
-            (tangent[0, 0], inverse[first] - qa[first] * a * cube),
-            (tangent[0, 1], a * mixed_m[first]),
-            (tangent[0, 2], a * mixed_w[first]),
-        )
+    d_m = -four_S2 * e.mu * p  # d<1/R>/dm = -<u/R^3>
+    d_w = per_c_t * e.t * (e.h - cmp)  # d<1/R>/dw = -<s u/R^3>
+    if first := k_t.size:
+        d_a = -qa[:first] * per_c_t[:first] * two_S[:first] * p[:first]  # -q^2 a <1/R^3>
+        d_t = inverse[:first] + a * d_a
+        rows = np.stack([a * inverse[:first], d_t, a * d_m[:first], a * d_w[:first]], 1)
+        out[0] += _weighed(k_t, rows)
     normal = two_S * cmp
-    add(
-        k_n,
-        (force[1], e.mu),
-        (force[2], 0.5 * e.c_mu * e.t * e.h),
-        (tangent[1, 0], qa * mixed_m),
-        (tangent[2, 0], qa * mixed_w),
-        (tangent[1, 1], normal),
-        (tangent[1, 2], -e.mu * e.t * normal),
-        (tangent[2, 2], two_S * e.c_mu * (p - e.h)),
-    )
-    tangent[2, 1] = tangent[1, 2]
+    cross = -e.mu * e.t * normal
+    across = [e.mu, qa * d_m, normal, cross]
+    turning = [0.5 * e.c_mu * e.t * e.h, qa * d_w, cross, two_S * e.c_mu * (p - e.h)]
+    out[1:] += _weighed(k_n, np.stack(across + turning, 1)).reshape(2, 4, *a.shape)
+
+
+def _weighed(k: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Sum over the terms on axis 0 of k times rows."""
+    return (k @ rows.reshape(k.size, -1)).reshape(rows.shape[1:])
 
 
 def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:
@@ -166,13 +145,8 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
         def mean(x):
             return (weight * x).sum(0)
 
-        force = np.stack([mean(f_t), mean(f_n), mean(s * f_n)])
-        tangent = [
-            [mean(tt), mean(tn), mean(s * tn)],
-            [mean(nt), mean(nn), mean(s * nn)],
-            [mean(s * nt), mean(s * nn), mean(s * s * nn)],
-        ]
-        return Load(force, np.array(tangent))
+        rows = (f_t, tt, tn, s * tn), (f_n, nt, nn, s * nn), (s * f_n, s * nt, s * nn, s * s * nn)
+        return np.array([[mean(x) for x in row] for row in rows])
 
     return load
 

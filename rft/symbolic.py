@@ -23,7 +23,9 @@ def viscous_chain(lengths=(1, 1, 1), ratio=2, link: int = 2):
     headings = [h - headings[link - 1] for h in headings]
     places = [sp.Matrix([0, 0])]
     for i in range(1, n):
-        step = sum((halves[k] * sp.Matrix([sp.cos(headings[k]), sp.sin(headings[k])]) for k in (i - 1, i)), sp.zeros(2, 1))
+        step = sum(
+            (halves[k] * sp.Matrix([sp.cos(headings[k]), sp.sin(headings[k])]) for k in (i - 1, i)), sp.zeros(2, 1)
+        )
         places.append(places[-1] + step)
     places = [p - places[link - 1] for p in places]
     grand, coupling = sp.zeros(3, 3), sp.zeros(3, n - 1)

@@ -106,7 +106,7 @@ def test_dry_media_do_not_know_time(medium):
 @pytest.mark.parametrize("medium", MEDIA)
 def test_mirror_and_reversal(medium):
     alpha, alphadot = samples(THREE, 50)
-    solve = lambda a, d: body_velocity(MEDIA[medium], THREE, a, d, tolerance=1e-12).xi  # noqa: E731
+    solve = lambda a, d: body_velocity(MEDIA[medium], THREE, a, d, tolerance=1e-12).xi
     xi = solve(alpha, alphadot)
     np.testing.assert_allclose(solve(alpha, -alphadot), -xi, atol=1e-9)
     np.testing.assert_allclose(solve(-alpha, -alphadot), xi * [1, -1, -1], atol=1e-9)

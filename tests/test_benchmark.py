@@ -41,7 +41,7 @@ def one_scipy_solve(alpha, alphadot, segments=20, tan2=np.tan(np.radians(13.8)) 
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
 
-    return fsolve(force, np.zeros(3), full_output=True)
+    return fsolve(force, [0.02, 0.01, 0.1], full_output=True)  # off zero, where a link may stand still
 
 
 def test_field_against_a_loop_of_fsolve():
@@ -63,9 +63,13 @@ def test_field_against_a_loop_of_fsolve():
     flags = np.array([a[2] == 1 for a in answers])
     off = np.abs(np.array([a[0] for a in answers]) - solution.xi[part]).max(-1)
     ratio, ratio_plain = (np.median(theirs) / np.median(x) for x in (ours, plain))
-    print(f"\n31 x 31 x 8 loose glass, exact integrals: field {1e6 * np.median(ours):.1f} us a sample (half by mirror symmetry),")
+    print(
+        f"\n31 x 31 x 8 loose glass, exact integrals: field {1e6 * np.median(ours):.1f} us a sample (half by mirror symmetry),"
+    )
     print(f"  every sample solved {1e6 * np.median(plain):.1f} us, all converged")
-    print(f"fsolve, 20 midpoints a link: {1e6 * np.median(theirs):.0f} us a sample, says it failed in {100 * np.mean(~flags):.0f} %,")
+    print(
+        f"fsolve, 20 midpoints a link: {1e6 * np.median(theirs):.0f} us a sample, says it failed in {100 * np.mean(~flags):.0f} %,"
+    )
     print(f"  is off by more than 0.01 in {100 * np.mean(off > 0.01):.0f} %")
     print(f"ratio {ratio:.0f} for the field, {ratio_plain:.0f} with every sample solved")
     assert (solution.status != "unconverged").all()

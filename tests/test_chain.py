@@ -37,8 +37,12 @@ def test_links_are_where_they_should_be(name):
         headings, centres = by_hand(body, alpha[:, b])
         np.testing.assert_allclose([motion.c[:, b], motion.s[:, b]], [np.cos(headings), np.sin(headings)], atol=1e-14)
         lever = np.stack([-centres[:, 1], centres[:, 0]], -1)  # velocity of the centres under a unit turn
-        np.testing.assert_allclose(motion.r_t[:, b], (lever * np.stack([motion.c, motion.s], -1)[:, b]).sum(-1), atol=1e-14)
-        np.testing.assert_allclose(motion.r_n[:, b], (lever * np.stack([-motion.s, motion.c], -1)[:, b]).sum(-1), atol=1e-14)
+        np.testing.assert_allclose(
+            motion.r_t[:, b], (lever * np.stack([motion.c, motion.s], -1)[:, b]).sum(-1), atol=1e-14
+        )
+        np.testing.assert_allclose(
+            motion.r_n[:, b], (lever * np.stack([-motion.s, motion.c], -1)[:, b]).sum(-1), atol=1e-14
+        )
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -59,9 +63,10 @@ def test_carried_and_total_are_transposes():
     xi, force = rng.normal(size=(3, 6)), rng.normal(size=(3, 3, 6))
     power = (2 * motion.half * force * motion.carried(xi)).sum((0, 1))
     np.testing.assert_allclose(power, (xi * motion.total(force)).sum(0), rtol=1e-12)
-    H = rng.normal(size=(3, 3, 3, 6))
+    H, load = rng.normal(size=(3, 3, 3, 6)), np.empty((3, 4, 3, 6))
+    load[:, 0], load[:, 1:] = force, H
     columns = [motion.total(np.einsum("ijnb,jnb->inb", H, motion.carried(e[:, None] * np.ones(6)))) for e in np.eye(3)]
-    np.testing.assert_allclose(motion.assembled(H), np.stack(columns, 1), rtol=1e-12)
+    np.testing.assert_allclose(motion.assembled(load), np.stack([motion.total(force), *columns], 1), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

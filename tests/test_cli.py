@@ -52,7 +52,9 @@ def test_displacement_by_every_tier(tmp_path):
     assert (code, err) == (0, "")
     table = json.loads(out)
     assert table["amplitude"] == [0.5, 1.0]
-    assert {m: np.shape(table[m]) for m in ("area", "path", "direct")} == dict.fromkeys(("area", "path", "direct"), (2, 3))
+    assert {m: np.shape(table[m]) for m in ("area", "path", "direct")} == dict.fromkeys(
+        ("area", "path", "direct"), (2, 3)
+    )
     assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
     assert plot.stat().st_size > 10_000
     code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--methods", "direct")
@@ -93,7 +95,10 @@ def test_scenes_are_listed():
 BAD = [
     (["velocity", "nothing", "--alpha", "0,0", "--alphadot", "1,0"], "scene: 'nothing' is unknown"),
     (["velocity", "three-link-glass", "--alpha", "0", "--alphadot", "1"], r"alpha must have shape (..., 2)"),
-    (["velocity", "three-link-glass", "--alpha", "0,x", "--alphadot", "1,0"], "--alpha: '0,x' is not a list of numbers"),
+    (
+        ["velocity", "three-link-glass", "--alpha", "0,x", "--alphadot", "1,0"],
+        "--alpha: '0,x' is not a list of numbers",
+    ),
     (["velocity", "three-link-glass", "--alpha", "0,nan", "--alphadot", "1,0"], "alpha must be finite, got nan"),
     (["velocity", "three-link-glass", "--alpha", "0,0"], "Missing option '--alphadot'"),
     (["displacement", "three-link-glass", "--amplitudes", "2.6"], "lies outside the field's -2.5 to 2.5"),

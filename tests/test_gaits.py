@@ -29,7 +29,9 @@ def test_amplitudes_are_a_batch_axis(name):
 
 def test_butterfly_is_the_published_one():
     a1, a2 = Butterfly().shape(T).T
-    np.testing.assert_allclose((a1 + a2) / 2, 1.0908 * np.cos(T) - 0.2508 * np.cos(3 * T) - 0.18 * np.cos(5 * T), atol=1e-14)
+    np.testing.assert_allclose(
+        (a1 + a2) / 2, 1.0908 * np.cos(T) - 0.2508 * np.cos(3 * T) - 0.18 * np.cos(5 * T), atol=1e-14
+    )
     np.testing.assert_allclose((a1 - a2) / 2, 1.052 * np.sin(T) + 0.0859 * np.sin(3 * T), atol=1e-14)
 
 

@@ -37,7 +37,7 @@ def test_fit_recovers_a_linear_swimmer():
 def test_fit_takes_any_number_of_joints(joints):
     rng = np.random.default_rng(1)
     M = rng.normal(size=(3, joints))
-    swimmer = lambda a, d: np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])  # noqa: E731
+    swimmer = lambda a, d: np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])
     fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 8)
     assert fitted.A.shape == (3, joints, *(9,) * joints)
     np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
@@ -45,14 +45,14 @@ def test_fit_takes_any_number_of_joints(joints):
 
 @pytest.mark.parametrize("points", [6, 7])
 def test_half_the_grid_tells_the_other_half(points):
-    glass = lambda a, d: body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d).checked().xi  # noqa: E731
+    glass = lambda a, d: body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d).checked().xi
     whole, half = (connection.fit(glass, connection.grid(2, points), mirror=m) for m in (False, True))
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(half, name), getattr(whole, name), atol=1e-7)
 
 
 def test_fit_residual_is_the_rms_misfit():
-    swimmer = lambda a, d: np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]  # noqa: E731
+    swimmer = lambda a, d: np.stack([d[..., 0] ** 3, d[..., 0], 0 * d[..., 0]], -1) + 0 * a[..., :1]
     fitted = connection.fit(swimmer, connection.grid(2, 5, 1.0), 16)
     # cos^3 = (3 cos + cos 3)/4: the plane keeps 3/4 cos, the misfit is cos 3t / 4, rms sqrt(1/32).
     np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
@@ -127,7 +127,10 @@ def test_area_counts_winding_numbers():
 
 def test_leaving_the_field_is_an_error_that_names_the_angle():
     fitted = connection.fit(MIDDLE, connection.grid(2, 11, 1.0))
-    for tier in (lambda: predict.path(fitted, Circle(amplitude=1.3)), lambda: predict.area(curvature.ccf(fitted), Circle(), 1.3)):
+    for tier in (
+        lambda: predict.path(fitted, Circle(amplitude=1.3)),
+        lambda: predict.area(curvature.ccf(fitted), Circle(), 1.3),
+    ):
         with pytest.raises(ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"):
             tier()
 
@@ -136,10 +139,10 @@ def test_leaving_the_field_is_an_error_that_names_the_angle():
 def test_changing_frame_is_solving_in_that_frame(medium):
     mean, rng = Chain((1, 2, 1), length=0.4), np.random.default_rng(2)
     alpha, alphadot = rng.uniform(-2, 2, (30, 2)), rng.normal(size=(30, 2))
-    solve = lambda body, a, d: body_velocity(MEDIA[medium], body, a, d).xi  # noqa: E731
+    solve = lambda body, a, d: body_velocity(MEDIA[medium], body, a, d).xi
     for frame in ("link-1", "link-2", "link-3"):
         other = dataclasses.replace(mean, frame=frame)
-        carried = coordinates.in_frame(lambda a, d: solve(mean, a, d), lambda a, d: mean.frame_pose(frame, a, d))  # noqa: B023
+        carried = coordinates.in_frame(lambda a, d: solve(mean, a, d), lambda a, d: mean.frame_pose(frame, a, d))
         np.testing.assert_allclose(carried(alpha, alphadot), solve(other, alpha, alphadot), atol=1e-8)
 
 
@@ -211,4 +214,8 @@ def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match="directions must"):
         connection.directions(3, 2)
     with pytest.raises(ValueError, match="two joints"):
-        curvature.ccf(connection.fit(lambda a, d: np.zeros((*np.broadcast_shapes(a.shape, d.shape)[:-1], 3)), (np.linspace(0, 1, 9),)))
+        curvature.ccf(
+            connection.fit(
+                lambda a, d: np.zeros((*np.broadcast_shapes(a.shape, d.shape)[:-1], 3)), (np.linspace(0, 1, 9),)
+            )
+        )

@@ -57,7 +57,10 @@ BAD = [
     ("x = 1", "table: 'x' is unknown"),
     (GOOD.split("[gait]")[0], r"the table \[gait\] is missing"),
     ("gait = 3" + GOOD.split("[gait]")[0], r"gait must be a table"),
-    (GOOD.replace('law = "granular"', 'law = "granluar"'), r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'"),
+    (
+        GOOD.replace('law = "granular"', 'law = "granluar"'),
+        r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'",
+    ),
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
     (GOOD.replace('law = "granular"', 'name = "glass"'), "takes no 'C'"),
     (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),

@@ -61,13 +61,15 @@ class Motion(NamedTuple):
         np.add(length * self.r_t * f_t + length * self.r_n * f_n, length * self.half * f_s, out=parts[2])
         return parts.sum(-2)
 
-    def assembled(self, matrix: np.ndarray) -> np.ndarray:
-        """(3, 3, ..., B): sum over elements of J^T H J, from H (3, 3, ..., n, B), J the matrix of `carried`."""
-        to_t, to_n, to_w = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-        columns = np.empty_like(matrix)
-        np.subtract(self.c * to_t, self.s * to_n, out=columns[:, 0])
-        np.add(self.s * to_t, self.c * to_n, out=columns[:, 1])
-        np.add(self.r_t * to_t + self.r_n * to_n, self.half * to_w, out=columns[:, 2])
+    def assembled(self, load: np.ndarray) -> np.ndarray:
+        """(3, 4, B) from element loads (3, 4, n, B) as `rft.loads` gives them: net force and moment in column 0, their
+        derivative with respect to xi, sum of J^T H J with J the matrix of `carried`, in columns 1 to 3."""
+        to_t, to_n, to_w = load[:, 1], load[:, 2], load[:, 3]
+        columns = np.empty_like(load)
+        columns[:, 0] = load[:, 0]
+        np.subtract(self.c * to_t, self.s * to_n, out=columns[:, 1])
+        np.add(self.s * to_t, self.c * to_n, out=columns[:, 2])
+        np.add(self.r_t * to_t + self.r_n * to_n, self.half * to_w, out=columns[:, 3])
         return self.total(columns)
 
 

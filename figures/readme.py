@@ -1,0 +1,24 @@
+"""The README's picture: Fig. 11(d) and (e) side by side."""
+
+from __future__ import annotations
+
+from figures import fig11d_ccf, fig11e_displacement, main
+from geomech import plots
+
+
+def compute() -> dict:
+    return {"map": fig11d_ccf.compute(), "tables": fig11e_displacement.compute()}
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(10.8, 3.3, 3)
+    field, study = numbers["map"], numbers["tables"]
+    plots.ccf_map(field["ccf"], 0, field["gaits"], field["unit"], axes[0, 0])
+    for ax, (name, table) in zip(axes[0, 1:], study["tables"].items()):
+        plots.displacement(table, study["unit"], ax, gait=fig11e_displacement.GAITS[name])
+    return fig
+
+
+if __name__ == "__main__":
+    main("readme", compute, draw)
