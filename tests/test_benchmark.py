@@ -19,7 +19,10 @@ def field_samples(points=31, count=8, extent=2.5):
     return np.broadcast_arrays(alpha, np.stack([np.cos(angle), np.sin(angle)], -1))
 
 
-def one_scipy_solve(alpha, alphadot, segments=20, tan2=np.tan(np.radians(13.8)) ** 2, C=1.8):
+TAN2, C = np.tan(np.radians(13.8)) ** 2, 1.8
+
+
+def one_scipy_solve(alpha, alphadot, segments=20):
     """What a user writes today: midpoint segments in the middle link's frame, Eqs. 2-3 as printed, fsolve."""
     half = 1 / 6
     s = ((np.arange(segments) + 0.5) / segments * 2 - 1) * half
@@ -37,7 +40,7 @@ def one_scipy_solve(alpha, alphadot, segments=20, tan2=np.tan(np.radians(13.8)) 
         v = xi[:2] + spin + swing
         v = v / (np.sqrt((v**2).sum(-1, keepdims=True)) + 1e-12)
         vn, vt = (v * n).sum(-1, keepdims=True), (v * t).sum(-1, keepdims=True)
-        f = (1 + C / np.sqrt(tan2 + vn**2)) * vn * n + vt * t
+        f = (1 + C / np.sqrt(TAN2 + vn**2)) * vn * n + vt * t
         moment = place[..., 0] * f[..., 1] - place[..., 1] * f[..., 0]
         return [f[..., 0].sum(), f[..., 1].sum(), moment.sum()]
 
@@ -63,14 +66,12 @@ def test_field_against_a_loop_of_fsolve():
     flags = np.array([a[2] == 1 for a in answers])
     off = np.abs(np.array([a[0] for a in answers]) - solution.xi[part]).max(-1)
     ratio, ratio_plain = (np.median(theirs) / np.median(x) for x in (ours, plain))
-    print(
-        f"\n31 x 31 x 8 loose glass, exact integrals: field {1e6 * np.median(ours):.1f} us a sample (half by mirror symmetry),"
-    )
-    print(f"  every sample solved {1e6 * np.median(plain):.1f} us, all converged")
-    print(
-        f"fsolve, 20 midpoints a link: {1e6 * np.median(theirs):.0f} us a sample, says it failed in {100 * np.mean(~flags):.0f} %,"
-    )
-    print(f"  is off by more than 0.01 in {100 * np.mean(off > 0.01):.0f} %")
+    us = {k: 1e6 * np.median(v) for k, v in (("field", ours), ("plain", plain), ("loop", theirs))}
+    failed, wrong = 100 * np.mean(~flags), 100 * np.mean(off > 0.01)
+    print(f"\n31 x 31 x 8 loose glass at exact integrals: {us['field']:.1f} us a sample (half by mirror symmetry),")
+    print(f"  {us['plain']:.1f} us with every sample solved; all converged")
+    print(f"fsolve, 20 midpoints a link: {us['loop']:.0f} us a sample; says it failed in {failed:.0f} %,")
+    print(f"  is off by more than 0.01 in {wrong:.0f} %")
     print(f"ratio {ratio:.0f} for the field, {ratio_plain:.0f} with every sample solved")
     assert (solution.status != "unconverged").all()
     assert ratio > 200

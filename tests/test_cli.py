@@ -142,5 +142,6 @@ def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
 
 
 def test_the_command_starts_without_the_heavy_libraries():
-    code = "import sys, geomech.cli; print([m for m in ('numpy', 'scipy', 'matplotlib', 'sympy', 'rich.progress') if m in sys.modules])"
+    heavy = ("numpy", "scipy", "matplotlib", "sympy", "rich.progress")
+    code = f"import sys, geomech.cli; print([m for m in {heavy} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
