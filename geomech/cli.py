@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
+import re
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Optional
@@ -59,13 +62,13 @@ def velocity(
     scene = load(name)
     solution = scene.solve(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
     out = {"xi": solution.xi.tolist(), "status": str(solution.status), "residual": float(solution.residual)}
+    if out["status"] == "unconverged":
+        raise SceneError(f"{scene.name}: the force balance did not converge: raise [numerics] regularisation")
     if as_json:
         print(json.dumps(out))
     else:
         print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{scene.unit}, {scene.unit}, rad per unit time")
         print(f"{out['status']}, residual {out['residual']:.1e}, {int(solution.iterations)} iterations")
-    if out["status"] == "unconverged":
-        raise SceneError(f"{scene.name}: the force balance did not converge: raise [numerics] regularisation")
 
 
 @app.command()
@@ -80,10 +83,12 @@ def connection(
     from geomech import plots
     from geomech.netcdf import save_connection
 
-    scene = _field_scene(name, grid, extent, out, plot)
+    if out.suffix != ".nc":
+        raise SceneError(f"cannot write {out}: end the name of a NetCDF file in .nc")
+    scene = _field_scene(name, grid, extent, out, plot, maps=plot is not None)
     save_connection(out, scene)
     if plot:
-        plots.save(plots.connection_figure(_two_joints(scene).fitted, scene.unit), plot)
+        plots.save(plots.connection_figure(scene.fitted, scene.unit), plot)
 
 
 @app.command()
@@ -96,7 +101,7 @@ def ccf(
     """The CCF map with the scene's gait drawn on it."""
     from geomech import plots
 
-    scene = _two_joints(_field_scene(name, grid, extent, plot, plot))
+    scene = _field_scene(name, grid, extent, plot, plot, maps=True)
     plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit), plot)
 
 
@@ -133,7 +138,7 @@ def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="pri
     import rft
     from geomech.scene import builtin_names, load
 
-    if show:
+    if show is not None:
         print(load(choose("--show", show, builtin_names())).text, end="")
         return
     for scene_name in builtin_names():
@@ -163,9 +168,13 @@ def _loaded(name: str, grid: int | None, extent: float | None):
     return load(name).with_numerics(grid=grid, extent=extent)
 
 
-def _field_scene(name, grid, extent, output: Path, plot: Path | None):
-    """The scene with its field computed, once its outputs are known to be writable."""
+def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool):
+    """The scene with its field computed, once its outputs are known to be writable. maps: they show shape space."""
     scene = _loaded(name, grid, extent)
+    if maps and scene.body.joints != 2:
+        raise SceneError(
+            f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
+        )
     _check_outputs(output, plot)
     with progress(f"field of {scene.name}") as bar:
         scene.compute_field(bar)
@@ -186,30 +195,25 @@ class _Unused(Exception):
     """Leaves `whole_file` without writing."""
 
 
-def _two_joints(scene):
-    if scene.body.joints != 2:
-        raise SceneError(
-            f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
-        )
-    return scene
-
-
-def _numbers(option: str, text: str) -> list[float]:
+def _numbers(option: str, text: str, count: int | None = None) -> list[float]:
     try:
-        return [float(x) for x in text.split(",")]
+        values = [float(x) for x in text.split(",")]
+        if count not in (None, len(values)):
+            raise ValueError
     except ValueError:
-        raise SceneError(f"{option}: {text!r} is not a list of numbers such as 0.5,0.3") from None
+        raise SceneError(
+            f"{option}: {text!r} is not {'a number' if count else 'a list of numbers such as 0.5,0.3'}"
+        ) from None
+    return values
 
 
 def _sweep(option: str, text: str) -> list[float]:
     """0.5,1.0 or START:STOP:COUNT, all finite."""
-    import math
-
     parts = text.split(":")
     if len(parts) == 1:
         values = _numbers(option, text)
-    elif len(parts) == 3 and parts[2].isdecimal() and 1 <= int(parts[2]) <= 100_000:
-        (start, stop), count = _numbers(option, ",".join(parts[:2])), int(parts[2])
+    elif len(parts) == 3 and re.fullmatch(r"[1-9]\d{0,4}", parts[2]):
+        (start,), (stop,), count = _numbers(option, parts[0], 1), _numbers(option, parts[1], 1), int(parts[2])
         values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
     else:
         raise SceneError(f"{option}: {text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10")
@@ -220,11 +224,15 @@ def _sweep(option: str, text: str) -> list[float]:
 
 def main() -> None:
     """Entry point: one line on standard error and exit code 2 for what the user can mend."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing half-written stays behind
     try:
         code = app(standalone_mode=False)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         print("error: interrupted", file=sys.stderr)
         code = 130
+    except MemoryError:
+        print("error: not enough memory: lower the grid, the phases or the number of amplitudes", file=sys.stderr)
+        code = 2
     except Exception as error:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):

@@ -43,20 +43,33 @@ class Connection:
         return np.einsum("...ij,...j->...i", self(alpha), np.asarray(alphadot, float))
 
 
+def evaluate(velocity: Velocity, alpha, alphadot) -> np.ndarray:
+    """velocity(alpha, alphadot), or ValueError if that is not finite and of shape (..., 3)."""
+    shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
+    xi = np.asarray(velocity(alpha, alphadot))
+    if xi.shape != shape:
+        raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
+    if not np.isfinite(xi).all():
+        where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
+        raise ValueError(f"velocity is not finite at alpha = {where}")
+    return xi
+
+
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
     """``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
-    if int(points) != points or points < 4:
+    if not (np.isfinite(points) and int(points) == points and points >= 4):
         raise ValueError(f"grid must be a whole number of at least 4 points, got {points!r}")
-    if not (np.isfinite(extent) and extent > 0):
-        raise ValueError(f"extent must be a finite angle > 0 in rad, got {extent!r}")
+    if not 1e-9 <= extent <= 1e6:
+        raise ValueError(f"extent must be a finite angle > 0 in rad, 1e-9 to 1e6, got {extent!r}")
     return (np.linspace(-extent, extent, int(points)),) * joints
 
 
 def directions(joints: int, count: int) -> np.ndarray:
     """Unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
     low-discrepancy sequence for more."""
-    if int(count) != count or count < joints:
-        raise ValueError(f"directions must be a whole number >= the number of joints ({joints}), got {count!r}")
+    least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
+    if not (np.isfinite(count) and int(count) == count and count >= least):
+        raise ValueError(f"directions must be a whole number of at least {least} for {joints} joints, got {count!r}")
     if joints == 1:
         return np.ones((1, 1))
     if joints == 2:
@@ -79,6 +92,9 @@ def fit(
     Raises what ``velocity`` raises.
     """
     axes = tuple(np.asarray(a, float) for a in axes)
+    for a in axes:
+        if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
+            raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
     mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
     unit = directions(len(axes), count)
     solve = np.linalg.pinv(unit)  # (d, count): A^T = pinv(directions) xi
@@ -88,7 +104,7 @@ def fit(
     step = max(1, SAMPLES_TOGETHER // len(unit))
     for k in range(0, todo, step):
         here = slice(k, min(k + step, todo))
-        xi = velocity(alpha[here, None], unit)
+        xi = evaluate(velocity, alpha[here, None], unit)
         A[here] = np.einsum("jc,sci->sij", solve, xi)
         off = xi - np.einsum("sij,cj->sci", A[here], unit)
         residual[here], speed[here] = np.sqrt((off**2).mean(1)), np.sqrt((xi**2).mean(1))

@@ -57,6 +57,8 @@ class Field:
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""
         alpha = np.asarray(alpha, float)
+        if alpha.ndim == 0 or alpha.shape[-1] != self.joints or not np.isfinite(alpha).all():
+            raise ValueError(f"alpha must be finite and of shape (..., {self.joints}), got {alpha.shape}")
         for k, axis in enumerate(self.axes):
             low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
             slack = 1e-9 * (axis[-1] - axis[0])

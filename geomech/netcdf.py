@@ -19,9 +19,9 @@ def save_connection(path: str | Path, scene: Scene) -> None:
 
     fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = f"Local connection and curvature constraint function of the scene {scene.name}"
+        file.title = f"Local connection and curvature constraint function of the scene {scene.name}".encode()
         file.Conventions = "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops"
-        file.scene = scene.text or repr(scene)
+        file.scene = (scene.text or repr(scene)).encode()
         file.numerics = repr(scene.numerics)
         _coordinates(file, fitted)
         angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from geomech import se2
-from geomech.connection import Connection, Velocity
+from geomech.connection import SAMPLES_TOGETHER, Connection, Velocity, evaluate
 from geomech.field import Field
 from geomech.gaits.base import Gait
 from geomech.simulate import displacement
@@ -38,5 +38,13 @@ def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases:
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
-    """The velocity integrated along the gait, all phases and amplitudes in one batch."""
-    return displacement(velocity(*gait.cycle(phases, amplitudes)))
+    """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
+    amplitudes = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
+    flat = amplitudes.reshape(-1)
+    step = max(1, SAMPLES_TOGETHER // phases)
+    poses = [_cycle(velocity, gait, flat[k : k + step], phases) for k in range(0, flat.size, step)]
+    return np.concatenate(poses).reshape(*amplitudes.shape, 3) if poses else np.zeros((*amplitudes.shape, 3))
+
+
+def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarray:
+    return displacement(evaluate(velocity, *gait.cycle(phases, amplitudes)))

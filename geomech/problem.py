@@ -11,7 +11,11 @@ from pathlib import Path
 
 
 class SceneError(ValueError):
-    """A scene, option or file that makes no sense; its text is one line."""
+    """A scene, option or file that makes no sense; its text is one line of readable length."""
+
+    def __init__(self, text: str):
+        text = " ".join(text.split())
+        super().__init__(text if len(text) <= 400 else text[:300] + " ... " + text[-80:])
 
 
 def choose(place: str, word: object, known: Iterable[str]) -> str:
@@ -25,7 +29,10 @@ def choose(place: str, word: object, known: Iterable[str]) -> str:
 
 
 def _short(value: object) -> str:
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very long number"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -33,18 +40,20 @@ def _short(value: object) -> str:
 def whole_file(path: str | Path):
     """A path to write to, with the same ending; moved to ``path`` on success, removed on failure. SceneError if
     nothing can be written there."""
-    path = Path(path)
     try:
-        if path.is_dir():
-            raise IsADirectoryError("it is a folder")
-        handle, part = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+        target = Path(path).resolve()
+        if target.exists() and not target.is_file():
+            raise OSError("it is no ordinary file")
+        handle, part = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
         os.close(handle)
-    except OSError as error:
-        raise SceneError(f"cannot write {path}: {error.strerror or error}; choose another output") from None
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SceneError(
+            f"cannot write {path}: {getattr(error, 'strerror', None) or error}; choose another output"
+        ) from None
     try:
         yield Path(part)
         os.chmod(part, 0o666 & ~_umask())
-        os.replace(part, path)
+        os.replace(part, target)
     finally:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(part)

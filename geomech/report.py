@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -23,19 +24,23 @@ AMPLITUDES = 10  # in the study that `run` makes of each gait
 @contextlib.contextmanager
 def whole_folder(path: str | Path):
     """A folder to fill; its files move to ``path`` on success and vanish on failure. SceneError if that cannot be."""
-    path = Path(path)
     try:
-        if path.exists() and not path.is_dir():
-            raise NotADirectoryError("it is not a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
-    except OSError as error:
-        raise SceneError(f"cannot write the folder {path}: {error.strerror or error}; choose another with -o") from None
+        target = Path(path).resolve()
+        if os.path.lexists(target) and not target.is_dir():
+            raise OSError("it is not a folder")
+        there = next(p for p in (target, *target.parents) if p.exists())
+        part = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=there))
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SceneError(f"cannot write the folder {path}: {reason}; choose another with -o") from None
     try:
         yield part
-        path.mkdir(exist_ok=True)
-        for file in part.iterdir():
-            file.replace(path / file.name)
+        files = list(part.iterdir())
+        if blocked := [f.name for f in files if (target / f.name).is_dir()]:
+            raise SceneError(f"cannot write {target / blocked[0]}: it is a folder; choose another with -o")
+        target.mkdir(parents=True, exist_ok=True)
+        for file in files:
+            file.replace(target / file.name)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
@@ -55,7 +60,7 @@ def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
         plots.displacement(table, scene.unit, ax, gait=gait, marker="o")
     _save(fig, folder / "displacement")
     (folder / "displacement.json").write_text(json.dumps(tables, indent=1) + "\n")
-    (folder / "scene.toml").write_text(scene.text)
+    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     return tables
 
 
@@ -63,10 +68,13 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     """Amplitudes up to the largest that keeps the gait inside the field and its joints within pi / 1.25."""
     t = np.linspace(0, 2 * np.pi, 721)
     room = min(scene.numerics.extent, np.pi / 1.25) - np.abs(np.array(gait.centre or 0.0)).max()
-    top = room / np.abs(gait.unit(t)).max()
-    if top <= 0:
+    reach = np.abs(gait.unit(t)).max()
+    if reach == 0:
+        raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+    if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
-    return [float(f"{a:.3g}") for a in np.floor(top * 1000 * np.arange(1, AMPLITUDES + 1) / AMPLITUDES) / 1000]
+    top = 0.999 * room / reach
+    return [float(f"{a:.3g}") for a in top * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
 
 
 def _save(fig, stem: Path) -> None:

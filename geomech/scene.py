@@ -35,24 +35,26 @@ LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 class Numerics:
     """How finely to compute; all optional. loads: "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation: body
     lengths per radian (rft.balance). tolerance: normalised residual. directions: of alphadot in the least-squares
-    fit. grid: points per joint, extent: rad on either side. interpolation: spline degree. phases: per cycle."""
+    fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on either side.
+    interpolation: spline degree. phases: per cycle."""
 
     loads: str = "exact"
     regularisation: float = 1e-6
     tolerance: float = 1e-10
-    directions: int = 8
+    directions: int | None = None
     grid: int = 31
     extent: float = 2.5
     interpolation: int = 3
     phases: int = 256
 
     def __post_init__(self):
-        for name in ("regularisation", "tolerance", "extent"):
+        for name, low, high in (("regularisation", 1e-12, 1.0), ("tolerance", 1e-13, 1.0), ("extent", 1e-6, 100.0)):
             value = getattr(self, name)
-            if not (math.isfinite(value) and 0 < value <= 10):
-                raise ValueError(f"{name} must be a number > 0 and at most 10, got {value!r}")
-        for name, low, high in (("directions", 1, 4096), ("grid", 4, 4096), ("phases", 4, 1_000_000)):
-            if not low <= getattr(self, name) <= high:
+            if not low <= value <= high:
+                raise ValueError(f"{name} must be a number from {low:g} to {high:g}, got {value!r}")
+        for name, low, high in (("directions", 2, 4096), ("grid", 4, 4096), ("phases", 4, 1_000_000)):
+            value = getattr(self, name)
+            if value is not None and not (low <= value <= high and int(value) == value):
                 raise ValueError(f"{name} must be a whole number from {low} to {high}, got {getattr(self, name)!r}")
         if self.interpolation not in (1, 2, 3, 4, 5) or self.interpolation >= self.grid:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
@@ -112,7 +114,8 @@ class Scene:
                 "methods = direct, which needs no field"
             )
         axes = conn.grid(joints, n.grid, n.extent)
-        return conn.fit(self.velocity, axes, n.directions, n.interpolation, progress, self.medium.mirror)
+        count = n.directions or (8 if joints <= 2 else 16 * joints)
+        return conn.fit(self.velocity, axes, count, n.interpolation, progress, self.medium.mirror)
 
     @cached_property
     def fitted(self) -> conn.Connection:
@@ -192,8 +195,8 @@ def load(scene: str | Path) -> Scene:
     if path.suffix != ".toml" and not path.exists():
         choose("scene", str(scene), names)
     try:
-        text = path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
         raise SceneError(
             f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
@@ -205,8 +208,8 @@ def parse(text: str, name: str = "scene") -> Scene:
     """The scene of a TOML text; SceneError if it is not one."""
     try:
         tables = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise SceneError(f"{name} is not TOML: {' '.join(str(error).split())}") from None
+    except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
+        raise SceneError(f"{name} is not TOML: {error}") from None
     for table in tables:
         choose(f"{name}: table", table, ("medium", "body", "gait", "numerics"))
     for table in ("medium", "body", "gait"):
@@ -243,21 +246,25 @@ def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type]):
 
 
 def _build(place: str, table: dict, kind: type):
-    """A dataclass from a table: keys are its fields, an angle ``x`` may be given as ``x_deg``; SceneError on anything else."""
+    """A dataclass from a table: keys are its fields, one of its ``angles`` may be given as ``x_deg``; else SceneError."""
     names = [f.name for f in dataclasses.fields(kind)]
     values = {}
     for key, value in table.items():
-        field, scale = key, None
-        if key not in names and key.endswith("_deg"):
-            field, scale = key.removesuffix("_deg"), math.pi / 180
-        choose(f"{place} key", field if field in names else key, names)
+        in_degrees = key.endswith("_deg") and key.removesuffix("_deg") in getattr(kind, "angles", ())
+        field = choose(f"{place} key", key.removesuffix("_deg") if in_degrees else key, names)
         if field in values:
             raise SceneError(f"{place}: {field} is given twice: keep one of {field} and {field}_deg")
-        if scale is not None and isinstance(value, (int, float)) and not isinstance(value, bool):
-            value = value * scale
-        values[field] = value
+        values[field] = _radians(value) if in_degrees else value
     try:
         return msgspec.convert(values, kind)
-    except (msgspec.ValidationError, OverflowError) as error:
-        text = " ".join(str(error).split())
-        raise SceneError(f"{place} {text.replace(' - at `$', ' - at `').replace(' - at ``', '')}") from None
+    except (ValueError, OverflowError) as error:
+        raise SceneError(f"{place} {str(error).replace(' - at `$', ' - at `').replace(' - at ``', '')}") from None
+
+
+def _radians(degrees):
+    """Numbers, and numbers in lists, from degrees; anything else as it is, to be refused for what it is."""
+    if isinstance(degrees, list):
+        return [_radians(x) for x in degrees]
+    if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:
+        return math.radians(degrees)
+    return degrees

@@ -46,6 +46,8 @@ def _spectrum(xi) -> _Spectrum:
     xi = np.asarray(xi, float)
     if xi.ndim < 2 or xi.shape[-1] != 3 or xi.shape[-2] < 3:
         raise ValueError(f"xi must have shape (..., N >= 3, 3), got {xi.shape}")
+    if not np.isfinite(xi).all():
+        raise ValueError("xi must be finite")
     k, turn = _coefficients(xi[..., 2] + 0j)
     mean = turn[..., k == 0].real
     swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))

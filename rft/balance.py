@@ -21,7 +21,7 @@ import numpy as np
 
 from rft.bodies.base import Body, Motion
 from rft.loads import LoadLaw, element_load, parse
-from rft.media.base import Medium
+from rft.media.base import Medium, real_array
 
 LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
@@ -96,34 +96,34 @@ def body_velocity(
     alpha, alphadot = _checked_input(body, alpha, alphadot, regularisation, tolerance)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
-    speed = np.sqrt((alphadot * alphadot).sum(0)) if alphadot.size else np.zeros(alpha.shape[1])
+    speed = np.sqrt((alphadot * alphadot).sum(0))
     moving = speed > 0
+    problem = _Problem(medium, body, loads, regularisation, tolerance)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
-        problem = _Problem(medium, body, loads, regularisation, tolerance)
         solved = problem.solve(alpha[:, moving], alphadot[:, moving] / speed[moving], threads)
         scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
         xi[:, moving] = solved.xi * scale
         residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
-        limit = problem.limit
-    else:
-        limit = tolerance
-    status = np.where(residual <= limit, np.where(stuck, "stuck", "sliding"), "unconverged")
+    status = np.where(residual <= problem.limit, np.where(stuck, "stuck", "sliding"), "unconverged")
     return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
 def _checked_input(body, alpha, alphadot, regularisation, tolerance):
     for name, value in (("regularisation", regularisation), ("tolerance", tolerance)):
-        if not (np.isscalar(value) and np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a finite number > 0, got {value!r}")
+        if not (isinstance(value, (int, float, np.floating)) and 1e-15 <= value <= 1e3):
+            raise ValueError(f"{name} must be a finite number > 0, 1e-15 to 1e3, got {value!r}")
     arrays = []
-    for name, x in (("alpha", alpha), ("alphadot", alphadot)):
-        x = np.asarray(x, float)
+    for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
+        x = real_array(name, x)
         if x.ndim == 0 or x.shape[-1] != body.joints:
             raise ValueError(f"{name} must have shape (..., {body.joints}) for this body, got {x.shape}")
         if not np.isfinite(x).all():
             raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+        size = np.abs(x)
+        if size.max(initial=0.0) > largest or (name == "alphadot" and size[size > 0].min(initial=1.0) < 1e-100):
+            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         arrays.append(x)
     try:
         return np.broadcast_arrays(*arrays)

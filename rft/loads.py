@@ -18,6 +18,7 @@ is elementary in mu, t and one function k(t) = (atanh t - t) / t^3:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -179,9 +180,9 @@ def parse(how: str) -> tuple[str, int]:
     kind, _, count = str(how).partition(":")
     if how == "exact":
         return "exact", 1
-    if kind in ("midpoint", "gauss") and count.isdecimal() and 1 <= int(count) <= 10_000:
+    if kind in ("midpoint", "gauss") and re.fullmatch(r"[1-9]\d{0,3}", count) and int(count) <= 1000:
         return kind, int(count)
-    raise ValueError(f"loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 10000, got {how!r}")
+    raise ValueError(f"loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000, got {str(how)[:60]!r}")
 
 
 def element_load(medium: Medium, how: str = "exact") -> LoadLaw:

@@ -163,8 +163,19 @@ def test_a_starved_solver_says_so(monkeypatch):
         ([0.0, np.nan], [1.0, 0.0], {}, "alpha must be finite, got nan"),
         ([0.0, 0.0], [1.0, np.inf], {}, "alphadot must be finite, got inf"),
         (np.zeros((3, 2)), np.zeros((4, 2)), {}, "do not broadcast"),
-        ([0.0, 0.0], [1.0, 0.0], {"regularisation": 0.0}, "regularisation must be a finite number > 0, got 0.0"),
+        (
+            [0.0, 0.0],
+            [1.0, 0.0],
+            {"regularisation": 0.0},
+            "regularisation must be a finite number > 0, 1e-15 to 1e3, got 0.0",
+        ),
         ([0.0, 0.0], [1.0, 0.0], {"loads": "best"}, "loads must be"),
+        ([0.0, 0.0], [0.0, 0.0], {"loads": "best"}, "loads must be"),
+        ([0.0, 1e20], [1.0, 0.0], {}, "alpha must be 0 or of a size that leaves digits"),
+        ([0.0, 0.0], [1e155, 0.0], {}, "alphadot must be 0 or of a size that leaves digits"),
+        ([0.0, 0.0], [1e-170, 0.0], {}, "alphadot must be 0 or of a size that leaves digits"),
+        ([0.0, 1j], [1.0, 0.0], {}, "alpha must be real numbers"),
+        ([0.0, "a"], [1.0, 0.0], {}, "alpha must be real numbers"),
     ],
 )
 def test_bad_input_is_refused(alpha, alphadot, kwargs, said):

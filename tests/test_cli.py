@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 
@@ -109,6 +110,10 @@ BAD = [
     (["connection", "three-link-glass", "-o", "no/such/a.nc"], "cannot write no/such/a.nc: No such file or directory"),
     (["connection", "three-link-glass", "-o", "a.nc", "--plot", "a.bmp"], "end the name in .png, .pdf, .svg"),
     (["ccf", "three-link-glass", "--plot", "."], "cannot draw"),
+    (["connection", "three-link-glass", "-o", "a.txt"], "end the name of a NetCDF file in .nc"),
+    (["connection", "three-link-glass", "-o", "pipe.nc"], "cannot write pipe.nc: it is no ordinary file"),
+    (["displacement", "three-link-glass", "--amplitudes", "0,1:2:3"], "--amplitudes: '0,1' is not a number"),
+    (["run", "still.toml"], "[gait] does not move"),
     (["run", "broken.toml"], "broken.toml is not TOML"),
     (["run", "-o", "broken.toml"], "cannot write the folder broken.toml"),
     (["fly"], "No such command 'fly'"),
@@ -119,13 +124,26 @@ BAD = [
 @pytest.mark.parametrize(("args", "said"), BAD)
 def test_bad_input_gets_one_line_and_exit_code_2(args, said, tmp_path):
     (tmp_path / "broken.toml").write_text("[medium\n")
+    still = '[medium]\nname = "coulomb"\n[body]\nkind = "chain"\n[gait]\nkind = "ellipse"\nsemi_axes = [0, 0]\n'
+    (tmp_path / "still.toml").write_text(still)
+    os.mkfifo(tmp_path / "pipe.nc")
+    before = sorted(p.name for p in tmp_path.iterdir())
     code, out, err = geomech(*args, cwd=tmp_path)
     assert code == 2
     assert out == ""
     assert err.startswith("error: ")
     assert err.count("\n") == 1
     assert said in err
-    assert [p.name for p in tmp_path.iterdir()] == ["broken.toml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_letters_of_any_alphabet_are_kept(tmp_path):
+    text = scene.load("three-link-viscous").text + "# schön ☃\n"
+    (tmp_path / "schön.toml").write_text(text, encoding="utf-8")
+    assert geomech("connection", "schön.toml", *SMALL, "-o", "ö.nc", cwd=tmp_path)[0] == 0
+    with xarray.open_dataset(tmp_path / "ö.nc") as data:
+        kept = data.attrs["scene"]
+    assert (kept.decode() if isinstance(kept, bytes) else kept) == text
 
 
 def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):

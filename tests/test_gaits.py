@@ -61,6 +61,9 @@ def test_points_are_passed_through_in_order():
         (lambda: Points(points=((0, 0), (1, 1))), "at least 3 shapes"),
         (lambda: Points(points=((0, 0), (0, 0), (1, 1), (1, 0))), "neighbours distinct"),
         (lambda: Circle().cycle(3), "phases must"),
+        (lambda: Butterfly().cycle(10), "at least 11 for this gait"),
+        (lambda: Points(points=((1e20, 0), (0, 1), (1, 1))), "points must be"),
+        (lambda: Circle(centre=None), "must be numbers"),
     ],
 )
 def test_bad_gaits_are_refused(make, said):

@@ -38,7 +38,7 @@ def test_fit_takes_any_number_of_joints(joints):
     rng = np.random.default_rng(1)
     M = rng.normal(size=(3, joints))
     swimmer = lambda a, d: np.einsum("ij,...j->...i", M, np.broadcast_arrays(a, d)[1]) * np.cos(a[..., :1])
-    fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 8)
+    fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 16)
     assert fitted.A.shape == (3, joints, *(9,) * joints)
     np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
 
@@ -212,7 +212,17 @@ def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match="extent must"):
         connection.grid(2, 9, float("nan"))
     with pytest.raises(ValueError, match="directions must"):
-        connection.directions(3, 2)
+        connection.directions(3, 8)
+    with pytest.raises(ValueError, match="ascending"):
+        connection.fit(MIDDLE, ([0.0, 0.0, 1.0, 2.0, 3.0],) * 2)
+    with pytest.raises(ValueError, match=r"must return shape \(.*, 3\).*got .*1\)"):
+        connection.fit(lambda a, d: MIDDLE(a, d)[..., :1], connection.grid(2, 5))
+    with pytest.raises(ValueError, match="not finite at alpha"):
+        predict.direct(lambda a, d: MIDDLE(a, d) * np.nan, Circle())
+    with pytest.raises(ValueError, match="amplitudes must be finite"):
+        predict.direct(MIDDLE, Circle(), [np.nan])
+    with pytest.raises(ValueError, match="xi must be finite"):
+        simulate.displacement(np.full((4, 3), np.inf))
     with pytest.raises(ValueError, match="two joints"):
         curvature.ccf(
             connection.fit(

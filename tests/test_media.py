@@ -76,7 +76,9 @@ def test_limits():
         (lambda: Granular(math.nan, 0.2), "C must"),
         (lambda: Granular(1, 0.0), "gamma0 must"),
         (lambda: Granular(1, 2.0), "114.592 degrees"),
+        (lambda: Granular(1e14, 0.2), "C must"),
         (lambda: Viscous(0.0), "ratio must"),
+        (lambda: Viscous(1e200), "ratio must"),
     ],
 )
 def test_bad_parameters_are_named(make, said):

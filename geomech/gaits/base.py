@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
+
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
@@ -20,11 +22,17 @@ class Gait:
     amplitude: float = 1.0
     centre: tuple[float, ...] = ()
     reverse: bool = False
+    angles = ("centre",)
+    harmonics = 1
 
     def __post_init__(self):
-        object.__setattr__(self, "centre", tuple(float(x) for x in self.centre))
-        if not math.isfinite(self.amplitude):
-            raise ValueError(f"amplitude must be finite, got {self.amplitude!r}")
+        try:
+            object.__setattr__(self, "centre", tuple(float(x) for x in self.centre))
+            object.__setattr__(self, "amplitude", float(self.amplitude))
+        except (TypeError, OverflowError):
+            raise ValueError(f"amplitude and centre must be numbers, got {self.amplitude!r}, {self.centre!r}") from None
+        if not abs(self.amplitude) <= LARGEST:
+            raise ValueError(f"amplitude must be finite and at most {LARGEST:g}, got {self.amplitude!r}")
         if self.centre and len(self.centre) != self.joints:
             raise ValueError(f"centre must have {self.joints} angles, got {list(self.centre)}")
         if not all(map(math.isfinite, self.centre)):
@@ -57,12 +65,15 @@ class Gait:
 
     def _times(self, amplitudes, curve):
         a = np.asarray(self.amplitude if amplitudes is None else amplitudes, float)
+        if not (np.abs(a) <= LARGEST).all():
+            raise ValueError(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
         return a[(..., *([None] * curve.ndim))] * curve
 
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
         """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
-        if int(phases) != phases or phases < 4:
-            raise ValueError(f"phases must be a whole number of at least 4, got {phases!r}")
+        least = max(4, 2 * self.harmonics + 1)
+        if not (np.isfinite(phases) and int(phases) == phases and phases >= least):
+            raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {phases!r}")
         t = 2 * np.pi * np.arange(phases) / phases
         return self.shape(t, amplitudes), self.rate(t, amplitudes)
 
@@ -71,8 +82,8 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
     """values as a float array of that many dimensions, or ValueError naming it."""
     try:
         array = np.asarray(values, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be numbers in equal rows, got {values!r}") from None
-    if array.ndim != ndim or not array.size or not np.isfinite(array).all():
+    if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
         raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {values!r}")
     return array

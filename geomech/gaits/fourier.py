@@ -22,6 +22,11 @@ class Series(Gait):
     def joints(self) -> int:
         return self.coefficients()[0].shape[0]
 
+    @property
+    def harmonics(self) -> int:
+        """The highest."""
+        return self.coefficients()[0].shape[1]
+
     def unit(self, t) -> np.ndarray:
         cos, sin = self.coefficients()
         kt = np.asarray(t, float)[..., None] * np.arange(1, cos.shape[1] + 1)
@@ -52,11 +57,12 @@ class Ellipse(Series):
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
     tilt: float = 0.0
+    angles = ("centre", "semi_axes", "tilt")
 
     def __post_init__(self):
         axes = finite_array("semi_axes", self.semi_axes, 1)
-        if axes.size != 2 or not math.isfinite(self.tilt):
-            raise ValueError(f"an ellipse needs two semi_axes and a finite tilt, got {self.semi_axes!r}, {self.tilt!r}")
+        if axes.size != 2 or not np.isfinite(finite_array("tilt", [self.tilt], 1)):
+            raise ValueError(f"an ellipse needs two semi_axes, got {self.semi_axes!r}")
         super().__post_init__()
 
     def coefficients(self):
@@ -82,6 +88,7 @@ class Fourier(Series):
 
     cos: tuple[tuple[float, ...], ...]
     sin: tuple[tuple[float, ...], ...]
+    angles = ("centre", "cos", "sin")
 
     def __post_init__(self):
         cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)

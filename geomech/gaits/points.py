@@ -15,12 +15,14 @@ class Points(Gait):
     phase running with chord length."""
 
     points: tuple[tuple[float, ...], ...]
+    angles = ("centre", "points")
 
     def __post_init__(self):
         points = finite_array("points", self.points, 2)
         if np.array_equal(points[0], points[-1]):
             points = points[:-1]
-        if len(points) < 3 or not np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1).all():
+        steps = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1)
+        if len(points) < 3 or not (steps > 1e-12 * steps.sum()).all():
             raise ValueError(f"points must be at least 3 shapes, neighbours distinct, got {self.points!r}")
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         super().__post_init__()

@@ -26,11 +26,16 @@ class Chain:
     frame: str = "mean"
 
     def __post_init__(self):
-        object.__setattr__(self, "lengths", tuple(float(x) for x in self.lengths))
+        try:
+            object.__setattr__(self, "lengths", tuple(float(x) for x in self.lengths))
+        except (TypeError, OverflowError):
+            raise ValueError(f"lengths must be a list of numbers, got {self.lengths!r}") from None
         require(len(self.lengths) >= 2, f"lengths needs at least two links, got {len(self.lengths)}")
-        good = all(math.isfinite(x) and x > 0 for x in self.lengths)
+        good = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
         require(good, f"lengths must all be finite and > 0, got {list(self.lengths)}")
-        require(math.isfinite(self.length) and self.length > 0, f"length must be finite and > 0, got {self.length!r}")
+        short = min(self.lengths) / sum(self.lengths)
+        require(short >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {short:.3g}")
+        require(1e-15 <= self.length <= 1e15, f"length must be finite and > 0, 1e-15 to 1e15, got {self.length!r}")
         self._link_of(self.frame)
 
     @property
@@ -47,7 +52,7 @@ class Chain:
         """Index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
         if frame == "mean":
             return None
-        found = re.fullmatch(r"link-([1-9]\d*)", str(frame))
+        found = re.fullmatch(r"link-([1-9]\d{0,6})", str(frame))
         n = len(self.lengths)
         require(
             bool(found) and int(found[1]) <= n,

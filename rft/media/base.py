@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Protocol
 
 import numpy as np
@@ -67,11 +66,17 @@ def is_linear(medium: Medium) -> bool:
     return medium.dry == ()
 
 
+def real_array(name: str, x) -> np.ndarray:
+    """x as an array of floats, or ValueError naming it."""
+    try:
+        if np.iscomplexobj(x):
+            raise TypeError
+        return np.asarray(x, float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be real numbers in equal rows, got {str(x)[:80]}") from None
+
+
 def require(condition: bool, text: str) -> None:
     """Raise ValueError(text) unless the condition holds."""
     if not condition:
         raise ValueError(text)
-
-
-def finite_positive(x: float) -> bool:
-    return isinstance(x, (int, float)) and math.isfinite(x) and x > 0

@@ -17,15 +17,16 @@ class Granular(TermLaw):
     v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
     Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
 
-    C: the extra normal force (no unit), >= 0. gamma0: the angle at which it saturates, in radians,
+    C: the extra normal force (no unit), 0 to 1e6. gamma0: the angle at which it saturates, in radians,
     strictly between 0 and pi/2.
     """
 
     C: float
     gamma0: float
+    angles = ("gamma0",)
 
     def __post_init__(self):
-        require(math.isfinite(self.C) and self.C >= 0, f"C must be a finite number >= 0, got {self.C!r}")
+        require(0 <= self.C <= 1e6, f"C must be a finite number from 0 to 1e6, got {self.C!r}")
         require(
             math.isfinite(self.gamma0) and 0 < self.gamma0 < math.pi / 2,
             f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from rft.media.base import TermLaw, require
@@ -12,13 +11,13 @@ from rft.media.base import TermLaw, require
 class Viscous(TermLaw):
     """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
 
-    ratio: normal over axial drag, > 0; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+    ratio: normal over axial drag, 1e-8 to 1e8; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
     """
 
     ratio: float = 2.0
 
     def __post_init__(self):
-        require(math.isfinite(self.ratio) and self.ratio > 0, f"ratio must be a finite number > 0, got {self.ratio!r}")
+        require(1e-8 <= self.ratio <= 1e8, f"ratio must be a finite number from 1e-8 to 1e8, got {self.ratio!r}")
 
     @property
     def viscous(self):
