@@ -61,7 +61,8 @@ def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray
         raise ValueError(f"grid must be a whole number of at least 4 points, got {points!r}")
     if not 1e-9 <= extent <= 1e6:
         raise ValueError(f"extent must be a finite angle > 0 in rad, 1e-9 to 1e6, got {extent!r}")
-    return (np.linspace(-extent, extent, int(points)),) * joints
+    axis = np.linspace(-extent, extent, int(points))
+    return ((axis - axis[::-1]) / 2,) * joints  # symmetric to the last digit, for `fit`'s mirror
 
 
 def directions(joints: int, count: int) -> np.ndarray:
