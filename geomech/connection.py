@@ -83,6 +83,30 @@ def directions(joints: int, count: int) -> np.ndarray:
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
+def sampled(
+    velocity: Velocity, axes, count: int, degree: int = 3, progress: Callable | None = None, mirror: bool = False
+) -> tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
+    """(axes, directions (C, d), xi (S, C, 3)): the velocity at every shape of a grid, in C order, for unit alphadot."""
+    axes = tuple(np.asarray(a, float) for a in axes)
+    for a in axes:
+        if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
+            raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
+    unit = directions(len(axes), count)
+    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
+    xi = np.empty((len(alpha), len(unit), 3))
+    mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
+    todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
+    step = max(1, SAMPLES_TOGETHER // len(unit))
+    for k in range(0, todo, step):
+        here = slice(k, min(k + step, todo))
+        xi[here] = evaluate(velocity, alpha[here], unit)
+        if progress:
+            progress(here.stop / todo)
+    # In C order alpha -> -alpha is the grid read backwards; there xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
+    xi[todo:] = [-1.0, 1.0, 1.0] * xi[: len(alpha) - todo][::-1]
+    return axes, unit, xi
+
+
 def fit(
     velocity: Velocity, axes, count: int = 8, degree: int = 3, progress: Callable | None = None, mirror: bool = False
 ) -> Connection:
@@ -92,29 +116,9 @@ def fit(
     xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half.
     Raises what ``velocity`` raises.
     """
-    axes = tuple(np.asarray(a, float) for a in axes)
-    for a in axes:
-        if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
-            raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
-    mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
-    unit = directions(len(axes), count)
-    solve = np.linalg.pinv(unit)  # (d, count): A^T = pinv(directions) xi
-    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
-    A, residual, speed = (np.empty((len(alpha), *tail)) for tail in ((3, len(axes)), (3,), (3,)))
-    todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
-    step = max(1, SAMPLES_TOGETHER // len(unit))
-    for k in range(0, todo, step):
-        here = slice(k, min(k + step, todo))
-        xi = evaluate(velocity, alpha[here, None], unit)
-        A[here] = np.einsum("jc,sci->sij", solve, xi)
-        off = xi - np.einsum("sij,cj->sci", A[here], unit)
-        residual[here], speed[here] = np.sqrt((off**2).mean(1)), np.sqrt((xi**2).mean(1))
-        if progress:
-            progress(here.stop / todo)
-    rest = slice(todo, None)  # in C order, alpha -> -alpha is the grid read backwards
-    A[rest] = np.array([-1.0, 1.0, 1.0])[:, None] * A[: len(alpha) - todo][::-1]
-    residual[rest], speed[rest] = residual[: len(alpha) - todo][::-1], speed[: len(alpha) - todo][::-1]
+    axes, unit, xi = sampled(velocity, axes, count, degree, progress, mirror)
+    A = np.einsum("jc,sci->ijs", np.linalg.pinv(unit), xi)
+    residual = np.sqrt(((xi - np.einsum("ijs,cj->sci", A, unit)) ** 2).mean(1)).T
+    speed = np.sqrt((xi**2).mean(1)).T
     shape = tuple(len(a) for a in axes)
-    return Connection(
-        axes, *(np.moveaxis(x, 0, -1).reshape(*x.shape[1:], *shape) for x in (A, residual, speed)), degree
-    )
+    return Connection(axes, *(x.reshape(*x.shape[:-1], *shape) for x in (A, residual, speed)), degree)

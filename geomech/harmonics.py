@@ -1,0 +1,80 @@
+"""Beyond the connection: the odd harmonics of xi in the direction of alphadot, of which A is the first.
+
+In a rate-independent medium xi(alpha, alphadot) = |alphadot| f(alpha, beta), beta the direction of alphadot in the
+plane of two joint rates, f odd under beta -> beta + pi. Its Fourier series has odd harmonics only,
+
+    f = sum over k = 1, 3, 5 ... of a_k cos(k beta) + b_k sin(k beta),
+
+and (a_1, b_1) is the uniform least-squares connection. Kept on a grid up to some k they give the velocity at the cost
+of a look-up. Links that stick put kinks in f, so the coefficients fall off like 1/k^2 there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.connection import Velocity, sampled
+from geomech.field import Field
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """Coefficients on a grid. coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in the
+    velocity's units and frame. residual: (3, N_1, N_2), rms over the sampled directions of what the series leaves."""
+
+    axes: tuple[np.ndarray, ...]
+    coefficients: np.ndarray
+    residual: np.ndarray
+    degree: int = 3
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.axes, self.coefficients, self.degree)
+
+    @property
+    def highest(self) -> int:
+        return self.coefficients.shape[1] - 1
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) at alpha, alphadot (..., 2); ValueError outside the grid."""
+        alphadot = np.asarray(alphadot, float)
+        beta = np.arctan2(alphadot[..., 1], alphadot[..., 0])
+        speed = np.hypot(alphadot[..., 0], alphadot[..., 1])
+        return np.einsum("...ij,...j->...i", self.field(alpha), _basis(beta, self.highest)) * speed[..., None]
+
+
+def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
+    """cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``: (..., highest + 1)."""
+    k = np.arange(1, highest + 1, 2)
+    waves = np.exp(1j * k * np.asarray(beta)[..., None])
+    return np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
+
+
+def fit(
+    velocity: Velocity,
+    axes,
+    highest: int = 9,
+    count: int = 24,
+    degree: int = 3,
+    progress: Callable | None = None,
+    mirror: bool = False,
+) -> Harmonics:
+    """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; arguments as `connection.fit`.
+
+    The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
+    it (k onto 2 count - k); so keep ``highest`` well below. ValueError if it is even or not below ``count``.
+    """
+    if highest % 2 == 0 or not 1 <= highest < count:
+        raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {highest!r}")
+    axes, unit, xi = sampled(velocity, axes, count, degree, progress, mirror)
+    if len(axes) != 2:
+        raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
+    basis = _basis(np.arctan2(unit[:, 1], unit[:, 0]), highest)
+    coefficients = np.einsum("cj,sci->ijs", basis * (2.0 / count), xi)
+    residual = np.sqrt(((xi - np.einsum("cj,ijs->sci", basis, coefficients)) ** 2).mean(1)).T
+    shape = tuple(len(a) for a in axes)
+    return Harmonics(axes, coefficients.reshape(3, -1, *shape), residual.reshape(3, *shape), degree)
