@@ -12,7 +12,7 @@ def compute() -> dict:
 
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(10.8, 3.3, 3)
+    fig, axes = plots.figure(10.8, 3.7, 3)
     field, study = numbers["map"], numbers["tables"]
     plots.ccf_map(field["ccf"], 0, field["gaits"], field["unit"], axes[0, 0])
     for ax, (name, table) in zip(axes[0, 1:], study["tables"].items()):

@@ -109,14 +109,16 @@ def ccf(
 def displacement(
     name: SceneArgument,
     amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT")],
-    methods: Annotated[Optional[str], typer.Option(help="any of area,path,direct; all by default")] = None,
+    methods: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
+    tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ):
-    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier."""
+    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
     from geomech import plots, report
+    from geomech.estimate import cheapest
     from geomech.scene import METHODS
 
     values = _sweep("--amplitudes", amplitudes)
@@ -124,7 +126,12 @@ def displacement(
     scene = _loaded(name, grid, extent)
     _check_outputs(plot, plot)
     with progress(f"displacement of {scene.name}") as bar:
-        table = scene.study(values, chosen or scene.methods, progress=bar)
+        if tol is None:
+            table = scene.study(values, chosen or scene.methods, progress=bar)
+        elif chosen:
+            raise SceneError("--tol chooses the tier: drop --methods")
+        else:
+            table = cheapest(scene, values, tol)
     if plot:
         fig, axes = plots.figure(3.6, 3.4)
         plots.displacement(table, scene.unit, axes[0, 0], gait=scene.gait, marker="o")

@@ -28,10 +28,18 @@ STYLE = {
 COMPONENTS = ("x", "y", r"\theta")
 METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and in print by their dashes
     "area": {"color": "#D55E00", "linestyle": "--"},
+    "adapted": {"color": "#CC79A7", "linestyle": (0, (5, 1))},
     "path": {"color": "#0072B2", "linestyle": "-."},
+    "harmonic": {"color": "#009E73", "linestyle": ":"},
     "direct": {"color": "black", "linestyle": "-"},
 }
-METHOD_LABEL = {"area": "area integral of the CCF", "path": "path integral of A", "direct": "force balance"}
+METHOD_LABEL = {
+    "area": "area integral of the CCF",
+    "adapted": "area integral, adapted CCF",
+    "path": "path integral of A",
+    "harmonic": "path integral, odd harmonics",
+    "direct": "force balance",
+}
 
 
 def styled(draw):

@@ -17,7 +17,9 @@ import numpy as np
 
 import rft
 from geomech import connection as conn
-from geomech import predict
+from geomech import estimate, predict
+from geomech import family as fam
+from geomech import harmonics as harm
 from geomech.curvature import ccf
 from geomech.field import Field
 from geomech.gaits import KINDS as GAITS
@@ -27,7 +29,7 @@ from rft.bodies import KINDS as BODIES
 from rft.loads import element_load
 from rft.media import LAWS, is_linear
 
-METHODS = ("area", "path", "direct")
+METHODS = ("area", "adapted", "path", "harmonic", "direct")  # cheapest look-up first
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 
 
@@ -36,7 +38,7 @@ class Numerics:
     """How finely to compute; all optional. loads: "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation: body
     lengths per radian (rft.balance). tolerance: normalised residual. directions: of alphadot in the least-squares
     fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on either side.
-    interpolation: spline degree. phases: per cycle."""
+    interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's table."""
 
     loads: str = "exact"
     regularisation: float = 1e-6
@@ -46,16 +48,25 @@ class Numerics:
     extent: float = 2.5
     interpolation: int = 3
     phases: int = 256
+    harmonics: int = 15
+    curves: int = 24
 
     def __post_init__(self):
         for name, low, high in (("regularisation", 1e-12, 1.0), ("tolerance", 1e-13, 1.0), ("extent", 1e-6, 100.0)):
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ValueError(f"{name} must be a number from {low:g} to {high:g}, got {value!r}")
-        for name, low, high in (("directions", 2, 4096), ("grid", 4, 4096), ("phases", 4, 1_000_000)):
+        for name, low, high in (
+            ("directions", 2, 4096),
+            ("grid", 4, 4096),
+            ("phases", 8, 1_000_000),
+            ("curves", 4, 4096),
+        ):
             value = getattr(self, name)
             if value is not None and not (low <= value <= high and int(value) == value):
                 raise ValueError(f"{name} must be a whole number from {low} to {high}, got {getattr(self, name)!r}")
+        if self.harmonics not in range(1, 1000, 2):
+            raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
         if self.interpolation not in (1, 2, 3, 4, 5) or self.interpolation >= self.grid:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
 
@@ -102,20 +113,39 @@ class Scene:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """The tiers this body allows: the area tier takes two joints."""
-        return METHODS if self.body.joints == 2 else METHODS[1:]
+        """The tiers of a plain study: area and harmonic take two joints."""
+        return ("area", "path", "harmonic", "direct") if self.body.joints == 2 else ("path", "direct")
 
-    def connection(self, progress: Callable | None = None) -> conn.Connection:
-        """The least-squares connection on the scene's grid."""
+    @property
+    def lookups(self) -> tuple[str, ...]:
+        """The tiers that look a precomputed table up; in a linear medium the path is the direct tier."""
+        two = ("area", "adapted") if self.body.joints == 2 else ("adapted",)
+        return two if is_linear(self.medium) else tuple(m for m in METHODS if m in (*self.methods, *two))[:-1]
+
+    @property
+    def direction_count(self) -> int:
+        """Directions of alphadot in the least-squares fit."""
+        joints = self.body.joints
+        return self.numerics.directions or (8 if joints <= 2 else 16 * joints)
+
+    @property
+    def harmonic_directions(self) -> int:
+        """Directions behind the harmonics: enough above the highest for folding to stay small."""
+        return (8 * self.numerics.harmonics) // 5
+
+    def _axes(self):
         n, joints = self.numerics, self.body.joints
         if n.grid**joints > LARGEST_GRID:
             raise SceneError(
                 f"{self.name}: a field of {n.grid}^{joints} shapes is too large: lower [numerics] grid, or use "
                 "methods = direct, which needs no field"
             )
-        axes = conn.grid(joints, n.grid, n.extent)
-        count = n.directions or (8 if joints <= 2 else 16 * joints)
-        return conn.fit(self.velocity, axes, count, n.interpolation, progress, self.medium.mirror)
+        return conn.grid(joints, n.grid, n.extent)
+
+    def connection(self, progress: Callable | None = None) -> conn.Connection:
+        """The least-squares connection on the scene's grid."""
+        degree, mirror = self.numerics.interpolation, self.medium.mirror
+        return conn.fit(self.velocity, self._axes(), self.direction_count, degree, progress, mirror)
 
     @cached_property
     def fitted(self) -> conn.Connection:
@@ -132,35 +162,74 @@ class Scene:
         """The CCF of `fitted`, for joints 1 and 2."""
         return ccf(self.fitted)
 
+    @cached_property
+    def harmonics(self) -> harm.Harmonics:
+        """The odd harmonics of the velocity on the scene's grid, computed once."""
+        n = self.numerics
+        return harm.fit(
+            self.velocity,
+            self._axes(),
+            n.harmonics,
+            self.harmonic_directions,
+            n.interpolation,
+            mirror=self.medium.mirror,
+        )
+
+    def family(self, gait: Gait, largest: float) -> fam.Family:
+        """The connection adapted to the scaled copies of ``gait`` up to an amplitude; computed once for each."""
+        kept = self.__dict__.setdefault("_families", {})
+        if (gait, largest) not in kept:
+            n = self.numerics
+            kept[gait, largest] = fam.fit(self.velocity, gait, largest, n.curves, n.phases // 2)
+        return kept[gait, largest]
+
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
-        """Net pose per cycle (..., 3) by one tier ("area", "path", "direct") for amplitudes (...,), gait or the scene's."""
+        """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
         gait, phases = gait or self.gait, self.numerics.phases
         choose("methods", method, METHODS)
-        if method not in self.methods:
-            raise SceneError(f"{self.name}: the area tier takes a body of two joints: use path or direct")
+        if method in ("area", "harmonic") and self.body.joints != 2:
+            raise SceneError(f"{self.name}: the {method} tier takes a body of two joints: use path, adapted or direct")
         if method == "area":
             return predict.area(self.curvature, gait, amplitudes, phases)
+        if method == "adapted":
+            a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
+            return self.family(gait, float(a.max(initial=0.0))).area(a)
         if method == "path" and self.needs_field(method):
             return predict.path(self.fitted, gait, amplitudes, phases)
-        # In a linear medium xi = A alphadot holds exactly: the path needs no field, and is the direct tier.
+        if method == "harmonic" and not is_linear(self.medium):
+            return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
+        # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
 
     def needs_field(self, method: str) -> bool:
-        """Whether a tier looks the connection up on the grid."""
+        """Whether a tier looks the fitted connection up on the grid."""
         return method == "area" or (method == "path" and not is_linear(self.medium))
 
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
     ) -> dict:
-        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "seconds": {...}}; the field is timed on its own."""
-        out: dict = {"amplitude": [float(a) for a in amplitudes]}
-        seconds = {}
+        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "seconds": {...}}.
+
+        estimate: error of each number in body lengths (`geomech.estimate`). Fields are timed on their own.
+        """
+        gait, amplitudes = gait or self.gait, np.array(amplitudes, float)
+        out: dict = {"amplitude": amplitudes.tolist()}
+        seconds, errors, reference = {}, {}, None
         if any(map(self.needs_field, methods)):
             seconds["field"] = _timed(lambda: self.compute_field(progress))[1]
-        for method in methods:
-            values, seconds[method] = _timed(lambda m=method: self.displacement(m, gait, np.array(amplitudes, float)))
-            out[method] = values.tolist()
-        return {**out, "seconds": seconds}
+        for method in sorted(methods, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
+            if method == "direct" or (is_linear(self.medium) and method not in ("area", "adapted")):
+                (poses, errors[method]), seconds[method] = _timed(
+                    lambda: estimate.direct(self, gait, amplitudes, self.numerics.phases)
+                )
+                reference = poses, errors[method]
+            else:
+                poses, seconds[method] = _timed(lambda m=method: self.displacement(m, gait, amplitudes))
+                errors[method] = estimate.against_direct(self, poses, gait, amplitudes, reference)
+            out[method] = poses.tolist()
+        ordered = {m: out[m] for m in methods}
+        errors = {m: errors[m].tolist() for m in methods}
+        return {"amplitude": out["amplitude"], **ordered, "estimate": errors, "seconds": seconds}
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed; None keeps a value."""

@@ -12,6 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 
+def turning(xi) -> np.ndarray:
+    """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
+    k, turn = _coefficients(np.asarray(xi, float)[..., 2] + 0j)
+    swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
+    return _values(swing, k, np.shape(xi)[-2])
+
+
 class _Spectrum(NamedTuple):
     mean_turn: np.ndarray  # (..., 1) mean of xi_theta
     k: np.ndarray  # (M,) wave numbers, symmetric about 0
@@ -52,18 +59,17 @@ def _spectrum(xi) -> _Spectrum:
     mean = turn[..., k == 0].real
     swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
     n = xi.shape[-2]
-    t = 2 * np.pi * np.arange(n) / n
-    periodic = (swing[..., None, :] * np.expm1(1j * k * t[:, None])).sum(-1).real if n <= 64 else _swing(swing, k, n)
+    periodic = _values(swing, k, n)
+    periodic = periodic - periodic[..., :1]
     _, wave = _coefficients(np.exp(1j * periodic) * (xi[..., 0] + 1j * xi[..., 1]))
     return _Spectrum(mean, k, wave, swing)
 
 
-def _swing(swing: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
-    """sum_k swing_k (e^(i k t) - 1) at the n phases, by FFT."""
-    folded = np.zeros((*swing.shape[:-1], n), complex)
-    np.add.at(folded, (..., k % n), swing)
-    values = np.fft.ifft(folded, axis=-1).real * n
-    return values - values[..., :1]
+def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
+    """sum_k c_k e^(i k t) at the n phases, real part: the inverse of `_coefficients`."""
+    folded = np.zeros((*c.shape[:-1], n), complex)
+    np.add.at(folded, (..., k % n), c)
+    return np.fft.ifft(folded, axis=-1).real * n
 
 
 def _coefficients(f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,144 @@
+"""How far a displacement can be trusted, and the cheapest way to one that can be trusted far enough.
+
+Every estimate is a refinement, never a constant: the direct tier against itself at half and a quarter of the phases
+and, on the quarter, with the regularisation ten times smaller and exact link integrals; every other tier against the
+direct tier. Errors are distances between net positions, in body lengths.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from geomech.gaits import Gait
+from geomech.problem import SceneError
+from geomech.simulate import displacement
+
+if TYPE_CHECKING:
+    from geomech.scene import Scene
+
+CHECKED = (
+    33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
+)
+REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
+MOST_PHASES = 1 << 16
+
+
+def distance(a, b) -> np.ndarray:
+    """Between the positions of poses (..., 3)."""
+    return np.hypot(a[..., 0] - b[..., 0], a[..., 1] - b[..., 1])
+
+
+def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
+    """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 4."""
+    phases = 4 * -(-phases // 4)
+    alpha, alphadot = gait.cycle(phases, amplitudes)
+    solution = scene.solve(alpha, alphadot).checked()
+    coarse, half, full = (displacement(solution.xi[..., ::step, :]) for step in (4, 2, 1))
+    first, second = distance(half, coarse), distance(full, half)
+    shrink = np.clip(second / np.maximum(first, 1e-300), 0.0, 0.5)
+    error = 2.0 * second * shrink / (1.0 - shrink)  # what is left if each doubling shrinks it so; twice, for luck
+    travelled = scene.body.length * np.linalg.norm(alphadot, axis=-1)
+    error += 2 * np.pi * (solution.residual * travelled).mean(-1)
+    if finer := finer_model(scene):
+        refined = displacement(finer.velocity(alpha[..., ::4, :], alphadot[..., ::4, :]))
+        error += 1.2 * distance(refined, coarse)
+    return full, error / scene.body.length
+
+
+def finer_model(scene: Scene) -> Scene | None:
+    """The scene with its forces computed more exactly, None where they are exact already."""
+    kind, _, count = scene.numerics.loads.partition(":")
+    closed = scene.medium.dry is not None
+    finer = {"loads": "exact" if closed else f"{kind}:{2 * int(count)}"} if kind != "exact" else {}
+    if scene.medium.dry != ():
+        finer["regularisation"] = max(scene.numerics.regularisation / 10, 1e-12)
+    return scene.with_numerics(**finer) if finer else None
+
+
+def against_direct(scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None) -> np.ndarray:
+    """Errors (B,) in body lengths of poses (B, 3) by any other tier. reference: (poses, errors) of the direct tier at
+    the same amplitudes; computed at some of them if not given."""
+    if reference is None:
+        some = np.unique(np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int))
+        reference = direct(scene, gait, amplitudes[some], max(REFERENCE_PHASES, 8 * gait.harmonics))
+    else:
+        some = np.arange(len(amplitudes))
+    at_some = distance(poses[some], reference[0]) / scene.body.length + reference[1]
+    left = np.searchsorted(some, np.arange(len(amplitudes)), side="right") - 1
+    right = np.minimum(left + (some[left] < np.arange(len(amplitudes))), len(some) - 1)
+    return np.maximum(at_some[left], at_some[right])
+
+
+def solves(scene: Scene, method: str, count: int, phases: int) -> int:
+    """Force balances that a tier needs for ``count`` amplitudes: its cost, look-ups being cheap beside it."""
+    n = scene.numerics
+    shapes = n.grid**scene.body.joints // (2 if scene.medium.mirror else 1)
+    return {
+        "area": shapes * scene.direction_count,
+        "path": shapes * scene.direction_count,
+        "adapted": n.curves * (n.phases // 2),
+        "harmonic": shapes * scene.harmonic_directions,
+        "direct": count * phases,
+    }[method]
+
+
+def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None) -> dict:
+    """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "tier", "settings", "seconds"}: the cheapest tier,
+    and for the direct tier the fewest phases, with every estimated error at most ``tol`` body lengths.
+
+    Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. SceneError if no
+    tier gets there.
+    """
+    if not (np.isfinite(tol) and tol > 0):
+        raise SceneError(f"--tol must be a number > 0 in body lengths, got {tol!r}")
+    gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
+    some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
+    pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, max(16, 4 * gait.harmonics))
+    for method in sorted(scene.lookups, key=lambda m: solves(scene, m, len(amplitudes), phases)):
+        if solves(scene, method, len(amplitudes), phases) >= solves(scene, "direct", len(amplitudes), phases):
+            break
+        try:
+            checked = scene.displacement(method, gait, amplitudes[some])
+        except ValueError:  # the gait leaves the field or the family: this tier cannot say
+            continue
+        if (distance(checked, pilot[0]) / scene.body.length + pilot[1]).max() <= tol:
+            poses = scene.displacement(method, gait, amplitudes)
+            error = against_direct(scene, poses, gait, amplitudes)
+            if error.max() <= tol:
+                return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
+    (poses, error), phases = _refined(scene, gait, amplitudes, tol, phases)
+    if error.max() > tol:
+        raise SceneError(
+            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error.max():.1e} at {phases} phases): "
+            "raise --tol, or lower [numerics] regularisation and tolerance"
+        )
+    return _answer("direct", amplitudes, poses, error, {"phases": phases}, start)
+
+
+def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int):
+    """The direct tier at twice the phases again and again, for the amplitudes that need it, until all errors are
+    within ``tol`` or doubling stops helping."""
+    (poses, error), open_ = direct(scene, gait, amplitudes, phases), np.arange(len(amplitudes))
+    while (worse := open_[error[open_] > tol]).size and 2 * phases <= MOST_PHASES:
+        phases *= 2
+        finer, now = direct(scene, gait, amplitudes[worse], phases)
+        stalled = (now > 0.9 * error[worse]).all() and phases > 1024
+        poses[worse], error[worse], open_ = finer, now, worse
+        if stalled:
+            break
+    return (poses, error), phases
+
+
+def _answer(method, amplitudes, poses, error, settings, start) -> dict:
+    return {
+        "amplitude": amplitudes.tolist(),
+        method: poses.tolist(),
+        "estimate": error.tolist(),
+        "tier": method,
+        "settings": settings,
+        "seconds": {method: time.perf_counter() - start},
+    }

@@ -1,0 +1,94 @@
+"""A connection adapted to one family of gaits: the scaled copies alpha = centre + a unit(t) of a closed curve.
+
+The uniform least-squares connection spreads its misfit over all directions of alphadot. A family uses one direction at
+each shape, so there a connection can be exact: in the coordinates (a, t) of the family A_t(a, t) is the velocity
+itself, and A_a, across the curves, is free, since no gait of the family ever moves that way. The freedom is spent on
+the frame: turn the body frame back by the heading the body gains along each curve, less its mean, and choose A_a = 0.
+In that frame nothing is left to commute, so
+
+    CCF = dA_t / da    per unit of a and t,
+
+its integral over 0 .. a and one cycle is the displacement, to any order in a where the body does not turn on the
+whole (where it does, to first order in the net turn). The one approximation left is the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech import se2
+from geomech.connection import Velocity, evaluate
+from geomech.gaits import Gait
+from geomech.simulate import turning
+
+
+@dataclass(frozen=True)
+class Family:
+    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending from 0. xi: (M, N, 3),
+    body velocity with respect to phase at N equally spaced phases."""
+
+    gait: Gait
+    amplitudes: np.ndarray
+    xi: np.ndarray
+
+    @cached_property
+    def heading(self) -> np.ndarray:
+        """(M, N): of the body in the family's frame, rad; of zero mean over each curve."""
+        return turning(self.xi)
+
+    @cached_property
+    def A(self) -> np.ndarray:
+        """A_t in the family's frame, (M, N, 3): the turning rate is the same all along a curve."""
+        x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
+        return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
+
+    def _spline(self, values: np.ndarray):
+        from scipy.interpolate import make_interp_spline
+
+        return make_interp_spline(self.amplitudes, values, 3)
+
+    def ccf(self) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
+        fold; for maps. Its sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
+        t = 2 * np.pi * np.arange(self.xi.shape[1]) / self.xi.shape[1]
+        unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
+        jacobian = self.amplitudes[:, None] * (unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0])
+        density = self._spline(self.A).derivative()(self.amplitudes)
+        small = np.abs(jacobian) < 1e-6 * np.abs(jacobian).max()
+        values = np.where(small[..., None], np.nan, density / np.where(small, 1.0, jacobian)[..., None])
+        return self.gait.shape(t, self.amplitudes), values
+
+    def area(self, amplitudes) -> np.ndarray:
+        """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: exp of the CCF's integral.
+        ValueError for amplitudes off the table."""
+        a = np.asarray(amplitudes, float)
+        if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
+            raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
+        density = self._spline(2 * np.pi * self.A.mean(1)).derivative()  # over one cycle, per unit of a
+        total = density.antiderivative()(a) - density.antiderivative()(0.0)
+        start = np.zeros((*a.shape, 3))
+        start[..., 2] = self._spline(self.heading[:, 0])(a)
+        return se2.compose(se2.compose(se2.inverse(start), se2.exp(total)), start)
+
+
+def fit(
+    velocity: Velocity, gait: Gait, largest: float, count: int = 24, phases: int = 128, progress: Callable | None = None
+) -> Family:
+    """The family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes.
+
+    Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
+    """
+    if not (np.isfinite(largest) and largest > 0):
+        raise ValueError(f"largest amplitude must be finite and > 0, got {largest!r}")
+    if not count >= 4:
+        raise ValueError(f"a family needs at least 4 curves, got {count!r}")
+    amplitudes = largest * np.arange(count + 1) / count
+    xi = np.zeros((count + 1, phases, 3))
+    xi[1:] = evaluate(velocity, *gait.cycle(phases, amplitudes[1:]))
+    if progress:
+        progress(1.0)
+    return Family(gait, amplitudes, xi)
