@@ -1,6 +1,6 @@
 """How far a displacement can be trusted, and the cheapest way to one that can be trusted far enough.
 
-Every estimate is a refinement, never a constant: the direct tier against itself at half and a quarter of the phases
+Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the phases
 and, on the quarter, with the regularisation ten times smaller and exact link integrals; every other tier against the
 direct tier. Errors are distances between net positions, in body lengths.
 """
@@ -25,6 +25,7 @@ CHECKED = (
 )
 REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
 MOST_PHASES = 1 << 16
+SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
 
 
 def distance(a, b) -> np.ndarray:
@@ -33,20 +34,31 @@ def distance(a, b) -> np.ndarray:
 
 
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
-    """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 4."""
-    phases = 4 * -(-phases // 4)
+    """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 8, >= 32."""
+    phases = max(32, 8 * -(-phases // 8))
     alpha, alphadot = gait.cycle(phases, amplitudes)
     solution = scene.solve(alpha, alphadot).checked()
-    coarse, half, full = (displacement(solution.xi[..., ::step, :]) for step in (4, 2, 1))
-    first, second = distance(half, coarse), distance(full, half)
-    shrink = np.clip(second / np.maximum(first, 1e-300), 0.0, 0.5)
-    error = 2.0 * second * shrink / (1.0 - shrink)  # what is left if each doubling shrinks it so; twice, for luck
+    eighth, coarse, half, full = (displacement(solution.xi[..., ::step, :]) for step in (8, 4, 2, 1))
+    error = _left(
+        *(distance(*pair) for pair in ((coarse, eighth), (half, coarse), (full, half))), scene.medium.dry != ()
+    )
     travelled = scene.body.length * np.linalg.norm(alphadot, axis=-1)
     error += 2 * np.pi * (solution.residual * travelled).mean(-1)
     if finer := finer_model(scene):
         refined = displacement(finer.velocity(alpha[..., ::4, :], alphadot[..., ::4, :]))
         error += 1.2 * distance(refined, coarse)
     return full, error / scene.body.length
+
+
+def _left(d0, d1, d2, kinks: bool) -> np.ndarray:
+    """Error left after three doublings that moved the answer by d0, d1, d2.
+
+    If each shrinks the error by r, the last leaves d2 r / (1 - r). With kinks theory gives r = 1/4 (order 2) and the
+    moves scatter, so r is not taken for less, nor a small last move at its word. SAFETY is set by the coverage test.
+    """
+    r = np.clip(np.sqrt(d2 / np.maximum(d0, 1e-300)), 0.25 if kinks else 0.0, 0.5)
+    move = np.maximum.reduce([d2, d1 * r, d0 * r * r]) if kinks else d2
+    return SAFETY * move * r / (1.0 - r)
 
 
 def finer_model(scene: Scene) -> Scene | None:
@@ -97,7 +109,7 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {tol!r}")
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
-    pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, max(16, 4 * gait.harmonics))
+    pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, max(32, 8 * gait.harmonics))
     for method in sorted(scene.lookups, key=lambda m: solves(scene, m, len(amplitudes), phases)):
         if solves(scene, method, len(amplitudes), phases) >= solves(scene, "direct", len(amplitudes), phases):
             break

@@ -1,0 +1,72 @@
+"""Thousands of mutated scenes: every one is run, or refused with one clear line."""
+
+import re
+
+import numpy as np
+import pytest
+
+from geomech import scene
+
+VALUES = [
+    "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",
+    '""', '"x"', '"mean"', '"link-2"', '"circle"', '"granular"', "[]", "[[]]", "[1]", "[1, 2, 3, 4]", "[[1, 2], [3]]",
+    "[[0, 0], [1, 0], [0, 1]]", "{}", "{ a = 1 }", "1979-05-27", "'''\nx'''", "[nan, 1, 1]", "[1, 1e-320, 1]",
+    "0xff", "3",
+]  # fmt: skip
+KEYS = (
+    "C gamma0 gamma0_deg ratio lengths length frame amplitude centre centre_deg tilt points cos sin semi_axes reverse "
+    "grid phases law name kind loads zzz é"
+).split()
+TABLES = ["[medium]", "[body]", "[gait]", "[numerics]", "[[medium]]", "[x]", "[", "]"]
+
+
+def mutated(text, rng):
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    for _ in range(rng.integers(1, 3)):
+        k = rng.integers(len(lines))
+        match rng.integers(9):
+            case 0 if len(lines) > 1:
+                del lines[k]
+            case 1:
+                lines.insert(k, lines[rng.integers(len(lines))])
+            case 2 if "=" in lines[k]:
+                lines[k] = lines[k].split("=")[0] + "= " + VALUES[rng.integers(len(VALUES))]
+            case 3 if "=" in lines[k]:
+                lines[k] = KEYS[rng.integers(len(KEYS))] + " =" + lines[k].split("=", 1)[1]
+            case 4:
+                lines.insert(k, KEYS[rng.integers(len(KEYS))] + " = " + VALUES[rng.integers(len(VALUES))])
+            case 5 | 6 if "=" in lines[k]:
+                lines[k] = re.sub(r"\d+(\.\d+)?", lambda _: f"{10 ** rng.uniform(-2, 1):.3g}", lines[k])
+            case 7:
+                lines[k] = TABLES[rng.integers(len(TABLES))]
+            case _:
+                cut = rng.integers(len(lines[k]) + 1)
+                lines[k] = lines[k][:cut] + chr(rng.integers(32, 900)) + lines[k][cut:]
+    return "\n".join(lines)
+
+
+def outcome(text):
+    """'run' or 'refused'; anything else raises."""
+    try:
+        read = scene.parse(text)
+        read = read.with_numerics(phases=max(16, 2 * read.gait.harmonics + 1), loads="exact")
+        solution = read.solve(*read.gait.cycle(16 if read.gait.harmonics < 8 else 64))
+        assert (solution.status != "unconverged").all()
+        assert np.isfinite(solution.xi).all()
+        assert np.isfinite(read.displacement("direct")).all()
+        return "run"
+    except ValueError as error:
+        message = str(error)
+        assert message
+        assert "\n" not in message
+        assert len(message) < 450
+        return "refused"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_mutated_scenes_are_run_or_refused(seed):
+    rng, names = np.random.default_rng(seed), scene.builtin_names()
+    texts = [mutated(scene.load(names[rng.integers(len(names))]).text, rng) for _ in range(800)]
+    seen = [outcome(text) for text in texts]
+    assert seen.count("run") > 50
+    assert seen.count("refused") > 400
