@@ -1,4 +1,4 @@
-"""The command line: geomech run, velocity, connection, ccf, displacement, scenes."""
+"""The command line: geomech run, velocity, connection, ccf, displacement, accuracy, scenes."""
 
 from __future__ import annotations
 
@@ -137,6 +137,30 @@ def displacement(
         plots.displacement(table, scene.unit, axes[0, 0], gait=scene.gait, marker="o")
         plots.save(fig, plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))
+
+
+@app.command()
+def accuracy(
+    name: SceneArgument,
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
+        "accuracy"
+    ),
+    as_json: JsonOption = False,
+):
+    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
+    from geomech import accuracy as study
+    from geomech import plots, report
+
+    scene = _loaded(name, None, None)
+    with report.whole_folder(out) as folder, progress(f"accuracy of {scene.name}") as bar:
+        results = study.study(scene, bar)
+        text = "\n".join([study.table(results), "", *study.sentences(results)])
+        (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
+        (folder / "accuracy.txt").write_text(text + "\n")
+        fig = plots.work_precision_figure(results)
+        for ending in ("png", "pdf"):
+            plots.save(fig, folder / f"accuracy.{ending}")
+    print(json.dumps(results) if as_json else f"{text}\nfiles in {out}: accuracy.json, .txt, .png, .pdf")
 
 
 @app.command()

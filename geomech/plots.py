@@ -31,8 +31,9 @@ METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and
     "adapted": {"color": "#CC79A7", "linestyle": (0, (5, 1))},
     "path": {"color": "#0072B2", "linestyle": "-."},
     "harmonic": {"color": "#009E73", "linestyle": ":"},
-    "direct": {"color": "black", "linestyle": "-"},
+    "direct": {"color": "0.72", "linestyle": "-", "linewidth": 4.0, "zorder": 1},  # the others lie on it, or do not
 }
+METHOD_COLOUR = {method: "black" if method == "direct" else style["color"] for method, style in METHOD_STYLE.items()}
 METHOD_LABEL = {
     "area": "area integral of the CCF",
     "adapted": "area integral, adapted CCF",
@@ -157,6 +158,38 @@ def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL"):
     fig, axes = figure(10.8, 3.0, 3)
     for component, ax in enumerate(axes[0]):
         ccf_map(field, component, gaits, unit, ax)
+    return fig
+
+
+KNOB_MARKER = "osD^v<>Ph*X"
+
+
+@styled
+def work_precision(results: Mapping, axes=None):
+    """Error against seconds of `accuracy.study`, a line a knob: against the truth on the first of two Axes, against the
+    knob's own limit on the second. Slopes are measured orders in the setting."""
+    axes = figure(10.0, 3.8, 2)[1][0] if axes is None else axes
+    for ax, against in zip(axes, ("truth", "limit")):
+        lines = [line for line in results["lines"] if line["against"] == against]
+        for line, marker in zip(lines, KNOB_MARKER):
+            style = {"color": METHOD_COLOUR[line["tier"]], "linestyle": "-", "linewidth": 1.0}
+            if against == "limit":
+                style["color"] = f"C{KNOB_MARKER.index(marker)}"
+            order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
+            error = np.maximum(line["error"], 1e-17)
+            ax.loglog(line["seconds"], error, marker=marker, label=line["label"] + order, **style)
+        ax.set(
+            xlabel="seconds", ylabel=f"error against the {'truth' if against == 'truth' else 'limit of the knob'} (BL)"
+        )
+        ax.grid(True, which="major", lw=0.3, color="0.85")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return axes
+
+
+@styled
+def work_precision_figure(results: Mapping):
+    fig, axes = figure(10.0, 3.4, 2)
+    work_precision(results, axes[0])
     return fig
 
 

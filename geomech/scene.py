@@ -131,7 +131,7 @@ class Scene:
     @property
     def harmonic_directions(self) -> int:
         """Directions behind the harmonics: enough above the highest for folding to stay small."""
-        return (8 * self.numerics.harmonics) // 5
+        return max(24, (8 * self.numerics.harmonics) // 5)
 
     def _axes(self):
         n, joints = self.numerics, self.body.joints

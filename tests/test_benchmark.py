@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from geomech import connection
+from geomech import connection, predict
+from geomech.gaits import Circle
 from rft import CATALOGUE, Chain, body_velocity
 
 pytestmark = pytest.mark.benchmark
@@ -77,6 +78,23 @@ def test_field_against_a_loop_of_fsolve():
     assert ratio > 200
 
 
-def test_linear_in_the_number_of_samples(benchmark):
+def test_direct_tier_of_a_circle_to_four_digits():
+    """One circle at the fewest phases that bring it within 1e-4 body lengths of the truth."""
+    swimmer = lambda a, d: body_velocity(GLASS, Chain(), a, d).xi
+    for radius in (0.5, 1.0, 1.75):
+        gait, n = Circle(amplitude=radius), 16
+        truth = predict.direct(swimmer, gait, phases=4096)
+        while np.linalg.norm(predict.direct(swimmer, gait, phases=n) - truth) > 1e-4:
+            n *= 2
+        times = []
+        for _ in range(20):
+            start = time.perf_counter()
+            predict.direct(swimmer, gait, phases=n)
+            times.append(time.perf_counter() - start)
+        print(f"\ncircle of {radius} rad to 1e-4: {n} phases, {1e3 * np.median(times):.1f} ms", end="")
+        assert n <= 128
+
+
+def test_field(benchmark):
     alpha, alphadot = field_samples()
     benchmark(lambda: body_velocity(GLASS, Chain(), alpha, alphadot))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement
+from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks
 
 
 def drawn(module, numbers, tmp_path):
@@ -66,3 +66,13 @@ def test_fig11e(tmp_path):
     # The butterfly is the better gait (Fig. 11(e)): at its published size it outdoes every circle.
     assert plots.net(tables["butterfly"]["direct"])[1] > 1.5 * 0.1378
     assert drawn(fig11e_displacement, numbers, tmp_path)
+
+
+def test_kinks(tmp_path):
+    numbers = kinks.compute(grid=21, directions=24)
+    # Curled to (1.5, 1.5) the body stays put for joints driven alike; straight ahead nothing sticks for long.
+    near = np.abs(numbers["axes"][0] - 1.5).argmin()
+    assert numbers["stuck"][near, near] > 0.1
+    assert numbers["stuck"].mean() < 0.1
+    assert np.sqrt((numbers["left"][15] ** 2).mean()) < 0.2 * np.sqrt((numbers["left"][1] ** 2).mean())
+    assert drawn(kinks, numbers, tmp_path)

@@ -13,10 +13,10 @@ VALUES = [
     "[[0, 0], [1, 0], [0, 1]]", "{}", "{ a = 1 }", "1979-05-27", "'''\nx'''", "[nan, 1, 1]", "[1, 1e-320, 1]",
     "0xff", "3",
 ]  # fmt: skip
-KEYS = (
-    "C gamma0 gamma0_deg ratio lengths length frame amplitude centre centre_deg tilt points cos sin semi_axes reverse "
-    "grid phases law name kind loads zzz é"
-).split()
+KEYS = [
+    "C", "gamma0", "gamma0_deg", "ratio", "lengths", "length", "frame", "amplitude", "centre", "centre_deg", "tilt",
+    "points", "cos", "sin", "semi_axes", "reverse", "grid", "phases", "law", "name", "kind", "loads", "zzz", "é",
+]  # fmt: skip
 TABLES = ["[medium]", "[body]", "[gait]", "[numerics]", "[[medium]]", "[x]", "[", "]"]
 
 

@@ -1,0 +1,46 @@
+"""Where kinks keep the linear connection and its odd harmonics from the truth: maps over shape space.
+
+Left: the fraction of directions of alphadot for which some link stands still. Middle and right: what the first harmonic
+(the connection) and all odd harmonics up to the 15th leave of the velocity, rms over directions, turning rate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech import connection, harmonics, plots
+from geomech.scene import load
+
+
+def compute(scene: str = "three-link-glass", grid: int = 61, directions: int = 48) -> dict:
+    """axes; stuck (N, N); left: {1: (N, N), 15: (N, N)} in rad per rad."""
+    loaded = load(scene).with_numerics(grid=grid)
+    axes = connection.grid(2, grid, loaded.numerics.extent)
+    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
+    solution = loaded.solve(alpha, connection.directions(2, directions)).checked()
+    table = solution.xi.reshape(-1, directions, 3)
+    left = {k: harmonics.fit(lambda a, d: table, axes, k, directions).residual[2] for k in (1, 15)}
+    return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "left": left}
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(10.8, 3.0, 3)
+    left = numbers["left"]
+    maps = (
+        (numbers["stuck"], "directions with a link at rest", 1.0),
+        (left[1], "left by the connection (rad/rad)", left[1].max()),
+        (left[15], "left by 15 harmonics (rad/rad)", left[1].max()),
+    )
+    for ax, (values, label, top) in zip(axes[0], maps):
+        image = ax.pcolormesh(
+            *numbers["axes"], values.T, cmap="viridis", vmin=0, vmax=top, shading="nearest", rasterized=True
+        )
+        fig.colorbar(image, ax=ax, shrink=0.85).set_label(label)
+        plots.shape_space(ax, numbers["axes"])
+    return fig
+
+
+if __name__ == "__main__":
+    main("kinks", compute, draw)

@@ -1,0 +1,20 @@
+"""What accuracy costs: error against time for every tier and knob of the built-in scene."""
+
+from __future__ import annotations
+
+from figures import main
+from geomech import accuracy, plots
+from geomech.scene import load
+
+
+def compute(scene: str = "three-link-glass") -> dict:
+    """As `accuracy.study` gives it."""
+    return accuracy.study(load(scene))
+
+
+def draw(numbers: dict):
+    return plots.work_precision_figure(numbers)
+
+
+if __name__ == "__main__":
+    main("work_precision", compute, draw)

@@ -1,0 +1,183 @@
+"""What accuracy costs: every approximation as a knob, swept for one scene, error against time.
+
+A knob declares which tier it belongs to, its settings from coarse to fine, the order theory gives its error and what it
+is measured against: the truth (the direct tier, far finer), or the limit of the knob alone, all else being equal.
+Errors are distances between net positions in body lengths, rms over a few amplitudes up to the gait's own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from geomech import estimate, predict
+from geomech.scene import Scene
+from rft.media import is_linear
+
+FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
+TOLERANCES = 10.0 ** -np.arange(1, 7)
+ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
+TRUTH_PHASES = 4096
+GRIDS = (7, 11, 15, 21, 31, 45, 61)
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One approximation. setting: the name of an entry of [numerics]; loads for rules, whose prefix is ``rule``."""
+
+    name: str
+    tier: str
+    setting: str
+    values: tuple
+    order: str  # of the error in 1/value (in value for the regularisation)
+    buys: str  # what turning it up buys, to complete a sentence
+    against: str = "truth"
+    rule: str = ""
+
+    @property
+    def label(self) -> str:
+        return f"{self.tier}: {self.name}"
+
+    def turned(self, scene: Scene, value) -> Scene:
+        return scene.with_numerics(**{self.setting: f"{self.rule}:{value}" if self.rule else value})
+
+    def applies(self, scene: Scene) -> bool:
+        if is_linear(scene.medium) and (
+            self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")
+        ):
+            return False
+        return scene.body.joints == 2 or self.tier in ("direct", "adapted")
+
+
+KNOBS = (
+    Knob("phases", "direct", "phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, 2 across kinks", "the true answer"),
+    Knob("segments", "direct", "loads", (2, 4, 8, 16, 32, 64), "2; less with pivots in links",
+         "nothing that exact link integrals do not give for less", "limit", "midpoint"),
+    Knob("nodes", "direct", "loads", (2, 4, 8, 16, 32, 64), "spectral; about 1 to 2 with pivots in links",
+         "nothing that exact link integrals do not give for less", "limit", "gauss"),
+    Knob("regularisation", "direct", "regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1",
+         "links that really stand still", "limit"),
+    Knob("curves", "adapted", "curves", (4, 6, 8, 12, 16, 24, 48), "4 if smooth, about 2 across kinks",
+         "every amplitude of one family from one table"),
+    Knob("grid", "harmonic", "grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
+    Knob("harmonics", "harmonic", "harmonics", (1, 3, 5, 9, 15, 21), "1 to 2, set by the kinks",
+         "the part of the velocity that is not linear in alphadot"),
+    Knob("grid", "path", "grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further"),
+    Knob("directions", "path", "directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit"),
+    Knob("interpolation", "path", "interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit"),
+    Knob("grid", "area", "grid", GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits"),
+)  # fmt: skip
+
+
+def study(scene: Scene, progress: Callable | None = None) -> dict:
+    """{"scene", "amplitudes", "lines": [{"label", "tier", "knob", "order", "against", "value", "error", "seconds",
+    "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}."""
+    amplitudes = scene.gait.amplitude * FRACTIONS
+    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
+    truth = predict.direct(finest.velocity, scene.gait, amplitudes, TRUTH_PHASES)
+    knobs = [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
+    lines = []
+    for done, knob in enumerate(knobs):
+        lines.append(_sweep(scene, knob, amplitudes, truth))
+        if progress:
+            progress((done + 1) / len(knobs))
+    return {
+        "scene": scene.name,
+        "amplitudes": amplitudes.tolist(),
+        "lines": lines,
+        "cheapest": [_cheapest(lines, tol) for tol in TOLERANCES],
+    }
+
+
+def _sweep(scene: Scene, knob: Knob, amplitudes, truth) -> dict:
+    at_limit = {"loads": {"loads": "exact"}, "regularisation": {"regularisation": 1e-9}}.get(knob.setting)
+    if knob.against == "limit":
+        limit = scene.with_numerics(**(at_limit or {knob.setting: 192 if knob.setting == "directions" else 5}))
+        if knob.setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
+            limit = limit.with_numerics(grid=4 * scene.numerics.grid - 3)
+        truth = limit.displacement(knob.tier, None, amplitudes)
+    errors, seconds = [], []
+    for value in knob.values:
+        poses, took = _timed(partial(_fresh, knob, scene, value, amplitudes))
+        errors.append(float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.body.length) ** 2))))
+        seconds.append(took)
+    entry = {"label": knob.label, "tier": knob.tier, "knob": knob.name, "order": knob.order, "against": knob.against}
+    slope = _slope(knob, errors)
+    return {**entry, "buys": knob.buys, "value": list(knob.values), "error": errors, "seconds": seconds, "slope": slope}
+
+
+def _fresh(knob: Knob, scene: Scene, value, amplitudes):
+    """The displacement with the knob at ``value``, tables built anew so that their cost is counted."""
+    return knob.turned(scene, value).displacement(knob.tier, None, amplitudes)
+
+
+def _timed(f: Callable):
+    """(value, seconds): the quicker of two runs, so that what a first call loads and warms is not counted."""
+    times = []
+    for _ in range(2):
+        start = time.perf_counter()
+        value = f()
+        times.append(time.perf_counter() - start)
+    return value, min(times)
+
+
+def _slope(knob: Knob, errors) -> float | None:
+    """Measured order: of the error in 1/value, in value for the regularisation; None where all is rounding."""
+    x, y = np.log(np.array(knob.values, float)), np.array(errors)
+    seen = y > ROUNDING
+    if seen.sum() < 3:
+        return None
+    p = np.polyfit(x[seen], np.log(y[seen]), 1)[0]
+    return float(p if knob.setting == "regularisation" else -p)
+
+
+def _cheapest(lines, tol: float) -> dict:
+    """The quickest measured setting whose error against the truth is at most ``tol``; no tier if there is none."""
+    found = [
+        (t, line, v, e)
+        for line in lines
+        if line["against"] == "truth"
+        for v, e, t in zip(line["value"], line["error"], line["seconds"])
+        if e <= tol
+    ]
+    if not found:
+        return {"tolerance": float(tol), "tier": None}
+    seconds, line, value, error = min(found, key=lambda f: f[0])
+    return {
+        "tolerance": float(tol),
+        "tier": line["tier"],
+        "knob": line["knob"],
+        "value": value,
+        "error": error,
+        "seconds": seconds,
+    }
+
+
+def sentences(results: dict) -> list[str]:
+    """One sentence a knob: what it buys, from coarsest to finest, and its measured order."""
+    out = []
+    for line in results["lines"]:
+        e, t, v = line["error"], line["seconds"], line["value"]
+        slope = "no slope, all rounding" if line["slope"] is None else f"measured order {line['slope']:.1f}"
+        against = "" if line["against"] == "truth" else " of its own limit"
+        out.append(
+            f"{line['label']} {v[0]:g} to {v[-1]:g}: error {e[0]:.1e} to {e[-1]:.1e}{against} for "
+            f"{t[-1] / t[0]:.1f} times the time; buys {line['buys']} ({slope}; theory: {line['order']})."
+        )
+    return out
+
+
+def table(results: dict) -> str:
+    """The cheapest measured settings by tolerance, as plain text."""
+    rows = ["error in BL  cheapest setting                   error     seconds"]
+    for c in results["cheapest"]:
+        if c["tier"] is None:
+            rows.append(f"{c['tolerance']:9.0e}    none of those tried")
+        else:
+            what = f"{c['tier']}, {c['knob']} = {c['value']:g}"
+            rows.append(f"{c['tolerance']:9.0e}    {what:32} {c['error']:9.1e} {c['seconds']:9.4f}")
+    return "\n".join(rows)

@@ -1,0 +1,134 @@
+"""The accuracy study: declared orders where theory gives them, and what it prints and draws."""
+
+import json
+
+import numpy as np
+import pytest
+
+from figures import cost_scaling, work_precision
+from geomech import accuracy, connection, predict, scene
+from geomech.gaits import Circle, Ellipse
+from rft import Chain, Viscous, body_velocity
+
+
+@pytest.fixture(scope="module")
+def glass():
+    return work_precision.compute()
+
+
+@pytest.fixture(scope="module")
+def viscous():
+    return accuracy.study(scene.load("three-link-viscous"))
+
+
+def line(results, label):
+    return next(x for x in results["lines"] if x["label"] == label)
+
+
+def test_every_knob_gets_better(glass):
+    """Each knob's finest setting beats its coarsest, but for those whose tier has an error of its own."""
+    assert len(glass["lines"]) == len(accuracy.KNOBS)
+    for found in glass["lines"]:
+        if found["label"] not in ("path: grid", "area: grid"):
+            assert found["error"][-1] < 0.5 * found["error"][0], found["label"]
+        assert all(t > 0 for t in found["seconds"])
+
+
+def test_tiers_rank_as_they_should(glass):
+    """What each tier settles at: the direct one below the harmonic one below the path and the area."""
+    floor = {x["tier"]: min(x["error"]) for x in glass["lines"] if x["against"] == "truth"}
+    assert floor["direct"] < 1e-6 < floor["harmonic"] < 2e-4 < floor["path"]
+    assert floor["adapted"] < 2e-5
+    assert floor["area"] > 5e-3
+
+
+def test_orders_with_kinks(glass):
+    """Direct tier on loose glass: about order 2 in phases, its kinks cut at random; order 1 in the regularisation."""
+    assert line(glass, "direct: phases")["slope"] == pytest.approx(2.0, abs=0.5)
+    assert line(glass, "direct: regularisation")["slope"] == pytest.approx(1.0, abs=0.2)
+
+
+def test_midpoint_segments_are_of_order_two_where_nothing_kinks(viscous):
+    assert line(viscous, "direct: segments")["slope"] == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("degree", "order"), [(1, 2.0), (3, 4.0), (5, 6.0)])
+def test_interpolation_is_of_order_degree_plus_one(degree, order):
+    """A smooth field at shapes between its grid points."""
+    swimmer = lambda a, d: body_velocity(Viscous(2.0), Chain(frame="link-2"), a, d).xi
+    shapes = np.random.default_rng(0).uniform(-0.9, 0.9, (400, 2))
+    exact = np.stack([swimmer(shapes, e) for e in np.eye(2)], -1)
+    points = np.array([41, 61, 91, 137])
+    errors = []
+    for n in points:
+        fitted = connection.fit(swimmer, connection.grid(2, n, 1.5), degree=degree)
+        errors.append(np.sqrt(np.mean((fitted(shapes) - exact) ** 2)))
+    assert -np.polyfit(np.log(points - 1), np.log(errors), 1)[0] == pytest.approx(order, abs=0.1)
+
+
+def test_families_are_of_order_four_where_nothing_kinks():
+    viscous = scene.load("three-link-viscous")
+    counts = np.array([8, 16, 32, 64])
+    a = np.linspace(0.0, 1.5, 2001)[1:]
+    exact = predict.direct(viscous.velocity, Circle(), a)
+    errors = []
+    for n in counts:
+        adapted = viscous.with_numerics(curves=int(n)).displacement("adapted", Circle(), a)
+        errors.append(np.abs(adapted - exact).max())
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
+
+
+def test_phases_are_spectral_where_nothing_kinks():
+    swimmer = lambda a, d: body_velocity(Viscous(2.0), Chain(), a, d).xi
+    gait = Ellipse(centre=(0.4, 0.2), semi_axes=(1.0, 0.8))
+    exact = predict.direct(swimmer, gait, phases=256)
+    errors = [np.abs(predict.direct(swimmer, gait, phases=n) - exact).max() for n in (8, 16, 32, 64)]
+    assert errors[1] < errors[0] / 30
+    assert errors[2] < errors[1] / 300
+    assert errors[3] < 1e-15
+
+
+def test_phases_are_of_order_two_across_kinks():
+    """Averaged over gaits, since where a kink falls between two phases is chance."""
+    glass = scene.load("three-link-glass")
+    radii, counts = np.linspace(0.4, 2.0, 25), np.array([32, 64, 128, 256, 512])
+    exact = predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, 4096)
+    off = [predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact for n in counts]
+    errors = [np.exp(np.log(np.linalg.norm(x, axis=-1)).mean()) for x in off]
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.25)
+
+
+def test_table_and_sentences(glass):
+    text = accuracy.table(glass)
+    assert text.count("\n") == len(accuracy.TOLERANCES)
+    assert "direct, phases" in text
+    sentences = accuracy.sentences(glass)
+    assert len(sentences) == len(accuracy.KNOBS)
+    assert all(s.endswith(".") and "buys" in s for s in sentences)
+    for cheapest in glass["cheapest"]:
+        assert cheapest["tier"] is None or cheapest["error"] <= cheapest["tolerance"]
+    assert json.loads(json.dumps(glass)) == glass
+
+
+def test_a_linear_medium_has_no_dry_knobs(viscous):
+    labels = {x["label"] for x in viscous["lines"]}
+    assert "direct: phases" in labels
+    assert not any("regularisation" in x or "harmonic" in x or "path" in x for x in labels)
+
+
+def test_the_diagram_draws(glass, tmp_path):
+    from geomech import plots
+
+    plots.save(work_precision.draw(glass), tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 30_000
+
+
+@pytest.mark.benchmark
+def test_cost_is_linear_or_less(tmp_path):
+    from geomech import plots
+
+    numbers = cost_scaling.compute()
+    for axis, found in numbers.items():
+        print(f"\n{axis}: exponent {found['exponent']:.2f}", end="")
+        assert found["exponent"] < 1.15
+    plots.save(cost_scaling.draw(numbers), tmp_path / "c.png")
