@@ -13,14 +13,13 @@ from geomech import connection, harmonics, plots
 from geomech.scene import load
 
 
-def compute(scene: str = "three-link-glass", grid: int = 61, directions: int = 48) -> dict:
+def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:
     """axes; stuck (N, N); left: {1: (N, N), 15: (N, N)} in rad per rad."""
     loaded = load(scene).with_numerics(grid=grid)
     axes = connection.grid(2, grid, loaded.numerics.extent)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
     solution = loaded.solve(alpha, connection.directions(2, directions)).checked()
-    table = solution.xi.reshape(-1, directions, 3)
-    left = {k: harmonics.fit(lambda a, d: table, axes, k, directions).residual[2] for k in (1, 15)}
+    left = {k: harmonics.fit(loaded.velocity, axes, k, directions, mirror=True).residual[2] for k in (1, 15)}
     return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "left": left}
 
 
@@ -31,7 +30,7 @@ def draw(numbers: dict):
     maps = (
         (numbers["stuck"], "directions with a link at rest", 1.0),
         (left[1], "left by the connection (rad/rad)", left[1].max()),
-        (left[15], "left by 15 harmonics (rad/rad)", left[1].max()),
+        (left[15], "left by 15 harmonics (rad/rad)", left[15].max()),
     )
     for ax, (values, label, top) in zip(axes[0], maps):
         image = ax.pcolormesh(

@@ -16,7 +16,6 @@ import numpy as np
 
 from geomech import estimate, predict
 from geomech.scene import Scene
-from rft.media import is_linear
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)
@@ -46,9 +45,7 @@ class Knob:
         return scene.with_numerics(**{self.setting: f"{self.rule}:{value}" if self.rule else value})
 
     def applies(self, scene: Scene) -> bool:
-        if is_linear(scene.medium) and (
-            self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")
-        ):
+        if scene.linear and (self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")):
             return False
         return scene.body.joints == 2 or self.tier in ("direct", "adapted")
 

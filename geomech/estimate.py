@@ -66,7 +66,7 @@ def finer_model(scene: Scene) -> Scene | None:
     kind, _, count = scene.numerics.loads.partition(":")
     closed = scene.medium.dry is not None
     finer = {"loads": "exact" if closed else f"{kind}:{2 * int(count)}"} if kind != "exact" else {}
-    if scene.medium.dry != ():
+    if not scene.linear:
         finer["regularisation"] = max(scene.numerics.regularisation / 10, 1e-12)
     return scene.with_numerics(**finer) if finer else None
 

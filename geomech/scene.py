@@ -107,6 +107,11 @@ class Scene:
         return self.solve(alpha, alphadot).checked().xi
 
     @property
+    def linear(self) -> bool:
+        """Whether xi = A alphadot holds exactly, so that path and direct tier are one."""
+        return is_linear(self.medium)
+
+    @property
     def unit(self) -> str:
         """Of lengths in this scene: body lengths, or metres where the body has a size."""
         return "BL" if self.body.length == 1.0 else "m"
@@ -120,7 +125,7 @@ class Scene:
     def lookups(self) -> tuple[str, ...]:
         """The tiers that look a precomputed table up; in a linear medium the path is the direct tier."""
         two = ("area", "adapted") if self.body.joints == 2 else ("adapted",)
-        return two if is_linear(self.medium) else tuple(m for m in METHODS if m in (*self.methods, *two))[:-1]
+        return two if self.linear else tuple(m for m in METHODS if m in (*self.methods, *two))[:-1]
 
     @property
     def direction_count(self) -> int:
@@ -196,14 +201,14 @@ class Scene:
             return self.family(gait, float(a.max(initial=0.0))).area(a)
         if method == "path" and self.needs_field(method):
             return predict.path(self.fitted, gait, amplitudes, phases)
-        if method == "harmonic" and not is_linear(self.medium):
+        if method == "harmonic" and not self.linear:
             return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
         # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
 
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""
-        return method == "area" or (method == "path" and not is_linear(self.medium))
+        return method == "area" or (method == "path" and not self.linear)
 
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
@@ -218,7 +223,7 @@ class Scene:
         if any(map(self.needs_field, methods)):
             seconds["field"] = _timed(lambda: self.compute_field(progress))[1]
         for method in sorted(methods, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
-            if method == "direct" or (is_linear(self.medium) and method not in ("area", "adapted")):
+            if method == "direct" or (self.linear and method not in ("area", "adapted")):
                 (poses, errors[method]), seconds[method] = _timed(
                     lambda: estimate.direct(self, gait, amplitudes, self.numerics.phases)
                 )

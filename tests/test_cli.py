@@ -64,6 +64,27 @@ def test_displacement_by_every_tier(tmp_path):
     assert "area" not in out
 
 
+def test_displacement_to_a_tolerance():
+    code, out, err = geomech("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tol", "1e-3", "--json")
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert max(answer["estimate"]) <= 1e-3
+    assert len(answer["estimate"]) == len(answer[answer["tier"]]) == 2
+    code, out, _ = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9")
+    assert code == 0
+    assert "direct" in out
+
+
+def test_accuracy_leaves_its_study(tmp_path):
+    (tmp_path / "s.toml").write_text(scene.load("three-link-viscous").text)
+    code, out, err = geomech("accuracy", "s.toml", "-o", "out", cwd=tmp_path)
+    assert (code, err) == (0, "")
+    files = {p.name for p in (tmp_path / "out").iterdir()}
+    assert files == {"accuracy.json", "accuracy.txt", "accuracy.png", "accuracy.pdf"}
+    assert "direct: phases 16 to 512" in out
+    assert json.loads((tmp_path / "out" / "accuracy.json").read_text())["scene"] == "s.toml"
+
+
 def test_ccf_draws(tmp_path):
     code, out, err = geomech("ccf", "butterfly-glass", *SMALL, "--plot", tmp_path / "c.pdf")
     assert (code, out, err) == (0, "", "")
@@ -106,6 +127,8 @@ BAD = [
     (["displacement", "three-link-glass", "--amplitudes", "1:2"], "nor START:STOP:COUNT"),
     (["displacement", "three-link-glass", "--amplitudes", "inf"], "must be finite"),
     (["displacement", "three-link-glass", "--amplitudes", "1", "--methods", "guess"], "--methods: 'guess' is unknown"),
+    (["displacement", "three-link-glass", "--amplitudes", "1", "--tol", "-1"], "--tol must be a number > 0"),
+    (["displacement", "three-link-glass", "--amplitudes", "1", "--tol", "1", "--methods", "path"], "drop --methods"),
     (["displacement", "three-link-glass", "--amplitudes", "1", "--grid", "2"], "grid must be a whole number from 4"),
     (["connection", "three-link-glass", "-o", "no/such/a.nc"], "cannot write no/such/a.nc: No such file or directory"),
     (["connection", "three-link-glass", "-o", "a.nc", "--plot", "a.bmp"], "end the name in .png, .pdf, .svg"),
