@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Motion
+from rft.effects.base import Effect
 from rft.loads import LoadLaw, element_load, parse
 from rft.media.base import Medium, real_array
 
@@ -85,20 +86,22 @@ def body_velocity(
     regularisation: float = 1e-6,
     tolerance: float = 1e-10,
     threads: int | None = None,
+    effects: Sequence[Effect] = (),
 ) -> Solution:
     """Body velocity at which the medium's net force and moment on the body vanish.
 
     alpha, alphadot: (..., joints), rad and rad/time; they broadcast. loads: "exact", or "midpoint:N", "gauss:N".
     regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
     off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
-    threads: workers, by default one per core. Raises ValueError for shapes or values that make no sense.
+    threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
+    listed is not evaluated. Raises ValueError for shapes or values that make no sense.
     """
     alpha, alphadot = _checked_input(body, alpha, alphadot, regularisation, tolerance)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = np.sqrt((alphadot * alphadot).sum(0))
     moving = speed > 0
-    problem = _Problem(medium, body, loads, regularisation, tolerance)
+    problem = _Problem(medium, body, loads, regularisation, tolerance, effects)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
@@ -167,9 +170,11 @@ class _State:
 class _Problem:
     """A medium, a body and how finely to solve; `solve` takes samples as (joints, B), alphadot of norm 1."""
 
-    def __init__(self, medium: Medium, body: Body, loads: str, regularisation: float, tolerance: float):
+    def __init__(self, medium, body: Body, loads: str, regularisation: float, tolerance: float, effects=()):
         self.body, self.regularisation = body, regularisation
         self.load: LoadLaw = element_load(medium, loads)
+        for effect in effects:
+            self.load, self.body = effect.load(self.load, medium), effect.body(self.body)
         self.nodes = parse(loads)[1]
         axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
         self.unit = axial

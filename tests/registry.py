@@ -3,7 +3,7 @@
 import math
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
-from rft import Chain, Coulomb, Granular, Viscous
+from rft import Backbone, Chain, ConstantCurvature, Coulomb, Granular, Serpenoid, Viscous
 from rft.media import CATALOGUE
 
 MEDIA = {
@@ -24,6 +24,9 @@ BODIES = {
     "three-middle": Chain((1, 1, 1), frame="link-2"),
     "uneven": Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
     "five": Chain((1,) * 5),
+    "serpenoid": Serpenoid(elements=24, waves=1.5),
+    "arcs": ConstantCurvature(elements=12, sections=3, frame="link-4"),
+    "backbone": Backbone(elements=9, length=0.1),
 }
 
 GAITS = {

@@ -28,7 +28,7 @@ def by_hand(body, alpha):
     return headings - zero, (centres - origin) @ np.array([[c, -s], [s, c]])
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", [n for n, body in BODIES.items() if isinstance(body, Chain)])
 def test_links_are_where_they_should_be(name):
     body, rng = BODIES[name], np.random.default_rng(0)
     alpha = rng.uniform(-3, 3, (body.joints, 7))
@@ -45,7 +45,7 @@ def test_links_are_where_they_should_be(name):
         )
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", [n for n, body in BODIES.items() if isinstance(body, Chain)])
 def test_velocities_are_the_rates_of_places(name):
     body, rng, h = BODIES[name], np.random.default_rng(1), 1e-6
     alpha, alphadot = rng.uniform(-2, 2, (2, body.joints))

@@ -11,8 +11,9 @@ class Motion(NamedTuple):
     """Elements of a body, in body lengths, in the body frame; each array (n, B): elements by samples.
 
     c, s: cosine and sine of the element's heading. r_t, r_n: along and across the element, the velocity its centre
-    takes from a unit turn of the frame. half: half lengths (n, 1). v: (3, n, B), the element's own
-    (a, m, w) of `rft.loads` while the frame is held still.
+    takes from a unit turn of the frame. half: half lengths (n, 1), 0 for a point such as an end cap. weight: (n, 1), what
+    an element's force counts, its length for a piece of body. v: (3, n, B), the element's own (a, m, w) of `rft.loads`
+    while the frame is held still.
     """
 
     c: np.ndarray
@@ -20,6 +21,7 @@ class Motion(NamedTuple):
     r_t: np.ndarray
     r_n: np.ndarray
     half: np.ndarray
+    weight: np.ndarray
     v: np.ndarray
 
     @classmethod
@@ -28,18 +30,19 @@ class Motion(NamedTuple):
         own = velocity * along.conj()
         lever = 1j * place * along.conj()
         v = np.stack([own.real, own.imag, turn * half])
-        return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, v)
+        return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, 2.0 * half, v)
 
     def take(self, keep: np.ndarray) -> Motion:
         """The samples that ``keep`` (an index or mask over B) selects."""
-        c, s, r_t, r_n, half, v = self
-        return Motion(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, v[:, :, keep])
+        c, s, r_t, r_n, half, weight, v = self
+        return Motion(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, weight, v[:, :, keep])
 
     @staticmethod
     def join(motions: list[Motion]) -> Motion:
         """The samples of several motions of one body, side by side."""
-        c, s, r_t, r_n, halves, v = zip(*motions)
-        return Motion(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), halves[0], np.concatenate(v, -1))
+        c, s, r_t, r_n, halves, weights, v = zip(*motions)
+        fixed = halves[0], weights[0]
+        return Motion(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), *fixed, np.concatenate(v, -1))
 
     def carried(self, xi: np.ndarray) -> np.ndarray:
         """(3, n, B): what the body velocity xi (3, B) adds to every element's (a, m, w)."""
@@ -53,12 +56,12 @@ class Motion(NamedTuple):
     def total(self, force: np.ndarray) -> np.ndarray:
         """(3, ..., B): force and moment on the frame from element averages (3, ..., n, B); the transpose of `carried`."""
         f_t, f_n, f_s = force
-        length = 2.0 * self.half
-        c, s = length * self.c, length * self.s
+        weight = self.weight
+        c, s = weight * self.c, weight * self.s
         parts = np.empty_like(force)
         np.subtract(c * f_t, s * f_n, out=parts[0])
         np.add(s * f_t, c * f_n, out=parts[1])
-        np.add(length * self.r_t * f_t + length * self.r_n * f_n, length * self.half * f_s, out=parts[2])
+        np.add(weight * self.r_t * f_t + weight * self.r_n * f_n, weight * self.half * f_s, out=parts[2])
         return parts.sum(-2)
 
     def assembled(self, load: np.ndarray) -> np.ndarray:

@@ -1,0 +1,100 @@
+"""Continuous backbones: many short straight elements whose bends follow from a few shape variables.
+
+Of order 2 in 1/elements: the elements are chords of the curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rft.bodies.base import Motion
+from rft.bodies.chain import Chain
+from rft.media.base import require
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """A body of equal elements, bent at every one of the ``elements`` - 1 points between them, as a wave or a measured
+    centreline prescribes. length, frame: as for `Chain`."""
+
+    elements: int = 100
+    length: float = 1.0
+    frame: str = "mean"
+
+    def __post_init__(self):
+        require(3 <= self.elements <= 2000, f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
+        self.chain  # noqa: B018 (checks length and frame)
+
+    @cached_property
+    def chain(self) -> Chain:
+        return Chain((1.0,) * self.elements, self.length, self.frame)
+
+    @property
+    def joints(self) -> int:
+        return self.elements - 1
+
+    @property
+    def bends(self) -> np.ndarray | None:
+        """(elements - 1, joints): the bend at each point for a unit of each shape variable; None where they are the
+        shape variables themselves."""
+        return None
+
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion:
+        """Elements in the body frame while that is held still; alpha, alphadot: (joints, B)."""
+        if self.bends is None:
+            return self.chain.motion(alpha, alphadot)
+        return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
+
+    def frame_pose(self, frame: str, alpha, alphadot):
+        """As `Chain.frame_pose`; "link-k" is the k-th element."""
+        if self.bends is None:
+            return self.chain.frame_pose(frame, alpha, alphadot)
+        return self.chain.frame_pose(frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T)
+
+
+@dataclass(frozen=True)
+class Serpenoid(Backbone):
+    """Two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s), s from 0 at the
+    tail to 1 at the head. A circle in (alpha_1, alpha_2) is a travelling wave: towards the head, run backwards
+    (reverse) towards the tail, which drives the body head first."""
+
+    waves: float = 1.0
+
+    def __post_init__(self):
+        super().__post_init__()
+        require(0 < self.waves <= self.elements / 4, f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
+
+    @property
+    def joints(self) -> int:
+        return 2
+
+    @cached_property
+    def bends(self) -> np.ndarray:
+        phase = 2 * np.pi * self.waves * np.arange(1, self.elements) / self.elements
+        return np.stack([np.cos(phase), np.sin(phase)], -1) / self.elements
+
+
+@dataclass(frozen=True)
+class ConstantCurvature(Backbone):
+    """``sections`` of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
+
+    sections: int = 2
+
+    def __post_init__(self):
+        super().__post_init__()
+        fits = 1 <= self.sections <= self.elements and self.elements % self.sections == 0
+        require(fits, f"sections must divide elements ({self.elements}), got {self.sections!r}")
+
+    @property
+    def joints(self) -> int:
+        return self.sections
+
+    @cached_property
+    def bends(self) -> np.ndarray:
+        # A bend between two elements belongs half to each one's section.
+        per = self.elements // self.sections
+        owner = np.repeat(np.eye(self.sections), per, axis=0)
+        return (owner[:-1] + owner[1:]) / (2 * per)

@@ -1,0 +1,91 @@
+"""Drag on the ends of the body: the head above all, which pushes grains out of its way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.bodies.base import Body, Motion
+from rft.effects.base import Effect
+from rft.media.base import TermLaw, require
+from rft.media.granular import Granular
+
+
+class _CapLaw(TermLaw):
+    """f_t = C (v.t) / sqrt(tan^2 gamma0 + (v.t)^2), f_n = v.n for the unit velocity v: the law of the body's side with
+    its extra force turned to face along it."""
+
+    def __init__(self, medium: Granular):
+        self.dry = (1.0, 1.0, 0.0), (math.sin(medium.gamma0), 0.0, medium.C * math.cos(medium.gamma0))
+
+    def at(self, v_t, v_n, eps):
+        """The load (3, 4, ...) of a point: `TermLaw` with along and across exchanged."""
+        f_n, f_t = self.traction(v_n, v_t, eps)
+        (nn, nt), (tn, tt) = self.derivatives(v_n, v_t, eps)
+        zero = np.zeros_like(f_t)
+        return np.array([[f_t, tt, tn, zero], [f_n, nt, nn, zero], [zero] * 4])
+
+
+@dataclass(frozen=True)
+class EndCaps(Effect):
+    """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)), lateral e pi r^2 C_F sin psi.
+
+    radius: of the body, in body lengths, 0 to 1. head, tail: the factor e, 0 for none, 1 flat, 4 hemisphere.
+    Source: the end forces of the cylinder in granular resistive force theory as written in third-party code, C_S / C_F
+    being C of Eq. 3. Granular media only.
+    """
+
+    radius: float
+    head: float = 1.0
+    tail: float = 1.0
+
+    limit = "radius = 0"
+    cost = "one point load an end"
+
+    def __post_init__(self):
+        require(0 <= self.radius <= 1, f"radius must lie from 0 to 1 body length, got {self.radius!r}")
+        for name in ("head", "tail"):
+            value = getattr(self, name)
+            require(0 <= value <= 100, f"{name} must be a factor from 0 to 100, got {value!r}")
+
+    def load(self, load, medium):
+        require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
+        cap = _CapLaw(medium)
+
+        def with_caps(a, m, w, eps):
+            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps), cap.at(a[-2:], m[-2:], eps)], 2)
+
+        return with_caps
+
+    def body(self, body: Body) -> Body:
+        # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
+        factor = math.pi * self.radius / 2
+        return _Capped(body, np.array([[self.tail * factor], [self.head * factor]]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Capped:
+    """A body with two points more, at its tail and its head."""
+
+    inner: Body
+    weight: np.ndarray
+
+    @property
+    def length(self) -> float:
+        return self.inner.length
+
+    @property
+    def joints(self) -> int:
+        return self.inner.joints
+
+    def motion(self, alpha, alphadot) -> Motion:
+        m = self.inner.motion(alpha, alphadot)
+        ends, sign = [0, -1], np.array([[-1.0], [1.0]])
+        points = m.c[ends], m.s[ends], m.r_t[ends], m.r_n[ends] + sign * m.half[ends]
+        a, across, w = m.v[:, ends]
+        v = np.stack([a, across + sign * w, np.zeros_like(a)])
+        joined = (np.concatenate(x) for x in zip((m.c, m.s, m.r_t, m.r_n), points))
+        half, weight = np.concatenate([m.half, np.zeros((2, 1))]), np.concatenate([m.weight, self.weight])
+        return Motion(*joined, half, weight, np.concatenate([m.v, v], 1))
