@@ -1,4 +1,4 @@
-"""The command line: geomech run, velocity, connection, ccf, displacement, accuracy, scenes."""
+"""The command line: geomech run, velocity, connection, ccf, displacement, accuracy, explain, scenes."""
 
 from __future__ import annotations
 
@@ -161,6 +161,14 @@ def accuracy(
         for ending in ("png", "pdf"):
             plots.save(fig, folder / f"accuracy.{ending}")
     print(json.dumps(results) if as_json else f"{text}\nfiles in {out}: accuracy.json, .txt, .png, .pdf")
+
+
+@app.command()
+def explain(name: SceneArgument):
+    """Which effects a scene asks for, the engine that follows, what each costs and what it takes away."""
+    from geomech.explain import explain as told
+
+    print(told(_loaded(name, None, None)))
 
 
 @app.command()

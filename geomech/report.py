@@ -65,9 +65,11 @@ def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes up to the largest that keeps the gait inside the field and its joints within pi / 1.25."""
+    """Amplitudes up to the largest that keeps the gait inside the field; up to its own where the body has no field."""
+    if "path" not in scene.methods:
+        return [float(f"{a:.3g}") for a in gait.amplitude * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
     t = np.linspace(0, 2 * np.pi, 721)
-    room = min(scene.numerics.extent, np.pi / 1.25) - np.abs(np.array(gait.centre or 0.0)).max()
+    room = scene.numerics.extent - np.abs(np.array(gait.centre or 0.0)).max()
     reach = np.abs(gait.unit(t)).max()
     if reach == 0:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")

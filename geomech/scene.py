@@ -26,6 +26,7 @@ from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.problem import SceneError, choose
 from rft.bodies import KINDS as BODIES
+from rft.effects import KINDS as EFFECTS
 from rft.loads import element_load
 from rft.media import LAWS, is_linear
 
@@ -79,6 +80,7 @@ class Scene:
     body: rft.Body
     gait: Gait
     numerics: Numerics = Numerics()
+    effects: tuple[rft.effects.Effect, ...] = ()
     name: str = "scene"
     text: str = ""
 
@@ -93,13 +95,29 @@ class Scene:
             element_load(self.medium, self.numerics.loads)
         except ValueError as error:
             raise SceneError(f"{self.name}: [numerics] {error}") from None
+        kinds = [type(e) for e in self.effects]
+        for effect in self.effects:
+            if kinds.count(type(effect)) > 1:
+                raise SceneError(f"{self.name}: [[effects]] {type(effect).__name__} is asked for twice: keep one")
+            try:
+                effect.load(None, self.medium)
+            except ValueError as error:
+                raise SceneError(f"{self.name}: [[effects]] {error}: drop it, or change the medium") from None
 
     def solve(self, alpha, alphadot) -> rft.Solution:
         """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`."""
         n = self.numerics
         return rft.body_velocity(
             self.medium, self.body, alpha, alphadot,
-            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
+            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance, effects=self.effects,
+        )  # fmt: skip
+
+    def work(self, alpha, alphadot, xi) -> rft.Work:
+        """Power, internal moments and slip of a solution of `solve`; see `rft.work`."""
+        n = self.numerics
+        return rft.work(
+            self.medium, self.body, alpha, alphadot, xi,
+            loads=n.loads, regularisation=n.regularisation, effects=self.effects,
         )  # fmt: skip
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
@@ -109,7 +127,7 @@ class Scene:
     @property
     def linear(self) -> bool:
         """Whether xi = A alphadot holds exactly, so that path and direct tier are one."""
-        return is_linear(self.medium)
+        return is_linear(self.medium) and not any(isinstance(e, rft.SkinFriction) for e in self.effects)
 
     @property
     def unit(self) -> str:
@@ -118,8 +136,10 @@ class Scene:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """The tiers of a plain study: area and harmonic take two joints."""
-        return ("area", "path", "harmonic", "direct") if self.body.joints == 2 else ("path", "direct")
+        """The tiers of a plain study: area and harmonic take two joints, path no more than a grid can span."""
+        if self.body.joints == 2:
+            return "area", "path", "harmonic", "direct"
+        return ("path", "direct") if self.body.joints <= 3 else ("direct",)
 
     @property
     def lookups(self) -> tuple[str, ...]:
@@ -285,10 +305,13 @@ def parse(text: str, name: str = "scene") -> Scene:
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
         raise SceneError(f"{name} is not TOML: {error}") from None
     for table in tables:
-        choose(f"{name}: table", table, ("medium", "body", "gait", "numerics"))
+        choose(f"{name}: table", table, ("medium", "body", "gait", "numerics", "effects"))
     for table in ("medium", "body", "gait"):
         if table not in tables:
             raise SceneError(f"{name}: the table [{table}] is missing: add it, see 'geomech scenes --show NAME'")
+    effects = tables.pop("effects", [])
+    if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
+        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
     for table, value in tables.items():
         if not isinstance(value, dict):
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
@@ -297,6 +320,7 @@ def parse(text: str, name: str = "scene") -> Scene:
         body=_of_kind(f"{name}: [body]", tables["body"], "kind", BODIES),
         gait=_of_kind(f"{name}: [gait]", tables["gait"], "kind", GAITS),
         numerics=_build(f"{name}: [numerics]", tables.get("numerics", {}), Numerics),
+        effects=tuple(_of_kind(f"{name}: [[effects]]", e, "kind", EFFECTS) for e in effects),
         name=name,
         text=text,
     )

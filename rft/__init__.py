@@ -2,9 +2,25 @@
 
 from rft.balance import Solution, body_velocity
 from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
+from rft.effects import EndCaps, SkinFriction
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
+from rft.work import Work, work
 
 __all__ = [
-    "CATALOGUE", "Backbone", "Body", "Chain", "ConstantCurvature", "Coulomb", "Granular", "Medium", "Serpenoid", "Solution",
-    "Viscous", "body_velocity",
-]  # fmt: skip
+    "CATALOGUE",
+    "Backbone",
+    "Body",
+    "Chain",
+    "ConstantCurvature",
+    "Coulomb",
+    "EndCaps",
+    "Granular",
+    "Medium",
+    "Serpenoid",
+    "SkinFriction",
+    "Solution",
+    "Viscous",
+    "Work",
+    "body_velocity",
+    "work",
+]

@@ -3,7 +3,15 @@
 from geomech.gaits.base import Gait
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
+from geomech.gaits.waves import Sine
 
-KINDS = {"circle": Circle, "ellipse": Ellipse, "butterfly": Butterfly, "fourier": Fourier, "points": Points}
+KINDS = {
+    "circle": Circle,
+    "ellipse": Ellipse,
+    "butterfly": Butterfly,
+    "fourier": Fourier,
+    "points": Points,
+    "sine": Sine,
+}
 
-__all__ = ["KINDS", "Butterfly", "Circle", "Ellipse", "Fourier", "Gait", "Points"]
+__all__ = ["KINDS", "Butterfly", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine"]

@@ -59,6 +59,12 @@ class EndCaps(Effect):
 
         return with_caps
 
+    def traction(self, medium: Granular, v_t, v_n, eps=0.0):
+        """(along, across) force of both ends together at velocity (v_t, v_n), in units of the body's axial drag."""
+        across, along = _CapLaw(medium).traction(v_n, v_t, eps)
+        factor = (self.head + self.tail) * math.pi * self.radius / 2
+        return factor * along, factor * across
+
     def body(self, body: Body) -> Body:
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         factor = math.pi * self.radius / 2

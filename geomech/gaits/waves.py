@@ -1,0 +1,108 @@
+"""Travelling waves of an inextensible body: the sandfish's gait (paper Sec. III B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.gaits.base import Gait
+
+
+def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """p at which the sine y = sin, of largest slope ``slope``, has run the share u / 2 pi of its length per wave.
+
+    The length up to p is proportional to E(p | m), m = slope^2 / (1 + slope^2); Newton from u, which converges
+    quadratically because E is monotone with a slope between sqrt(1 - m) and 1.
+    """
+    from scipy.special import ellipe, ellipeinc
+
+    m = slope**2 / (1 + slope**2)
+    per_wave = 4 * ellipe(m)
+    p = np.array(np.broadcast_to(u, np.broadcast_shapes(u.shape, np.shape(slope))), float)
+    for _ in range(50):
+        step = (ellipeinc(p, m) - u / (2 * np.pi) * per_wave) / np.sqrt(1 - m * np.sin(p) ** 2)
+        p -= np.clip(step, -0.5, 0.5)
+        if np.abs(step).max() < 1e-13 * (1 + np.abs(p).max()):
+            break
+    return p
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sine(Gait):
+    """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
+    tail. Its arc length is fixed, ``waves`` wavelengths of arc, whatever the amplitude.
+
+    amplitude: A / lambda, the sine's amplitude over its wavelength. elements: as in the body (joints + 1). waves: > 0.
+    The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
+    """
+
+    amplitude: float = 0.2
+    waves: float = 1.0
+    elements: int = 100
+
+    def __post_init__(self):
+        super().__post_init__()
+        if self.centre:
+            raise ValueError("a sine wave takes no centre: it undulates about the straight body")
+        if not 3 <= self.elements <= 2000:
+            raise ValueError(f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
+        if not 0 < self.waves <= self.elements / 4:
+            raise ValueError(f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
+        if not 0 <= self.amplitude <= 10:
+            raise ValueError(f"amplitude (A / lambda) must lie from 0 to 10, got {self.amplitude!r}")
+
+    @property
+    def joints(self) -> int:
+        return self.elements - 1
+
+    @property
+    def amplitude_label(self) -> str:
+        return r"amplitude over wavelength $A/\lambda$"
+
+    def _slopes(self, amplitudes) -> np.ndarray:
+        a = np.asarray(self.amplitude if amplitudes is None else amplitudes, float)
+        if not ((a >= 0) & (a <= 10)).all():
+            raise ValueError(f"amplitudes (A / lambda) must lie from 0 to 10, got {a.ravel()[:4]}")
+        return 2 * np.pi * a
+
+    def _headings(self, t, amplitudes):
+        """Headings of the elements and their rates of change with the wave's phase, (B..., T..., elements)."""
+        from scipy.special import ellipe
+
+        t = np.asarray(t, float) * (-1.0 if self.reverse else 1.0)
+        slope = self._slopes(amplitudes)[(..., *([None] * (t.ndim + 1)))]
+        s = (np.arange(self.elements) + 0.5) / self.elements
+        p = arc_to_phase(2 * np.pi * self.waves * s + t[..., None], slope)
+        rise = slope * np.cos(p)
+        m = slope**2 / (1 + slope**2)
+        speed = np.sqrt(1 + slope**2) * 4 * ellipe(m) / (2 * np.pi) / np.sqrt(1 + rise**2)  # dp/du
+        return np.arctan(rise), -slope * np.sin(p) / (1 + rise**2) * speed
+
+    def headings(self, t, amplitudes=None) -> np.ndarray:
+        """Of the elements against the wave's axis, (B..., T..., elements), rad."""
+        return self._headings(t, amplitudes)[0]
+
+    def shape(self, t, amplitudes=None) -> np.ndarray:
+        return np.diff(self._headings(t, amplitudes)[0], axis=-1)
+
+    def rate(self, t, amplitudes=None) -> np.ndarray:
+        return np.diff(self._headings(t, amplitudes)[1], axis=-1) * (-1.0 if self.reverse else 1.0)
+
+    def unit(self, t) -> np.ndarray:
+        return self.shape(t)
+
+    def unit_rate(self, t) -> np.ndarray:
+        return self.rate(t)
+
+    def wavelength(self, amplitudes=None) -> np.ndarray:
+        """lambda over the body's length (...,): the arc length of a wave, 1 / waves, laid out straight."""
+        from scipy.special import ellipe
+
+        slope = self._slopes(amplitudes)
+        arc = np.sqrt(1 + slope**2) * 4 * ellipe(slope**2 / (1 + slope**2)) / (2 * np.pi)  # of a wave of unit length
+        return 1 / (self.waves * arc)
+
+    def relative_curvature(self, amplitudes=None) -> np.ndarray:
+        """Mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
+        return 4 * np.arctan(self._slopes(amplitudes))
