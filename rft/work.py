@@ -15,8 +15,9 @@ from rft.media.base import Medium
 
 class Work(NamedTuple):
     """power: (...), rate of work against the medium, >= 0, in units of (the whole body's axial drag) x (length / time).
-    moment: (..., n - 1), internal moment at the points between the n elements, what the head's side of each exerts on
-    the tail's side through it, in axial drag x length. slip: (...), mean over the body of the angle between an element's
+    moment: (..., n - 1), internal moment at the points between the n elements that holds against the medium, in axial
+    drag x length: positive where the body works to bend to the left (counter-clockwise, tail to head), as muscles on its
+    left side do; moment . d(bend)/dt sums to the power. slip: (...), mean over the body of the angle between an element's
     direction and the velocity of its centre, 0 to pi/2 rad."""
 
     power: np.ndarray
@@ -54,20 +55,18 @@ def work(
 
 
 def _moments(motion, f, n: int) -> np.ndarray:
-    """(B, n - 1): the moment of the medium's force on the tail's side about each point between two elements, which the
-    head's side must hold against. The medium pushes with -f; so the moment exerted is that of +f."""
-    c, s, half = motion.c, motion.s, motion.half
-    place = (motion.r_t + 1j * motion.r_n) * (c + 1j * s) / 1j  # lever = i place conj(along)
-    force = (f[0] + 1j * f[1]) * (c + 1j * s)
-    spin = half * f[2]
-    if len(c) > n:  # end caps: the tail's counts with the first element, the head's with the last
-        order = [n, *range(n), n + 1]
-        place, force, spin = place[order], force[order], np.concatenate([0 * spin[:1], spin[:n], 0 * spin[:1]])
-        first = 1
-    else:
-        first = 0
-    joints = place[first : first + n - 1] + half[: n - 1] * (c + 1j * s)[: n - 1]
-    torque = (place.conj() * force).imag + spin
-    until = slice(first, first + n - 1)
-    total_force, total_torque = np.cumsum(force, 0)[until], np.cumsum(torque, 0)[until]
-    return (total_torque - (joints.conj() * total_force).imag).T
+    """(B, n - 1) from drags f (3, n or n + 2, B) that oppose the motion, the two end caps' last if there are any.
+
+    The medium pushes with -f. At a point between two elements the body must hold the tail's side, and pushes the head's
+    side with the opposite: with the moment of -f on the tail's side about that point.
+    """
+    along, half = motion.c + 1j * motion.s, motion.half
+    place = (motion.r_t + 1j * motion.r_n) * along / 1j  # the lever is i place conj(along)
+    force = (f[0] + 1j * f[1]) * along
+    torque = (place.conj() * force).imag + half * f[2]
+    if len(along) > n:  # the tail's cap belongs to the first element's side of every point, the head's to none
+        force[0] += force[n]
+        torque[0] += torque[n]
+    points = place[: n - 1] + half[: n - 1] * along[: n - 1]
+    tail_force, tail_torque = np.cumsum(force[: n - 1], 0), np.cumsum(torque[: n - 1], 0)
+    return ((points.conj() * tail_force).imag - tail_torque).T
