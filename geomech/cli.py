@@ -1,4 +1,4 @@
-"""The command line: geomech run, velocity, connection, ccf, displacement, accuracy, explain, scenes."""
+"""The command line: geomech run, velocity, connection, ccf, displacement, accuracy, sweep, explain, scenes."""
 
 from __future__ import annotations
 
@@ -83,8 +83,7 @@ def connection(
     from geomech import plots
     from geomech.netcdf import save_connection
 
-    if out.suffix != ".nc":
-        raise SceneError(f"cannot write {out}: end the name of a NetCDF file in .nc")
+    _is_netcdf(out)
     scene = _field_scene(name, grid, extent, out, plot, maps=plot is not None)
     save_connection(out, scene)
     if plot:
@@ -164,6 +163,37 @@ def accuracy(
 
 
 @app.command()
+def sweep(
+    name: SceneArgument,
+    over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
+    plot: PlotOption = None,
+):
+    """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
+    from geomech import plots
+    from geomech import sweep as sweeping
+
+    axes = {}
+    for text in over:
+        parameter, equals, values = text.partition("=")
+        if not equals or parameter in axes:
+            raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
+        axes[parameter] = _sweep(f"--over {parameter}", values)
+    _is_netcdf(out)
+    if plot and len(axes) > 2:
+        raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
+    scene = _loaded(name, None, None)
+    _check_outputs(out, plot)
+    with progress(f"sweep of {scene.name}") as bar:
+        results = sweeping.sweep(scene, axes, out.with_name(f".{out.name}.partial"), bar)
+    sweeping.save(out, scene, results)
+    if plot:
+        plots.save(sweeping.draw(scene, results), plot)
+    net = plots.net(results["displacement"])
+    print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.unit}, in {out}")
+
+
+@app.command()
 def explain(name: SceneArgument):
     """Which effects a scene asks for, the engine that follows, what each costs and what it takes away."""
     from geomech.explain import explain as told
@@ -218,6 +248,11 @@ def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool
     with progress(f"field of {scene.name}") as bar:
         scene.compute_field(bar)
     return scene
+
+
+def _is_netcdf(path: Path) -> None:
+    if path.suffix != ".nc":
+        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc")
 
 
 def _check_outputs(output: Path | None, plot: Path | None) -> None:

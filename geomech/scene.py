@@ -304,6 +304,12 @@ def parse(text: str, name: str = "scene") -> Scene:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
         raise SceneError(f"{name} is not TOML: {error}") from None
+    return from_tables(tables, name, text)
+
+
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
+    """The scene of the tables of a TOML text; SceneError if they make none."""
+    tables = dict(tables)
     for table in tables:
         choose(f"{name}: table", table, ("medium", "body", "gait", "numerics", "effects"))
     for table in ("medium", "body", "gait"):

@@ -1,0 +1,168 @@
+"""A scene over a grid of its own parameters: force balance and error at every point, kept as it goes."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import itertools
+import json
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from geomech import estimate
+from geomech.netcdf import COMPONENTS
+from geomech.problem import SceneError, whole_file
+from geomech.scene import Scene, from_tables
+
+LARGEST = 1_000_000  # points
+AMPLITUDE = "gait.amplitude"
+SAVE_EVERY = 2.0  # seconds between savings of what there is
+
+
+def changed(tables: dict, parameter: str, value: float) -> dict:
+    """The tables with one parameter set: "section.key", or "effects.KIND.key" for an effect that is on."""
+    parts = parameter.split(".")
+    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics"):
+        old = tables.get(parts[0], {}).get(parts[1])
+        value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
+        return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
+    if len(parts) == 3 and parts[0] == "effects":
+        effects = tables.get("effects", [])
+        if any(e.get("kind") == parts[1] for e in effects):
+            return {**tables, "effects": [{**e, parts[2]: value} if e["kind"] == parts[1] else e for e in effects]}
+        raise SceneError(f"--over {parameter}: the scene has no effect {parts[1]!r}: add it as [[effects]]")
+    raise SceneError(
+        f"--over {parameter}: name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius"
+    )
+
+
+def sweep(
+    scene: Scene, over: Mapping[str, list[float]], kept: Path | None = None, progress: Callable | None = None
+) -> dict:
+    """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...)} by the direct tier.
+
+    Amplitudes go through the solver as one batch. kept: a file that holds what is done and is taken up again when the
+    same sweep is asked for; removed at the end. SceneError if a point of the grid makes no scene.
+    """
+    names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
+    values = {k: [float(x) for x in over[k]] for k in names}
+    shape = tuple(len(v) for v in values.values())
+    if not names or np.prod(shape) > LARGEST:
+        raise SceneError(f"--over must span 1 to {LARGEST} points, got {int(np.prod(shape)) if names else 0}")
+    outer = [values[k] for k in names if k != AMPLITUDE]
+    if not scene.text:
+        raise SceneError(f"{scene.name}: a sweep takes a scene that was read from TOML")
+    numerics = {k: v for k, v in dataclasses.asdict(scene.numerics).items() if v is not None}
+    tables = {**tomllib.loads(scene.text), "numerics": numerics}
+    points = list(itertools.product(*outer))
+    for corner in itertools.product(*([v[0], v[-1]] for v in outer)):
+        _scene_at(tables, scene, names, corner)  # refuse before computing
+    rows = _taken_up(kept, scene, values)
+    saved = _now()
+    try:
+        for k in range(len(rows), len(points)):
+            rows.append(_row(_scene_at(tables, scene, names, points[k]), values.get(AMPLITUDE)))
+            if progress:
+                progress((k + 1) / len(points))
+            if kept and _now() - saved > SAVE_EVERY:
+                _keep(kept, scene, values, rows)
+                saved = _now()
+    except BaseException:
+        if kept and rows:
+            _keep(kept, scene, values, rows)
+        raise
+    if kept:
+        kept.unlink(missing_ok=True)
+    flat = np.array(rows).reshape(*shape, 4)
+    back = [names.index(k) for k in over]
+    flat = np.transpose(flat, (*back, len(shape)))
+    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], "estimate": flat[..., 3]}
+
+
+def _now() -> float:
+    import time
+
+    return time.monotonic()
+
+
+def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
+    for name, value in zip(names, point):
+        tables = changed(tables, name, value)
+    return from_tables(tables, scene.name, scene.text)
+
+
+def _row(scene: Scene, amplitudes) -> list:
+    """[[x, y, theta, error], ...] for all amplitudes at one point of the other parameters."""
+    a = np.array([scene.gait.amplitude] if amplitudes is None else amplitudes)
+    poses, error = estimate.direct(scene, scene.gait, a, scene.numerics.phases)
+    return np.column_stack([poses, error]).tolist()
+
+
+def _mark(scene: Scene, values) -> str:
+    return hashlib.sha256(json.dumps([scene.text, repr(scene.numerics), values]).encode()).hexdigest()
+
+
+def _keep(kept: Path, scene: Scene, values, rows) -> None:
+    with whole_file(kept) as part:
+        part.write_text(json.dumps({"sweep": _mark(scene, values), "rows": rows}))
+
+
+def _taken_up(kept: Path | None, scene: Scene, values) -> list:
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        found = json.loads(kept.read_text()) if kept else {}
+        if found["sweep"] == _mark(scene, values):
+            return found["rows"]
+    return []
+
+
+def save(path: Path, scene: Scene, results: dict) -> None:
+    """The results as NetCDF: dimensions are the parameters with their dots as underscores, and component."""
+    from scipy.io import netcdf_file
+
+    with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
+        file.title = f"Net displacement per cycle of the scene {scene.name}".encode()
+        file.scene = scene.text.encode()
+        names = []
+        for parameter, values in results["over"].items():
+            names.append(parameter.replace(".", "_").replace("-", "_"))
+            file.createDimension(names[-1], len(values))
+            axis = file.createVariable(names[-1], "f8", (names[-1],))
+            axis[:] = values
+            axis.long_name = parameter
+        file.createDimension("component", 3)
+        file.createDimension("component_length", 5)
+        component = file.createVariable("component", "c", ("component", "component_length"))
+        component[:] = np.array([list(c.ljust(5, "\0")) for c in COMPONENTS], "S1")
+        component._Encoding = "ascii"
+        unit = "body length" if scene.unit == "BL" else "m"
+        for name, dims, units in (
+            ("displacement", (*names, "component"), f"{unit} (x, y), rad (theta)"),
+            ("estimate", tuple(names), "body length"),
+        ):
+            variable = file.createVariable(name, "f8", dims)
+            variable[:] = results[name]
+            variable.units = units
+
+
+def draw(scene: Scene, results: dict):
+    """Net displacement against one parameter, or a map over two; SceneError for more."""
+    from geomech import plots
+
+    over = results["over"]
+    if len(over) > 2:
+        raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
+    net, label = plots.net(results["displacement"]), f"displacement per cycle ({scene.unit})"
+    fig, axes = plots.figure(4.0, 3.0)
+    ax, names = axes[0, 0], list(over)
+    if len(over) == 1:
+        ax.errorbar(over[names[0]], net, yerr=results["estimate"], fmt="o-", color="black", ms=3, lw=1)
+        ax.set(xlabel=names[0], ylabel=label)
+    else:
+        image = ax.pcolormesh(over[names[0]], over[names[1]], net.T, shading="nearest", cmap="viridis", rasterized=True)
+        fig.colorbar(image, ax=ax).set_label(label)
+        ax.set(xlabel=names[0], ylabel=names[1])
+    return fig

@@ -1,0 +1,84 @@
+"""Sweeps over a scene's parameters: right at every point, kept when interrupted, taken up again."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+from test_cli import geomech
+
+from geomech import estimate, scene, sweep
+from geomech.problem import SceneError
+
+GLASS = scene.load("three-link-glass").with_numerics(phases=32)
+
+
+def test_every_point_is_the_scene_there():
+    results = sweep.sweep(GLASS, {"gait.amplitude": [0.5, 1.0, 1.5], "body.length": [1.0, 2.0]})
+    assert results["displacement"].shape == (3, 2, 3)
+    alone = scene.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 "))
+    poses, error = estimate.direct(alone, alone.gait, np.array([1.5]), alone.numerics.phases)
+    np.testing.assert_allclose(results["displacement"][2, 1], poses[0], atol=1e-12)
+    np.testing.assert_allclose(results["estimate"][2, 1], error[0], rtol=1e-6)
+    np.testing.assert_allclose(results["displacement"][:, 1, 0], 2 * results["displacement"][:, 0, 0], rtol=1e-9)
+
+
+def test_effects_and_whole_numbers_can_be_swept():
+    fish = scene.load("sandfish-loose")
+    results = sweep.sweep(fish, {"effects.end-caps.radius": [0.0, 0.1], "numerics.phases": [32, 64]})
+    assert (results["displacement"][0, :, 0] > results["displacement"][1, :, 0]).all()
+
+
+def test_an_interrupted_sweep_is_taken_up(tmp_path, monkeypatch):
+    kept, over = tmp_path / ".s.partial", {"body.length": [1.0, 2.0, 3.0, 4.0], "gait.amplitude": [0.5, 1.0]}
+    whole = sweep.sweep(GLASS, over)
+    row, calls = sweep._row, []
+
+    def failing(at, amplitudes):
+        calls.append(at.body.length)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return row(at, amplitudes)
+
+    monkeypatch.setattr(sweep, "_row", failing)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.sweep(GLASS, over, kept)
+    assert len(json.loads(kept.read_text())["rows"]) == 2
+    again = sweep.sweep(GLASS, over, kept)
+    assert calls == [1.0, 2.0, 3.0, 3.0, 4.0]
+    np.testing.assert_array_equal(again["displacement"], whole["displacement"])
+    assert not kept.exists()
+
+
+def test_another_sweep_does_not_take_up_what_is_not_its_own(tmp_path):
+    kept = tmp_path / ".s.partial"
+    kept.write_text(json.dumps({"sweep": "of something else", "rows": [[[9.0, 9.0, 9.0, 9.0]]]}))
+    results = sweep.sweep(GLASS, {"gait.amplitude": [1.0]}, kept)
+    assert abs(results["displacement"][0, 0]) < 1
+
+
+def test_the_command_writes_netcdf_and_a_plot(tmp_path):
+    args = ["--over", "gait.amplitude=0.5:1.5:3", "--over", "medium.ratio=2,4", "-o", "s.nc", "--plot", "s.png"]
+    code, out, err = geomech("sweep", "three-link-viscous", *args, cwd=tmp_path)
+    assert (code, err) == (0, "")
+    assert out.startswith("6 points")
+    assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "s.png"}
+    with xarray.open_dataset(tmp_path / "s.nc") as data:
+        assert data.displacement.dims == ("gait_amplitude", "medium_ratio", "component")
+        found = data.displacement.sel(gait_amplitude=1.0, medium_ratio=2.0)
+        assert float(np.hypot(*found[:2])) == pytest.approx(0.0512808243, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("over", "said"),
+    [
+        ({"gait.size": [1.0]}, "'size' is unknown"),
+        ({"gait": [1.0]}, "name a parameter such as"),
+        ({"effects.end-caps.radius": [0.1]}, "no effect 'end-caps'"),
+        ({"body.length": [1.0, -1.0]}, "length must be finite"),
+        ({}, "must span 1 to"),
+    ],
+)
+def test_bad_sweeps_are_refused_before_computing(over, said):
+    with pytest.raises(SceneError, match=said):
+        sweep.sweep(GLASS, over)
