@@ -16,7 +16,7 @@ GLASS = scene.load("three-link-glass").with_numerics(phases=32)
 def test_every_point_is_the_scene_there():
     results = sweep.sweep(GLASS, {"gait.amplitude": [0.5, 1.0, 1.5], "body.length": [1.0, 2.0]})
     assert results["displacement"].shape == (3, 2, 3)
-    alone = scene.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 "))
+    alone = scene.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 ")).with_numerics(phases=32)
     poses, error = estimate.direct(alone, alone.gait, np.array([1.5]), alone.numerics.phases)
     np.testing.assert_allclose(results["displacement"][2, 1], poses[0], atol=1e-12)
     np.testing.assert_allclose(results["estimate"][2, 1], error[0], rtol=1e-6)
