@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from geomech.scene import METHODS, Scene
-from rft.effects import KINDS, PREMISES
+from rft.effects import KINDS
 
 
 def explain(scene: Scene) -> str:
@@ -19,12 +19,15 @@ def explain(scene: Scene) -> str:
     off = [name for name in KINDS if name not in on]
     lines.append("off, not evaluated: " + (", ".join(off) or "none"))
     lines.append(
-        "engine: algebraic (the balance of forces at every shape, all shapes at once), since no effect that is on breaks "
-        + " or ".join(PREMISES)
+        "engine: algebraic (the balance of forces at every shape, all shapes at once): nothing remembers, no mass"
     )
     two = scene.body.joints == 2
     lines.append("tiers: " + ", ".join(m for m in METHODS if m == "adapted" or m in scene.methods))
-    if not two:
+    if any(e.breaks for e in scene.effects):
+        lines.append(
+            "not available: connection, CCF, area, path and harmonic tiers: an effect breaks what they rest on"
+        )
+    elif not two:
         lines.append(
             f"not available: CCF maps, area and harmonic tiers: they take two joints, this body has {scene.body.joints}"
         )

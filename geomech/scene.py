@@ -127,7 +127,7 @@ class Scene:
     @property
     def linear(self) -> bool:
         """Whether xi = A alphadot holds exactly, so that path and direct tier are one."""
-        return is_linear(self.medium) and not any(isinstance(e, rft.SkinFriction) for e in self.effects)
+        return is_linear(self.medium) and not self.effects
 
     @property
     def unit(self) -> str:
@@ -137,6 +137,8 @@ class Scene:
     @property
     def methods(self) -> tuple[str, ...]:
         """The tiers of a plain study: area and harmonic take two joints, path no more than a grid can span."""
+        if any(e.breaks for e in self.effects):
+            return ("direct",)
         if self.body.joints == 2:
             return "area", "path", "harmonic", "direct"
         return ("path", "direct") if self.body.joints <= 3 else ("direct",)
@@ -144,8 +146,8 @@ class Scene:
     @property
     def lookups(self) -> tuple[str, ...]:
         """The tiers that look a precomputed table up; in a linear medium the path is the direct tier."""
-        two = ("area", "adapted") if self.body.joints == 2 else ("adapted",)
-        return two if self.linear else tuple(m for m in METHODS if m in (*self.methods, *two))[:-1]
+        tables = (*self.methods[:-1], "adapted")
+        return tuple(m for m in METHODS if m in tables and not (self.linear and m in ("path", "harmonic")))
 
     @property
     def direction_count(self) -> int:
@@ -159,6 +161,7 @@ class Scene:
         return max(24, (8 * self.numerics.harmonics) // 5)
 
     def _axes(self):
+        self.require_connection()
         n, joints = self.numerics, self.body.joints
         if n.grid**joints > LARGEST_GRID:
             raise SceneError(
@@ -225,6 +228,16 @@ class Scene:
             return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
         # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
+
+    def require_connection(self) -> None:
+        """SceneError naming the effect if one that is on breaks what a connection and its CCF rest on."""
+        kinds = {kind: name for name, kind in EFFECTS.items()}
+        for effect in self.effects:
+            if effect.breaks:
+                raise SceneError(
+                    f"{self.name}: no connection or CCF with the effect {kinds[type(effect)]}, which breaks "
+                    f"{', '.join(sorted(effect.breaks))}: use the direct tier, or drop the effect"
+                )
 
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""

@@ -2,7 +2,7 @@
 
 from rft.balance import Solution, body_velocity
 from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
-from rft.effects import EndCaps, SkinFriction
+from rft.effects import EndCaps, GrainInertia, SkinFriction
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
 from rft.work import Work, work
 
@@ -14,6 +14,7 @@ __all__ = [
     "ConstantCurvature",
     "Coulomb",
     "EndCaps",
+    "GrainInertia",
     "Granular",
     "Medium",
     "Serpenoid",

@@ -105,7 +105,7 @@ def body_velocity(
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
-        solved = problem.solve(alpha[:, moving], alphadot[:, moving] / speed[moving], threads)
+        solved = problem.solve(alpha[:, moving], alphadot[:, moving] / speed[moving], speed[moving], threads)
         scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
         xi[:, moving] = solved.xi * scale
         residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
@@ -181,7 +181,8 @@ class _Problem:
         self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
         self.linear = medium.dry == ()
 
-    def solve(self, alpha, alphadot, threads) -> _Solved:
+    def solve(self, alpha, alphadot, speed, threads) -> _Solved:
+        self.speed = speed
         size = alpha.shape[1]
         out = _Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
@@ -211,7 +212,7 @@ class _Problem:
     def _start(self, widest: float, index, motion: Motion) -> _State:
         """The viscous solution, which is a dry law rounded off without end, as the first step from rest."""
         size = index.size
-        net = motion.assembled(self.load(*motion.v, np.full(size, 1e3)))
+        net = motion.assembled(self.load(*motion.v, np.full(size, 1e3), self.speed[index]))
         first = self.regularisation if self.linear else max(widest, self.regularisation)
         eps = np.full(size, first)
         dx = -_solve3(net[:, 1:], net[:, 0])
@@ -231,7 +232,7 @@ class _Problem:
     def _step(self, s: _State, descent: Descent) -> np.ndarray:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.motion.carried(s.dx)
-        load = self.load(*v, s.eps_next)
+        load = self.load(*v, s.eps_next, self.speed[s.index])
         net = s.motion.assembled(load)
         residual = np.abs(net[:, 0]).max(0) / self.unit
         kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)

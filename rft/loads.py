@@ -31,7 +31,9 @@ SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses a
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
-LoadLaw = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (a, m, w, eps) -> (3, 4, n, B)
+# (a, m, w, eps, speed) -> (3, 4, n, B). speed (B,) is |alphadot|, by which all velocities were divided; only laws that
+# know time ask for it.
+LoadLaw = Callable[..., np.ndarray]
 
 
 def k_function(z: np.ndarray, one_minus_z: np.ndarray) -> np.ndarray:
@@ -87,7 +89,7 @@ def exact(medium: Medium) -> LoadLaw:
     q, k_t, k_n = np.array(terms).reshape(-1, 3).T
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
-    def load(a, m, w, eps):
+    def load(a, m, w, eps, speed=1.0):
         out = np.zeros((3, 4, *a.shape))
         if any(medium.viscous):
             _add_viscous(out, medium.viscous, a, m, w)
@@ -137,7 +139,7 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
     """The load by a quadrature rule on [-1, 1] (weights summing to 1), for any medium with a `traction`."""
     s, weight = (np.asarray(x, float)[:, None, None] for x in (nodes, weights))
 
-    def load(a, m, w, eps):
+    def load(a, m, w, eps, speed=1.0):
         u = m + w * s
         a = np.broadcast_to(a, u.shape)
         (f_t, f_n), slopes = _pointwise(medium, a, u, eps)

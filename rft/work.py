@@ -47,7 +47,11 @@ def work(
     motion = body.motion(alpha, alphadot)
     speed = np.sqrt((alphadot**2).sum(0))
     v = motion.v + motion.carried(xi)
-    f = load(*v, regularisation * np.where(speed > 0, speed, 1.0))[:, 0] * motion.weight
+    # At velocities over |alphadot|, as the balance is solved; a viscous law is proportional to them, a dry one does not know.
+    scale = np.where(speed > 0, speed, 1.0)
+    f = load(*(v / scale), np.full_like(scale, regularisation), scale)[:, 0] * motion.weight
+    if medium.dry == ():
+        f = f * scale
     power = (f * v).sum((0, 1)) * body.length
     n = inner.motion(alpha, alphadot).half.shape[0]
     slip = np.average(np.arctan2(np.abs(v[1, :n]), np.abs(v[0, :n])), 0, motion.half[:n, 0])

@@ -18,6 +18,7 @@ from rft import (
     ConstantCurvature,
     Coulomb,
     EndCaps,
+    GrainInertia,
     Granular,
     Serpenoid,
     SkinFriction,
@@ -136,6 +137,8 @@ def test_long_bodies_approach_the_endless_wave():
 
 
 EFFECTS = {
+    "grain-inertia": (lambda x: GrainInertia(frequency=x, length=1.0, depth=0.1), 2.0),
+    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.0, length=0.1, depth=0.1, strength=x), 1.0),
     "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1.0),
     "end-caps": (lambda x: EndCaps(radius=0.1 * x, tail=4.0), 1.0),
 }
@@ -180,9 +183,9 @@ def test_explain_names_effects_engine_and_losses():
     assert "on:  end-caps" in told
     assert "engine: algebraic" in told
     assert "not available: CCF maps" in told
-    assert "off, not evaluated: end-caps, skin-friction" in explain(scene.load("three-link-glass")).replace(
-        "skin-friction, end-caps", "end-caps, skin-friction"
-    )
+    plain = explain(scene.load("three-link-glass"))
+    assert "off, not evaluated: skin-friction, end-caps, grain-inertia" in plain
+    assert "not available" not in plain
 
 
 BAD = [
@@ -270,3 +273,66 @@ def test_fig10(tmp_path):
     assert numbers["lead"][len(numbers["lead"]) // 2] == pytest.approx(np.pi / 2, abs=0.15)
     plots.save(fig10_neuromechanics.draw(numbers), tmp_path / "f.png")
     assert (tmp_path / "f.png").stat().st_size > 15_000
+
+
+def test_squared_speed_is_integrated_exactly():
+    from rft.effects.grain_inertia import squared_speed_load
+
+    rng = np.random.default_rng(0)
+    m, w = rng.normal(size=(2, 60))
+    m[:10], w[10:20], w[20:30] = 0.0, 0.0, m[20:30] * rng.choice([-1.0, 1.0], 10)
+    x, weight = np.polynomial.legendre.leggauss(3)
+    pivot = np.clip(np.where(w == 0, -1.0, -m / np.where(w == 0, 1.0, w)), -1, 1)
+    exact = np.zeros((2, 60))
+    for low, high in ((-1.0, pivot), (pivot, 1.0)):  # a polynomial on either side, for which three nodes are exact
+        s = (low + high) / 2 + (high - low) / 2 * x[:, None]
+        u = m + w * s
+        part = np.array([np.abs(u) * u, s * np.abs(u) * u])
+        exact += (weight[:, None] * part).sum(1) * (high - low) / 4
+    got = squared_speed_load(m, w)
+    np.testing.assert_allclose(got[:, 0], exact, atol=1e-14)
+    h = 1e-6
+    np.testing.assert_allclose(
+        got[:, 2], (squared_speed_load(m + h, w) - squared_speed_load(m - h, w))[:, 0] / (2 * h), atol=1e-5
+    )
+    np.testing.assert_allclose(
+        got[:, 3], (squared_speed_load(m, w + h) - squared_speed_load(m, w - h))[:, 0] / (2 * h), atol=1e-5
+    )
+
+
+INERTIAL = (
+    scene.load("three-link-glass").text
+    + '[[effects]]\nkind = "grain-inertia"\nfrequency = {f}\nlength = 0.3\ndepth = 0.05'
+)
+
+
+def test_with_grain_inertia_frequency_matters():
+    slow, fast = (scene.parse(INERTIAL.format(f=f)) for f in (0.01, 3.0))
+    plain = scene.load("three-link-glass").displacement("direct")
+    np.testing.assert_allclose(slow.displacement("direct"), plain, atol=1e-4)
+    assert np.abs(fast.displacement("direct") - plain).max() > 5e-3
+    alpha, alphadot = fast.gait.cycle(16)
+    twice = fast.velocity(alpha, 2 * alphadot) / 2
+    assert np.abs(twice - fast.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
+
+
+@pytest.mark.parametrize("method", ["area", "path", "harmonic"])
+def test_what_an_effect_breaks_is_refused_by_name(method):
+    inertial = scene.parse(INERTIAL.format(f=1.0))
+    assert inertial.methods == ("direct",)
+    with pytest.raises(SceneError, match="the effect grain-inertia, which breaks rate independence"):
+        inertial.displacement(method)
+    assert "breaks rate independence" in explain(inertial)
+    assert "not available: connection, CCF" in explain(inertial)
+    np.testing.assert_allclose(inertial.displacement("adapted"), inertial.displacement("direct"), atol=1e-3)
+
+
+def test_the_cost_of_effects_draws(tmp_path):
+    from figures import effects_cost
+    from geomech import plots
+
+    numbers = effects_cost.compute(phases=16, repeats=1)
+    assert numbers["none"]["ratio"] == 1.0
+    assert set(numbers) == set(effects_cost.SETS)
+    plots.save(effects_cost.draw(numbers), tmp_path / "f.png")
+    assert (tmp_path / "f.png").stat().st_size > 8_000

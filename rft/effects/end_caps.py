@@ -54,8 +54,8 @@ class EndCaps(Effect):
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
         cap = _CapLaw(medium)
 
-        def with_caps(a, m, w, eps):
-            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps), cap.at(a[-2:], m[-2:], eps)], 2)
+        def with_caps(a, m, w, eps, speed=1.0):
+            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps, speed), cap.at(a[-2:], m[-2:], eps)], 2)
 
         return with_caps
 

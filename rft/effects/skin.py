@@ -35,8 +35,8 @@ class SkinFriction(Effect):
     def load(self, load, medium):
         ahead, astern = self.forward / self.reference, self.backward / self.reference
 
-        def scaled(a, m, w, eps):
-            out = load(a, m, w, eps)
+        def scaled(a, m, w, eps, speed=1.0):
+            out = load(a, m, w, eps, speed)
             out[0] *= np.where(a >= 0, ahead, astern)
             return out
 
