@@ -48,8 +48,9 @@ def whole_folder(path: str | Path):
 def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
     """Compute everything and write it; returns the displacement tables by gait."""
     gaits = [scene.gait]
-    if scene.body.joints == 2:
+    if scene.three_link:  # the two gaits of Fig. 11(e) beside the scene's own
         gaits += [g for g in (Circle(reverse=True), Butterfly()) if type(g) is not type(scene.gait)]
+    if "area" in scene.methods:
         scene.compute_field(progress)
         save_connection(folder / "connection.nc", scene)
         _save(plots.connection_figure(scene.fitted, scene.unit), folder / "connection")

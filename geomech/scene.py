@@ -130,6 +130,11 @@ class Scene:
         return is_linear(self.medium) and not self.effects
 
     @property
+    def three_link(self) -> bool:
+        """Whether the body is the three-link swimmer, for which the published gaits were made."""
+        return isinstance(self.body, rft.Chain) and self.body.joints == 2
+
+    @property
     def unit(self) -> str:
         """Of lengths in this scene: body lengths, or metres where the body has a size."""
         return "BL" if self.body.length == 1.0 else "m"
