@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from geomech import estimate, predict
+from geomech import estimate
 from geomech.scene import Scene
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
@@ -47,7 +47,7 @@ class Knob:
     def applies(self, scene: Scene) -> bool:
         if scene.linear and (self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")):
             return False
-        return scene.body.joints == 2 or self.tier in ("direct", "adapted")
+        return self.tier in scene.tiers
 
 
 KNOBS = (
@@ -75,7 +75,8 @@ def study(scene: Scene, progress: Callable | None = None) -> dict:
     "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}."""
     amplitudes = scene.gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
-    truth = predict.direct(finest.velocity, scene.gait, amplitudes, TRUTH_PHASES)
+    phases = TRUTH_PHASES if scene.engine == "algebraic" else TRUTH_PHASES // 4
+    truth = finest.with_numerics(phases=phases).displacement("direct", None, amplitudes)
     knobs = [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
     lines = []
     for done, knob in enumerate(knobs):

@@ -240,6 +240,7 @@ def _loaded(name: str, grid: int | None, extent: float | None):
 def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool):
     """The scene with its field computed, once its outputs are known to be writable. maps: they show shape space."""
     scene = _loaded(name, grid, extent)
+    scene.require_connection()
     if maps and scene.body.joints != 2:
         raise SceneError(
             f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from geomech.scene import METHODS, Scene
-from rft.effects import KINDS
+from geomech.scene import ALGEBRAIC, Scene
+from rft.effects import ENGINES, KINDS, PREMISES
 
 
 def explain(scene: Scene) -> str:
@@ -18,17 +18,25 @@ def explain(scene: Scene) -> str:
         )
     off = [name for name in KINDS if name not in on]
     lines.append("off, not evaluated: " + (", ".join(off) or "none"))
-    lines.append(
-        "engine: algebraic (the balance of forces at every shape, all shapes at once): nothing remembers, no mass"
-    )
-    two = scene.body.joints == 2
-    lines.append("tiers: " + ", ".join(m for m in METHODS if m == "adapted" or m in scene.methods))
-    if any(e.breaks for e in scene.effects):
-        lines.append(
-            "not available: connection, CCF, area, path and harmonic tiers: an effect breaks what they rest on"
-        )
-    elif not two:
+    lines.append(f"engine: {scene.engine} ({ENGINES[scene.engine]}): {_why(scene, kinds)}")
+    lines.append("tiers: " + ", ".join(scene.tiers))
+    if blame := ", ".join(kinds[type(e)] for e in scene.effects if e.breaks):
+        lost = "connection, CCF, area, path and harmonic tiers"
+        if scene.engine != "algebraic":
+            lost += ", adapted tier, velocity at a single shape"
+        lines.append(f"not available: {lost}: {blame} breaks what they rest on")
+    elif scene.body.joints != 2:
         lines.append(
             f"not available: CCF maps, area and harmonic tiers: they take two joints, this body has {scene.body.joints}"
         )
     return "\n".join(lines)
+
+
+def _why(scene: Scene, kinds) -> str:
+    """What makes the scene's engine necessary."""
+    reasons = [
+        f"with {kinds[type(e)]} {PREMISES[premise].split(':')[0]}"
+        for e in scene.effects
+        for premise in sorted(e.breaks & ALGEBRAIC)
+    ]
+    return "; ".join(reasons) or "nothing remembers, places are alike, no mass"

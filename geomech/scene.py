@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -25,6 +26,7 @@ from geomech.field import Field
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.problem import SceneError, choose
+from geomech.simulate import displacement
 from rft.bodies import KINDS as BODIES
 from rft.effects import KINDS as EFFECTS
 from rft.loads import element_load
@@ -32,6 +34,7 @@ from rft.media import LAWS, is_linear
 
 METHODS = ("area", "adapted", "path", "harmonic", "direct")  # cheapest look-up first
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+ALGEBRAIC = {"symmetry", "no memory", "no inertia"}  # premises of a body velocity that follows from shape alone
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Numerics:
     """How finely to compute; all optional. loads: "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation: body
     lengths per radian (rft.balance). tolerance: normalised residual. directions: of alphadot in the least-squares
     fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on either side.
-    interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's table."""
+    interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's table.
+    cycles: of a march (rft.march); if left out until they repeat, one where effects break symmetry."""
 
     loads: str = "exact"
     regularisation: float = 1e-6
@@ -51,6 +55,7 @@ class Numerics:
     phases: int = 256
     harmonics: int = 15
     curves: int = 24
+    cycles: int | None = None
 
     def __post_init__(self):
         for name, low, high in (("regularisation", 1e-12, 1.0), ("tolerance", 1e-13, 1.0), ("extent", 1e-6, 100.0)):
@@ -62,6 +67,7 @@ class Numerics:
             ("grid", 4, 4096),
             ("phases", 8, 1_000_000),
             ("curves", 4, 4096),
+            ("cycles", 1, 10_000),
         ):
             value = getattr(self, name)
             if value is not None and not (low <= value <= high and int(value) == value):
@@ -70,6 +76,16 @@ class Numerics:
             raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
         if self.interpolation not in (1, 2, 3, 4, 5) or self.interpolation >= self.grid:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
+
+
+class Cycle(NamedTuple):
+    """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
+    in the frame at its start. residual: (...), the largest of the cycle. work: `rft.Work`, (..., N) each, or None."""
+
+    xi: np.ndarray
+    net: np.ndarray
+    residual: np.ndarray
+    work: rft.Work | None
 
 
 @dataclass(frozen=True)
@@ -100,12 +116,14 @@ class Scene:
             if kinds.count(type(effect)) > 1:
                 raise SceneError(f"{self.name}: [[effects]] {type(effect).__name__} is asked for twice: keep one")
             try:
-                effect.load(None, self.medium)
+                effect.load(None, self.medium, self.body)
             except ValueError as error:
                 raise SceneError(f"{self.name}: [[effects]] {error}: drop it, or change the medium") from None
 
     def solve(self, alpha, alphadot) -> rft.Solution:
-        """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`."""
+        """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. SceneError
+        if shape alone does not settle them."""
+        self._refuse("body velocity from shape alone", ALGEBRAIC, "run a whole gait by the direct tier")
         n = self.numerics
         return rft.body_velocity(
             self.medium, self.body, alpha, alphadot,
@@ -123,6 +141,28 @@ class Scene:
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) in the body's frame; RuntimeError if any sample did not converge."""
         return self.solve(alpha, alphadot).checked().xi
+
+    @property
+    def engine(self) -> str:
+        """Of `rft.effects.ENGINES`, the cheapest that is right for the scene's effects."""
+        return rft.effects.engine(self.effects)
+
+    def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
+        """A gait, or the scene's own, run by the scene's engine for amplitudes (...,), all at once. RuntimeError if a force
+        balance did not converge or a march did not settle."""
+        gait, n = gait or self.gait, self.numerics
+        alpha, alphadot = gait.cycle(phases or n.phases, amplitudes)
+        if self.engine == "algebraic":
+            solution = self.solve(alpha, alphadot).checked()
+            done = self.work(alpha, alphadot, solution.xi) if work else None
+            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), done)
+        march = rft.march(
+            self.medium, self.body, alpha, alphadot, effects=self.effects, cycles=n.cycles, with_work=work,
+            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
+        ).checked()  # fmt: skip
+        # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
+        net = march.displacement if "symmetry" in rft.effects.broken(self.effects) else displacement(march.xi)
+        return Cycle(march.xi, net, march.residual, march.work)
 
     @property
     def linear(self) -> bool:
@@ -151,8 +191,13 @@ class Scene:
     @property
     def lookups(self) -> tuple[str, ...]:
         """The tiers that look a precomputed table up; in a linear medium the path is the direct tier."""
-        tables = (*self.methods[:-1], "adapted")
-        return tuple(m for m in METHODS if m in tables and not (self.linear and m in ("path", "harmonic")))
+        return tuple(m for m in self.tiers if m != "direct" and not (self.linear and m in ("path", "harmonic")))
+
+    @property
+    def tiers(self) -> tuple[str, ...]:
+        """All of METHODS that this scene allows."""
+        adapted = ("adapted",) if self.engine == "algebraic" else ()
+        return tuple(m for m in METHODS if m in (*self.methods, *adapted))
 
     @property
     def direction_count(self) -> int:
@@ -225,23 +270,31 @@ class Scene:
         if method == "area":
             return predict.area(self.curvature, gait, amplitudes, phases)
         if method == "adapted":
+            self._refuse("adapted tier", ALGEBRAIC, "use the direct tier")
             a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
             return self.family(gait, float(a.max(initial=0.0))).area(a)
         if method == "path" and self.needs_field(method):
             return predict.path(self.fitted, gait, amplitudes, phases)
         if method == "harmonic" and not self.linear:
             return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
+        if self.engine != "algebraic":
+            if method != "direct":
+                self.require_connection()
+            return self.cycle(gait, amplitudes).net
         # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
 
     def require_connection(self) -> None:
         """SceneError naming the effect if one that is on breaks what a connection and its CCF rest on."""
+        self._refuse("connection or CCF", set(rft.effects.PREMISES), "use the direct tier")
+
+    def _refuse(self, what: str, premises: set[str], instead: str) -> None:
         kinds = {kind: name for name, kind in EFFECTS.items()}
         for effect in self.effects:
-            if effect.breaks:
+            if effect.breaks & premises:
                 raise SceneError(
-                    f"{self.name}: no connection or CCF with the effect {kinds[type(effect)]}, which breaks "
-                    f"{', '.join(sorted(effect.breaks))}: use the direct tier, or drop the effect"
+                    f"{self.name}: no {what} with the effect {kinds[type(effect)]}, which breaks "
+                    f"{', '.join(sorted(effect.breaks))}: {instead}, or drop the effect"
                 )
 
     def needs_field(self, method: str) -> bool:

@@ -2,7 +2,8 @@
 
 from rft.balance import Solution, body_velocity
 from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
-from rft.effects import EndCaps, GrainInertia, SkinFriction
+from rft.effects import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
+from rft.march import March, march
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
 from rft.work import Work, work
 
@@ -10,18 +11,24 @@ __all__ = [
     "CATALOGUE",
     "Backbone",
     "Body",
+    "BodyInertia",
     "Chain",
     "ConstantCurvature",
     "Coulomb",
+    "DepthProfile",
+    "DisturbedGround",
     "EndCaps",
     "GrainInertia",
     "Granular",
+    "March",
     "Medium",
     "Serpenoid",
     "SkinFriction",
     "Solution",
+    "Transient",
     "Viscous",
     "Work",
     "body_velocity",
+    "march",
     "work",
 ]

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Motion
-from rft.effects.base import Effect
-from rft.loads import LoadLaw, element_load, parse
+from rft.effects.base import Effect, applied, broken, engine
+from rft.loads import Known, element_load, parse
 from rft.media.base import Medium, real_array
 
 LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
@@ -51,6 +51,7 @@ ATTEMPTS = (
     Descent(0.3, 0.3, 1e-6, np.inf, 500),
     Descent(1.0, 0.6, 1e-8, np.inf, 3000),
 )
+WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
 
 
 class Solution(NamedTuple):
@@ -96,16 +97,20 @@ def body_velocity(
     threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
     listed is not evaluated. Raises ValueError for shapes or values that make no sense.
     """
-    alpha, alphadot = _checked_input(body, alpha, alphadot, regularisation, tolerance)
+    if engine(effects) != "algebraic":
+        lost = ", ".join(sorted(broken(effects)))
+        raise ValueError(f"no body velocity follows from shape alone where effects break {lost}: use rft.march")
+    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = np.sqrt((alphadot * alphadot).sum(0))
     moving = speed > 0
-    problem = _Problem(medium, body, loads, regularisation, tolerance, effects)
+    problem = Balance(medium, body, loads, regularisation, tolerance, effects)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
-        solved = problem.solve(alpha[:, moving], alphadot[:, moving] / speed[moving], speed[moving], threads)
+        shape, rate = alpha[:, moving], alphadot[:, moving] / speed[moving]
+        solved = problem.solve(lambda i: problem.body.motion(shape[:, i], rate[:, i]), speed[moving], threads)
         scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
         xi[:, moving] = solved.xi * scale
         residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
@@ -113,7 +118,7 @@ def body_velocity(
     return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
-def _checked_input(body, alpha, alphadot, regularisation, tolerance):
+def checked_input(body, alpha, alphadot, regularisation, tolerance):
     for name, value in (("regularisation", regularisation), ("tolerance", tolerance)):
         if not (isinstance(value, (int, float, np.floating)) and 1e-15 <= value <= 1e3):
             raise ValueError(f"{name} must be a finite number > 0, 1e-15 to 1e3, got {value!r}")
@@ -134,7 +139,9 @@ def _checked_input(body, alpha, alphadot, regularisation, tolerance):
         raise ValueError(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
 
 
-class _Solved(NamedTuple):
+class Solved(NamedTuple):
+    """xi: (3, B), velocities over the sample's scale; the others (B,)."""
+
     xi: np.ndarray
     residual: np.ndarray
     iterations: np.ndarray
@@ -167,35 +174,74 @@ class _State:
         return _State(motion=motion, **{k: np.concatenate(x, -1) for k, x in parts.items()})
 
 
-class _Problem:
-    """A medium, a body and how finely to solve; `solve` takes samples as (joints, B), alphadot of norm 1."""
+class Inertia(NamedTuple):
+    """What mass adds to a balance of forces, in its units: weight (rate (M xi + shape) - past) + turning x, B samples.
+
+    M: (3, 3, B) and shape: (3, B), momentum of the body per unit mass, from its velocity and from its change of shape, all
+    over the scale. rate: 1/rad, of the time step. past: (3, B), what earlier momenta contribute. weight: (B,), inertia
+    over the balance's unit. turning: (B,), that times the scale, for the frame's own motion.
+    """
+
+    M: np.ndarray
+    shape: np.ndarray
+    rate: float
+    past: np.ndarray
+    weight: np.ndarray
+    turning: np.ndarray
+
+    def __call__(self, xi: np.ndarray, index) -> np.ndarray:
+        """(3, 4, B): the term and its derivatives with respect to xi (3, B), for the samples ``index``."""
+        M, shape, past, weight, turning = (x[..., index] for x in (self.M, self.shape, *self[3:]))
+        momentum = np.concatenate([(np.einsum("ijb,jb->ib", M, xi) + shape)[:, None], M], 1)
+        out = weight * self.rate * momentum + turning * _coadjoint(xi[:, None], momentum)
+        out[:, 0] -= weight * past
+        for k, unit in enumerate(np.eye(3)[:, :, None]):
+            out[:, k + 1] += turning * _coadjoint(unit, momentum[:, 0])
+        return out
+
+
+def _coadjoint(xi, p):
+    """Rate at which momentum p (3, ...) seems to change in a frame that moves with xi, for a body that keeps it."""
+    x, y, turn = xi
+    return np.stack([-turn * p[1], turn * p[0], x * p[1] - y * p[0]])
+
+
+class Balance:
+    """A medium, a body and how finely to solve; `solve` takes the motion of samples under a scale of their velocities."""
+
+    inertia: Inertia | None = None
 
     def __init__(self, medium, body: Body, loads: str, regularisation: float, tolerance: float, effects=()):
-        self.body, self.regularisation = body, regularisation
-        self.load: LoadLaw = element_load(medium, loads)
-        for effect in effects:
-            self.load, self.body = effect.load(self.load, medium), effect.body(self.body)
+        self.regularisation = regularisation
+        self.load, self.body = applied(effects, element_load(medium, loads), medium, body)
         self.nodes = parse(loads)[1]
         axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
         self.unit = axial
         self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
         self.linear = medium.dry == ()
 
-    def solve(self, alpha, alphadot, speed, threads) -> _Solved:
-        self.speed = speed
-        size = alpha.shape[1]
-        out = _Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
+    def weigh(self, inertia: Inertia) -> None:
+        """Let mass take part."""
+        self.inertia = inertia
+        self.limit += 1e-14 * inertia.rate * float(np.max(inertia.weight)) / self.unit
+
+    def solve(self, motion: Callable, speed, threads=None, guess=None) -> Solved:
+        """Velocities over ``speed`` (B,), the samples' scale. motion(index): `Motion` of those samples at velocities over
+        their scale. guess: (3, B), tried first."""
+        self.motion, self.speed, self.guess = motion, speed, guess
+        size = speed.size
+        out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
-        for descent in ATTEMPTS:
-            self._attempt(alpha, alphadot, todo, descent, out, threads)
+        for descent in ((WARM,) if guess is not None else ()) + ATTEMPTS:
+            self._attempt(todo, descent, out, threads)
             todo = np.flatnonzero(out.residual > self.limit)
             if not todo.size:
                 break
         return out
 
-    def _attempt(self, alpha, alphadot, todo, descent: Descent, out: _Solved, threads) -> None:
+    def _attempt(self, todo, descent: Descent, out: Solved, threads) -> None:
         """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
-        elements = self.body.motion(alpha[:, :1], alphadot[:, :1]).half.shape[0] * self.nodes
+        elements = self.motion(todo[:1]).half.shape[0] * self.nodes
         batch = max(16, ELEMENTS_TOGETHER // elements)
 
         def work(share):
@@ -203,23 +249,34 @@ class _Problem:
             while queue or state is not None:
                 while queue and (state is None or state.index.size <= batch // 2):
                     index = queue.pop()
-                    fresh = self._start(descent.widest, index, self.body.motion(alpha[:, index], alphadot[:, index]))
+                    fresh = self._start(descent, index, self.motion(index))
                     state = fresh if state is None else _State.join([state, fresh])
                 state = self._advance(state, descent, out)
 
         _map(work, np.array_split(todo, _workers(threads, todo.size // (2 * batch))))
 
-    def _start(self, widest: float, index, motion: Motion) -> _State:
-        """The viscous solution, which is a dry law rounded off without end, as the first step from rest."""
+    def _start(self, descent: Descent, index, motion: Motion) -> _State:
+        """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
         size = index.size
-        net = motion.assembled(self.load(*motion.v, np.full(size, 1e3), self.speed[index]))
-        first = self.regularisation if self.linear else max(widest, self.regularisation)
-        eps = np.full(size, first)
-        dx = -_solve3(net[:, 1:], net[:, 0])
         at_rest, worst = np.zeros((3, size)), np.full(size, np.inf)
+        first = self.regularisation if self.linear else max(descent.widest, self.regularisation)
+        eps = np.full(size, first)
+        if descent is WARM:
+            dx = self.guess[:, index]
+        else:
+            net = self._net(motion, motion.v, at_rest, np.full(size, 1e3), index)[1]
+            dx = -_solve3(net[:, 1:], net[:, 0])
         return _State(index, motion, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
 
-    def _advance(self, s: _State, descent: Descent, out: _Solved) -> _State | None:
+    def _net(self, motion: Motion, v, xi, eps, index) -> tuple[np.ndarray, np.ndarray]:
+        """Element loads (3, 4, n, B) and what they, and the mass, come to on the frame, (3, 4, B)."""
+        load = self.load(*v, eps, Known(self.speed[index], index))
+        net = motion.assembled(load)
+        if self.inertia is not None:
+            net += self.inertia(xi, index)
+        return load, net
+
+    def _advance(self, s: _State, descent: Descent, out: Solved) -> _State | None:
         """One step of all samples; those that end are written to ``out`` and leave. None when none are left."""
         kept = self._step(s, descent)
         ended = kept & (s.eps <= self.regularisation) & (s.residual <= self.limit)
@@ -232,8 +289,7 @@ class _Problem:
     def _step(self, s: _State, descent: Descent) -> np.ndarray:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.motion.carried(s.dx)
-        load = self.load(*v, s.eps_next, self.speed[s.index])
-        net = s.motion.assembled(load)
+        load, net = self._net(s.motion, v, s.xi + s.dx, s.eps_next, s.index)
         residual = np.abs(net[:, 0]).max(0) / self.unit
         kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
         s.iterations = s.iterations + 1
@@ -265,7 +321,7 @@ class _Problem:
         dx = _solve3(net[:, 1:], right)
         return np.clip(dx, -LARGEST_STEP, LARGEST_STEP)
 
-    def _write(self, s: _State, ended: np.ndarray, out: _Solved) -> None:
+    def _write(self, s: _State, ended: np.ndarray, out: Solved) -> None:
         i = s.index[ended]
         out.xi[:, i], out.residual[i] = s.xi[:, ended], s.residual[ended]
         out.iterations[i] += s.iterations[ended]

@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,24 @@ SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses a
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
-# (a, m, w, eps, speed) -> (3, 4, n, B). speed (B,) is |alphadot|, by which all velocities were divided; only laws that
-# know time ask for it.
+class Known(NamedTuple):
+    """What a law may ask beside the velocities of the elements it is given.
+
+    speed: (B,) or a number, by which all velocities were divided, rad per unit time. index: which samples of the whole
+    batch these are.
+    """
+
+    speed: np.ndarray | float = 1.0
+    index: np.ndarray | slice = slice(None)
+
+    def of(self, x):
+        """A parameter or memory of these samples, from one with the whole batch on its last axis; a number as it is."""
+        return x[..., self.index] if isinstance(x, np.ndarray) and x.ndim else x
+
+
+ALONE = Known()
+
+# (a, m, w, eps, known) -> (3, 4, n, B)
 LoadLaw = Callable[..., np.ndarray]
 
 
@@ -89,7 +106,7 @@ def exact(medium: Medium) -> LoadLaw:
     q, k_t, k_n = np.array(terms).reshape(-1, 3).T
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
-    def load(a, m, w, eps, speed=1.0):
+    def load(a, m, w, eps, known=ALONE):
         out = np.zeros((3, 4, *a.shape))
         if any(medium.viscous):
             _add_viscous(out, medium.viscous, a, m, w)
@@ -139,7 +156,7 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
     """The load by a quadrature rule on [-1, 1] (weights summing to 1), for any medium with a `traction`."""
     s, weight = (np.asarray(x, float)[:, None, None] for x in (nodes, weights))
 
-    def load(a, m, w, eps, speed=1.0):
+    def load(a, m, w, eps, known=ALONE):
         u = m + w * s
         a = np.broadcast_to(a, u.shape)
         (f_t, f_n), slopes = _pointwise(medium, a, u, eps)

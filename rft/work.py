@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body
-from rft.effects.base import Effect
-from rft.loads import element_load
+from rft.bodies.base import Body, Motion
+from rft.effects.base import Effect, applied
+from rft.loads import Known, element_load
 from rft.media.base import Medium
 
 
@@ -38,24 +38,27 @@ def work(
 ) -> Work:
     """Power and internal moments for body velocities xi (..., 3) that `body_velocity` gave for the same arguments."""
     alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-    batch, inner = alpha.shape[:-1], body
-    load = element_load(medium, loads)
-    for effect in effects:
-        load, body = effect.load(load, medium), effect.body(body)
+    batch = alpha.shape[:-1]
+    load, body = applied(effects, element_load(medium, loads), medium, body)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = np.asarray(xi, float).reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    motion = body.motion(alpha, alphadot)
     speed = np.sqrt((alphadot**2).sum(0))
-    v = motion.v + motion.carried(xi)
-    # At velocities over |alphadot|, as the balance is solved; a viscous law is proportional to them, a dry one does not know.
     scale = np.where(speed > 0, speed, 1.0)
-    f = load(*(v / scale), np.full_like(scale, regularisation), scale)[:, 0] * motion.weight
-    if medium.dry == ():
+    motion = body.motion(alpha, alphadot / scale)
+    done = done_by(load, motion, xi / scale, scale, regularisation, medium.dry == ())
+    return Work(done.power.reshape(batch) * body.length, *(x.reshape(*batch, *x.shape[1:]) for x in done[1:]))
+
+
+def done_by(load, motion: Motion, xi, scale, regularisation: float, linear: bool) -> Work:
+    """`Work` of B samples from body velocities xi (3, B), in body lengths; they and the motion are over scale (B,), as the
+    balance is solved: a linear law is proportional to it, a dry one does not know."""
+    v = motion.v + motion.carried(xi)
+    f = load(*v, np.full_like(scale, regularisation), Known(scale))[:, 0] * motion.weight
+    if linear:
         f = f * scale
-    power = (f * v).sum((0, 1)) * body.length
-    n = inner.motion(alpha, alphadot).half.shape[0]
+    n = np.count_nonzero(motion.half)
     slip = np.average(np.arctan2(np.abs(v[1, :n]), np.abs(v[0, :n])), 0, motion.half[:n, 0])
-    return Work(power.reshape(batch), _moments(motion, f, n).reshape(*batch, -1), slip.reshape(batch))
+    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n), slip)
 
 
 def _moments(motion, f, n: int) -> np.ndarray:
@@ -65,7 +68,7 @@ def _moments(motion, f, n: int) -> np.ndarray:
     side with the opposite: with the moment of -f on the tail's side about that point.
     """
     along, half = motion.c + 1j * motion.s, motion.half
-    place = (motion.r_t + 1j * motion.r_n) * along / 1j  # the lever is i place conj(along)
+    place = motion.place
     force = (f[0] + 1j * f[1]) * along
     torque = (place.conj() * force).imag + half * f[2]
     if len(along) > n:  # the tail's cap belongs to the first element's side of every point, the head's to none

@@ -32,6 +32,11 @@ class Motion(NamedTuple):
         v = np.stack([own.real, own.imag, turn * half])
         return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, 2.0 * half, v)
 
+    @property
+    def place(self) -> np.ndarray:
+        """(n, B), complex: the elements' centres; the lever (r_t, r_n) is i place conj(heading)."""
+        return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
+
     def take(self, keep: np.ndarray) -> Motion:
         """The samples that ``keep`` (an index or mask over B) selects."""
         c, s, r_t, r_n, half, weight, v = self
@@ -83,3 +88,18 @@ class Body(Protocol):
     joints: int
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion: ...
+
+
+def halves(body: Body) -> np.ndarray:
+    """(n,): half lengths of a body's elements in body lengths, 0 for points, which come last."""
+    zero = np.zeros((body.joints, 1))
+    return body.motion(zero, zero).half[:, 0]
+
+
+def stations(body: Body) -> np.ndarray:
+    """(n,): places of the elements' centres along the body, 0 at the tail, 1 at the head; points are its two ends."""
+    half = halves(body)
+    pieces = half > 0
+    s = np.cumsum(2 * half) - half
+    s[~pieces] = np.linspace(0, 1, np.count_nonzero(~pieces))
+    return s

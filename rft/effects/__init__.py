@@ -1,10 +1,37 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import PREMISES, Effect
+from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine
+from rft.effects.body_inertia import BodyInertia
+from rft.effects.depth import DepthProfile
+from rft.effects.disturbed import DisturbedGround
 from rft.effects.end_caps import EndCaps
 from rft.effects.grain_inertia import GrainInertia
 from rft.effects.skin import SkinFriction
+from rft.effects.transient import Transient
 
-KINDS = {"skin-friction": SkinFriction, "end-caps": EndCaps, "grain-inertia": GrainInertia}
+KINDS = {
+    "skin-friction": SkinFriction,
+    "end-caps": EndCaps,
+    "depth-profile": DepthProfile,
+    "grain-inertia": GrainInertia,
+    "body-inertia": BodyInertia,
+    "transient": Transient,
+    "disturbed-ground": DisturbedGround,
+}
 
-__all__ = ["KINDS", "PREMISES", "Effect", "EndCaps", "GrainInertia", "SkinFriction"]
+__all__ = [
+    "ENGINES",
+    "KINDS",
+    "PREMISES",
+    "BodyInertia",
+    "DepthProfile",
+    "DisturbedGround",
+    "Effect",
+    "EndCaps",
+    "GrainInertia",
+    "SkinFriction",
+    "Transient",
+    "applied",
+    "broken",
+    "engine",
+]

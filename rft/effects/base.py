@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from rft.bodies.base import Body
+import numpy as np
+
+from rft.bodies.base import Body, Motion
 
 # What an effect may break. Each premise lost takes an engine, or a result, with it.
 PREMISES = {
@@ -13,23 +17,84 @@ PREMISES = {
     "no memory": "the past matters: marching in time",
     "no inertia": "mass matters: an equation of motion",
 }
+ENGINES = {
+    "algebraic": "the balance of forces at every shape, all shapes at once",
+    "marching": "the balance of forces phase after phase, place and past carried along",
+    "dynamic": "the equation of motion phase after phase, implicit in time",
+}
+
+
+class Here(NamedTuple):
+    """One step of a march, as an effect may ask for it; n elements by B samples, lengths in body lengths.
+
+    dt: phase since the step before, rad. place, along: (n, B) complex, centres and headings of the elements on the
+    ground, as foreseen. motion: of the elements while the frame is held. before: (3, n, B), their velocities (a, m, w) one
+    step earlier, body lengths per rad. scale: (B,), what the velocities of this step are divided by.
+    """
+
+    dt: float
+    place: np.ndarray
+    along: np.ndarray
+    motion: Motion
+    before: np.ndarray
+    scale: np.ndarray
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects. breaks: premises of `PREMISES` it takes away. An effect of the algebraic engine changes the
-    load of an element, the elements of the body, or both; as its parameter goes to ``limit`` the scene without it
-    comes back at ``order``."""
+    """Base of all effects. breaks: premises of `PREMISES` it takes away. An effect changes the load of an element, the
+    elements of the body, or both; as its parameter goes to ``limit`` the scene without it comes back at ``order``.
+
+    rank: effects act in this order, whatever the scene's. batched: parameters that may be arrays (B,), one for each
+    sample of a batch. inertia: mass of the body x length x (rad/s of phase)^2 over its axial drag. settles: change of
+    displacement from cycle to cycle, body lengths, below which a march with this effect has settled.
+    """
 
     breaks = frozenset()
     limit = ""
     order = 1
     cost = ""
+    rank = 0
+    batched = ()
+    inertia = 0.0
+    settles = 1e-6
 
-    def load(self, load, medium):
-        """The load law (`rft.loads`) with this effect; the same one by default."""
+    def load(self, load, medium, body: Body):
+        """The load law (`rft.loads`) of the body's elements with this effect; the same one by default."""
         return load
 
     def body(self, body: Body) -> Body:
         """The body with this effect; the same one by default."""
         return body
+
+    def start(self, elements: int, samples: int):
+        """What the effect remembers before a march; nothing by default."""
+        return None
+
+    def at(self, memory, here: Here) -> Effect:
+        """The effect at one step of a march, its memory known; the same one by default."""
+        return self
+
+    def after(self, memory, here: Here, v: np.ndarray):
+        """What is remembered after a step that ended with element velocities v (3, n, B), body lengths per rad."""
+        return memory
+
+
+def broken(effects: Sequence[Effect]) -> frozenset:
+    """All that the effects break."""
+    return frozenset().union(*(e.breaks for e in effects))
+
+
+def engine(effects: Sequence[Effect]) -> str:
+    """The cheapest of ENGINES that is right with these effects."""
+    lost = broken(effects)
+    if "no inertia" in lost:
+        return "dynamic"
+    return "marching" if lost & {"no memory", "symmetry"} else "algebraic"
+
+
+def applied(effects: Sequence[Effect], load, medium, body: Body):
+    """(load, body) with the effects on, in the order of their rank."""
+    for effect in sorted(effects, key=lambda e: e.rank):
+        load, body = effect.load(load, medium, body), effect.body(body)
+    return load, body

@@ -9,6 +9,7 @@ import numpy as np
 
 from rft.bodies.base import Body, Motion
 from rft.effects.base import Effect
+from rft.loads import ALONE
 from rft.media.base import TermLaw, require
 from rft.media.granular import Granular
 
@@ -43,6 +44,7 @@ class EndCaps(Effect):
 
     limit = "radius = 0"
     cost = "one point load an end"
+    rank = 2
 
     def __post_init__(self):
         require(0 <= self.radius <= 1, f"radius must lie from 0 to 1 body length, got {self.radius!r}")
@@ -50,12 +52,12 @@ class EndCaps(Effect):
             value = getattr(self, name)
             require(0 <= value <= 100, f"{name} must be a factor from 0 to 100, got {value!r}")
 
-    def load(self, load, medium):
+    def load(self, load, medium, body):
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
         cap = _CapLaw(medium)
 
-        def with_caps(a, m, w, eps, speed=1.0):
-            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps, speed), cap.at(a[-2:], m[-2:], eps)], 2)
+        def with_caps(a, m, w, eps, known=ALONE):
+            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps, known), cap.at(a[-2:], m[-2:], eps)], 2)
 
         return with_caps
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.bodies.base import halves
 from rft.effects.base import Effect
+from rft.loads import ALONE
 from rft.media.base import require
 
 GRAVITY = 9.81  # m/s^2
@@ -31,6 +33,8 @@ class GrainInertia(Effect):
     breaks = frozenset({"rate independence"})
     limit = "frequency = 0 (order 2) or strength = 0 (order 1)"
     cost = "a dozen operations an element"
+    rank = 4  # the flux of grains does not know the ground's pressure
+    batched = ("frequency", "length", "depth", "strength")
 
     def __post_init__(self):
         for name, low, high in (
@@ -42,14 +46,16 @@ class GrainInertia(Effect):
             value = getattr(self, name)
             require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
 
-    def load(self, load, medium):
+    def load(self, load, medium, body):
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         beta = self.strength * speed_per_rad**2 / (PRESSURE_FACTOR * GRAVITY * self.depth)
 
-        def with_inertia(a, m, w, eps, speed=1.0):
-            out = load(a, m, w, eps, speed)
-            scale = beta * np.square(speed)
-            out[1:] += scale * squared_speed_load(m, w)
+        pieces = slice(np.count_nonzero(halves(body)))  # an end cap sweeps up grains that its neighbour has counted
+
+        def with_inertia(a, m, w, eps, known=ALONE):
+            out = load(a, m, w, eps, known)
+            scale = known.of(beta) * np.square(known.speed)
+            out[1:, :, pieces] += scale * squared_speed_load(m[pieces], w[pieces])
             return out
 
         return with_inertia

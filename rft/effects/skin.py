@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.effects.base import Effect
+from rft.loads import ALONE
 from rft.media.base import require
 
 
@@ -26,18 +27,19 @@ class SkinFriction(Effect):
 
     limit = "forward = backward = reference"
     cost = "one multiplication an element"
+    batched = ("forward", "backward", "reference")
 
     def __post_init__(self):
         for name in ("forward", "backward", "reference"):
             value = getattr(self, name)
             require(0 < value < 100, f"{name} must be a coefficient of friction > 0 and < 100, got {value!r}")
 
-    def load(self, load, medium):
+    def load(self, load, medium, body):
         ahead, astern = self.forward / self.reference, self.backward / self.reference
 
-        def scaled(a, m, w, eps, speed=1.0):
-            out = load(a, m, w, eps, speed)
-            out[0] *= np.where(a >= 0, ahead, astern)
+        def scaled(a, m, w, eps, known=ALONE):
+            out = load(a, m, w, eps, known)
+            out[0] *= np.where(a >= 0, known.of(ahead), known.of(astern))
             return out
 
         return scaled

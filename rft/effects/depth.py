@@ -1,0 +1,75 @@
+"""Depth below the surface other than the reference one: drag grows in proportion to it (paper Eq. 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.bodies.base import Body, stations
+from rft.effects.base import Effect, Here
+from rft.loads import ALONE
+from rft.media.base import require
+
+
+@dataclass(frozen=True)
+class DepthProfile(Effect):
+    """Drag times |z| over the depth that the medium's drag is for: 2 k rho g r |z| of Eq. 2, its other factors the same.
+
+    along: |z| over that depth at equally spaced places from tail to head, linear between them; (1, 1) is level. slope:
+    what the place on the ground adds to it per body length (a surface that is not level above a level plane of motion),
+    rising in the direction ``towards``, rad from the frame's heading at the start. An element counts as its centre: order
+    2 in its length. With a slope, place and heading matter.
+    """
+
+    along: tuple[float, ...] = (1.0, 1.0)
+    slope: float = 0.0
+    towards: float = 0.0
+
+    limit = "along all 1 and slope = 0"
+    cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
+    rank = 3
+    batched = ("slope", "towards")
+    angles = ("towards",)
+
+    def __post_init__(self):
+        object.__setattr__(self, "along", tuple(self.along))
+        good = len(self.along) >= 2 and all(0 < x <= 1000 for x in self.along)
+        require(good, f"along must be two depths or more, over the reference depth, > 0 to 1000, got {self.along!r}")
+        require(0 <= self.slope <= 1000, f"slope must lie from 0 to 1000 per body length, got {self.slope!r}")
+        require(abs(self.towards) <= 1e6, f"towards must be an angle, got {self.towards!r}")
+
+    @property
+    def breaks(self) -> frozenset:
+        return frozenset({"symmetry"}) if np.any(self.slope) else frozenset()
+
+    def load(self, load, medium, body: Body):
+        s = stations(body)
+        depth = np.interp(s, np.linspace(0, 1, len(self.along)), self.along)[:, None]
+        return _scaled(load, lambda known: depth)
+
+    def at(self, memory, here: Here) -> Effect:
+        return _There(self.along, self.slope * (here.place * np.exp(-1j * self.towards)).real) if self.breaks else self
+
+
+@dataclass(frozen=True, eq=False)
+class _There(Effect):
+    """The effect at one place: added (n, B), relative depth that the ground adds there."""
+
+    along: tuple[float, ...]
+    added: np.ndarray
+    rank = DepthProfile.rank
+
+    def load(self, load, medium, body: Body):
+        s = stations(body)
+        depth = np.interp(s, np.linspace(0, 1, len(self.along)), self.along)[:, None] + self.added
+        if not (depth > 0).all():
+            raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
+        return _scaled(load, lambda known: known.of(depth))
+
+
+def _scaled(load, depth):
+    def law(a, m, w, eps, known=ALONE):
+        return load(a, m, w, eps, known) * depth(known)
+
+    return law

@@ -1,0 +1,226 @@
+"""Phase after phase through a gait, for what a shape and its rate of change do not settle: place, past and mass.
+
+At every phase the balance of forces is solved for the body velocity, implicitly: a memory is that at the end of the step,
+and momentum changes by the backward difference of order 2, which forgets an error at any step size. So without memory,
+slope or mass the answer is that of `rft.body_velocity` at every phase, and with them it comes near as they go to zero.
+All samples (amplitudes, parameters) go side by side. The march starts from that answer on untouched ground and goes
+round the gait until the displacement of a cycle is that of the cycle before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.balance import Balance, Inertia, checked_input
+from rft.bodies.base import Body, Motion
+from rft.effects.base import Effect, Here, broken
+from rft.media.base import Medium, require
+from rft.work import Work, done_by
+
+MOST_CYCLES = 60
+UNIT_MASS = np.array([1.0, 1.0, 1 / 3])[:, None, None]  # <a>, <u> and <s u> of an element from its (a, m, w)
+
+
+class March(NamedTuple):
+    """The last cycle of a march of N phases. xi: (..., N, 3), body frame, length/rad, length/rad, 1. pose: (..., N + 1, 3),
+    on the ground, whose origin and x axis are the frame's at the start of the march. residual: (...), the largest, as in
+    `rft.Solution`. status: (...), "settled", "running" (as many cycles as were asked for, but not settled), "unsettled"
+    or "unconverged". drift: (...), change of displacement from the cycle before, body lengths (and rad). cycles: how
+    many. work: (..., N) each, None unless asked for."""
+
+    xi: np.ndarray
+    pose: np.ndarray
+    residual: np.ndarray
+    status: np.ndarray
+    drift: np.ndarray
+    cycles: int
+    work: Work | None
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """(..., 3): pose after the cycle in the frame at its start."""
+        return np.moveaxis(_between(*(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))), 0, -1)
+
+    def checked(self) -> March:
+        """This march, or RuntimeError if any sample is unconverged or has not settled."""
+        if (self.status == "unconverged").any():
+            raise RuntimeError(
+                f"a force balance of the march did not converge (residual {np.max(self.residual):.1e}): "
+                "raise 'regularisation', or report the scene"
+            )
+        if (self.status == "unsettled").any():
+            raise RuntimeError(
+                f"after {self.cycles} cycles displacement still changes by {np.max(self.drift):.1e} body lengths a cycle: "
+                "give 'cycles' to take it as it is, or lower the mass"
+            )
+        return self
+
+
+def march(
+    medium: Medium,
+    body: Body,
+    alpha,
+    alphadot,
+    *,
+    effects: Sequence[Effect] = (),
+    cycles: int | None = None,
+    loads: str = "exact",
+    regularisation: float = 1e-6,
+    tolerance: float = 1e-10,
+    with_work: bool = False,
+) -> March:
+    """Body velocities through a gait given over one cycle: alpha, alphadot (..., N, joints), rad and per rad of phase, at
+    N >= 8 equally spaced phases. Of order 2 in 1/N.
+
+    cycles: exactly so many; if left out, as many as it takes to settle, and one where effects break symmetry (there no
+    cycle is like another). Other arguments as in `rft.body_velocity`. ValueError for what makes no sense.
+    """
+    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
+    require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"a march takes 8 phases or more, got alpha {alpha.shape}")
+    good = cycles is None or (isinstance(cycles, int) and 1 <= cycles <= 10_000)
+    require(good, f"cycles must be a whole number from 1 to 10000, got {cycles!r}")
+    batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
+    if cycles is None and "symmetry" in broken(effects):
+        cycles = 1
+    shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
+    steps = _Steps(medium, body, *shapes, effects, loads, regularisation, tolerance)
+    found = _round_and_round(steps, phases, cycles, with_work)
+    return _shaped(found, batch, body.length)
+
+
+def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> March:
+    """Cycles until they repeat, or as many as asked for; samples on the last axis."""
+    enough = max([1e-6, *(e.settles for e in steps.effects)])
+    before, done = None, 0
+    while done < (cycles or MOST_CYCLES):
+        done += 1
+        rows = [steps.next(with_work) for _ in range(phases)]
+        xi, pose, residual, work = zip(*rows)
+        pose = np.stack([*pose, steps.foreseen()[1]])
+        moved = _between(pose[0], pose[-1])
+        drift = np.full(moved.shape[-1], np.inf) if before is None else np.abs(moved - before).max(0)
+        before = moved
+        if cycles is None and (drift <= enough).all():
+            break
+    worst = np.max(residual, 0)
+    status = np.where(drift <= enough, "settled", "unsettled" if cycles is None else "running")
+    status = np.where(worst <= steps.limit, status, "unconverged")
+    work = Work(*(np.stack(x) for x in zip(*work))) if with_work else None
+    return March(np.stack(xi), pose, worst, status, drift, done, work)
+
+
+def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Pose b (3, B) seen from pose a."""
+    z = ((b[0] - a[0]) + 1j * (b[1] - a[1])) * np.exp(-1j * a[2])
+    return np.stack([z.real, z.imag, b[2] - a[2]])
+
+
+def _moved(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
+    """Pose (3, B) after moving with xi (3, B) for dt."""
+    half = 0.5 * dt * xi[2]
+    z = dt * np.sinc(half / np.pi) * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
+    return pose + np.stack([z.real, z.imag, dt * xi[2]])
+
+
+def _shaped(found: March, batch: tuple, length: float) -> March:
+    """Samples to the leading axes, body lengths to the body's unit."""
+    units = np.array([length, length, 1.0])
+    xi, pose = (np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units for x in found[:2])
+    work = found.work
+    if work is not None:  # (N, B, ...)
+        power, moment, slip = (np.moveaxis(x, 1, 0).reshape(*batch, len(x), *x.shape[2:]) for x in work)
+        work = Work(power * length, moment, slip)
+    residual, status, drift = (x.reshape(batch) for x in found[2:5])
+    return March(xi, pose, residual, status, drift, found.cycles, work)
+
+
+class _Steps:
+    """The march itself: `next` takes one step. All lengths in body lengths, samples on the last axis."""
+
+    def __init__(self, medium, body, alpha, alphadot, effects, loads, regularisation, tolerance):
+        self.medium, self.body, self.alpha, self.alphadot = medium, body, alpha, alphadot
+        self.effects, self.how = effects, (loads, regularisation, tolerance)
+        self.phases, samples = len(alpha), alpha.shape[-1]
+        self.dt = 2 * np.pi / self.phases
+        speed = np.sqrt((alphadot**2).sum(1))
+        usual = np.sqrt((speed**2).mean(0))
+        usual = np.where(usual > 0, usual, 1.0)
+        self.inertia = sum(np.asarray(e.inertia, float) for e in effects)
+        self.heavy = "no inertia" in broken(effects)
+        self.scales = np.broadcast_to(usual, speed.shape) if self.heavy else np.where(speed > 0, speed, usual)
+        self.step, self.pose = 0, np.zeros((3, samples))
+        self.xi, self.momenta, self.velocity = [], [], None
+        self.memories = [e.start(len(self._motion().half), samples) for e in effects]
+        self.limit = 0.0
+
+    def _motion(self) -> Motion:
+        """Of this step's shape, over its scale; the plain body's, without end caps."""
+        k = self.step % self.phases
+        return self.body.motion(self.alpha[k], self.alphadot[k] / self.scales[k])
+
+    def foreseen(self):
+        """(velocity, pose) at the step to come, the velocity by straight extrapolation."""
+        if len(self.xi) < 2:
+            xi = self.xi[-1] if self.xi else np.zeros_like(self.pose)
+        else:
+            xi = 2 * self.xi[-1] - self.xi[-2]
+        before = self.xi[-1] if self.xi else xi
+        return xi, _moved(self.pose, (before + xi) / 2, self.dt if self.xi else 0.0)
+
+    def next(self, with_work: bool):
+        """Take a step: (xi, pose, residual, work) at it."""
+        guess, pose = self.foreseen()
+        scale, first = self.scales[self.step % self.phases], not self.xi
+        here = self._here(pose, scale)
+        active = [(e, m) for e, m in zip(self.effects, self.memories) if not (first and "no memory" in e.breaks)]
+        now = [e.at(m, here) for e, m in active]
+        loads, regularisation, tolerance = self.how
+        balance = Balance(self.medium, self.body, loads, regularisation, tolerance, now)
+        k = self.step % self.phases
+        motion = balance.body.motion(self.alpha[k], self.alphadot[k] / scale)
+        if self.heavy:
+            M, shape = _momentum(motion)
+            if not first:
+                balance.weigh(self._inertia(M, shape, scale, balance))
+        self.limit = max(self.limit, balance.limit)
+        solved = balance.solve(motion.take, scale, 1, None if first else guess / scale)
+        xi = solved.xi * scale
+        if not first:
+            self.pose = _moved(self.pose, (self.xi[-1] + xi) / 2, self.dt)
+        v = (motion.v + motion.carried(solved.xi)) * scale
+        n = len(here.place)
+        self.memories = [m if first else e.after(m, here, v[:, :n]) for e, m in zip(self.effects, self.memories)]
+        self.xi, self.velocity = [*self.xi[-1:], xi], v[:, :n]
+        if self.heavy:
+            momentum = scale * (np.einsum("ijb,jb->ib", M, solved.xi) + shape)
+            self.momenta = [*self.momenta[-1:], momentum]
+        self.step += 1
+        work = done_by(balance.load, motion, solved.xi, scale, regularisation, balance.linear) if with_work else None
+        return xi, self.pose, solved.residual, work
+
+    def _here(self, pose: np.ndarray, scale: np.ndarray) -> Here:
+        motion = self._motion()
+        turn = np.exp(1j * pose[2])
+        along = motion.c + 1j * motion.s
+        place = pose[0] + 1j * pose[1] + turn * motion.place
+        before = np.zeros_like(motion.v) if self.velocity is None else self.velocity
+        return Here(self.dt, place, turn * along, motion, before, scale)
+
+    def _inertia(self, M, shape, scale, balance: Balance) -> Inertia:
+        if len(self.momenta) < 2:
+            rate, past = 1 / self.dt, self.momenta[-1] / self.dt
+        else:
+            rate, past = 1.5 / self.dt, (2 * self.momenta[-1] - 0.5 * self.momenta[-2]) / self.dt
+        weight = self.inertia * balance.unit * (np.ones_like(scale) if balance.linear else scale)
+        return Inertia(M, shape, rate, past / scale, weight, weight * scale)
+
+
+def _momentum(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3, B) and (3, B): momentum of a uniform body of unit mass from its velocity, and from its change of shape."""
+    mass = motion._replace(weight=2 * motion.half)
+    units = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, motion.c.shape[1]))
+    M = np.stack([mass.total(UNIT_MASS * motion.carried(unit)) for unit in units], 1)
+    return M, mass.total(UNIT_MASS * motion.v)
