@@ -395,12 +395,18 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     return Scene(
         medium=_medium(f"{name}: [medium]", tables["medium"]),
         body=_of_kind(f"{name}: [body]", tables["body"], "kind", BODIES),
-        gait=_of_kind(f"{name}: [gait]", tables["gait"], "kind", GAITS),
+        gait=_of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS),
         numerics=_build(f"{name}: [numerics]", tables.get("numerics", {}), Numerics),
         effects=tuple(_of_kind(f"{name}: [[effects]]", e, "kind", EFFECTS) for e in effects),
         name=name,
         text=text,
     )
+
+
+def _located(table: dict, name: str) -> dict:
+    """The table with its data file, if it names one, looked for from the folder of the scene file ``name``."""
+    file = table.get("file")
+    return {**table, "file": str(Path(name).absolute().parent / file)} if isinstance(file, str) else table
 
 
 def _medium(place: str, table: dict) -> rft.Medium:

@@ -103,7 +103,7 @@ def _row(scene: Scene, amplitudes) -> list:
 
 
 def _mark(scene: Scene, values) -> str:
-    return hashlib.sha256(json.dumps([scene.text, repr(scene.numerics), values]).encode()).hexdigest()
+    return hashlib.sha256(json.dumps([scene.text, repr(scene.gait), repr(scene.numerics), values]).encode()).hexdigest()
 
 
 def _keep(kept: Path, scene: Scene, values, rows) -> None:

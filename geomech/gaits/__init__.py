@@ -1,6 +1,7 @@
 """Gaits: closed curves in shape space."""
 
 from geomech.gaits.base import Gait
+from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
 from geomech.gaits.waves import Sine
@@ -12,6 +13,7 @@ KINDS = {
     "fourier": Fourier,
     "points": Points,
     "sine": Sine,
+    "centreline": Centreline,
 }
 
-__all__ = ["KINDS", "Butterfly", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine"]
+__all__ = ["KINDS", "Butterfly", "Centreline", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine"]

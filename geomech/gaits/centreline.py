@@ -1,0 +1,151 @@
+"""A measured centreline as a gait: curvature or midline points from a CSV file, one period of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from geomech.gaits import frames, midline
+from geomech.gaits.base import Gait
+
+LARGEST_GAP = 0.25  # of the period, between neighbouring frames
+UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Centreline(Gait):
+    """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude scales them.
+
+    file: CSV; in a scene from a file relative to that file's folder, else to the current one. Its header line says
+    what it holds, in any order of the rows:
+      t,s,curvature   curvature in rad per body length at s, 0 at the tail to 1 at the head; every s at every t
+      t,point,x,y     points of the midline, numbered from the tail to the head; the same points at every t
+      t,x,y           the same without numbers, in the order of the rows; frames may differ in their number
+    t may be in any unit, x and y in any unit; # starts a comment, which is a good place for the units. Curvature is
+    positive counter-clockwise and y runs upwards: pixels counted downwards give the mirror image. A midline keeps its
+    length: each frame is scaled to its own, and where it lies and points to does not matter.
+
+    period: in the unit of t. Left out, the frames run over it once if the last repeats the first; else, if they are
+    equally spaced, it is their number times their spacing. In time the bends are a periodic cubic spline, of order 4 in
+    the spacing of the frames; along the body splines too, of order 4 in that of s, 3 in that of points. keep_harmonics,
+    keep_modes: smooth by least squares instead, with that many harmonics in time and Legendre modes of the curvature
+    along the body; 0 for none. sha256: of the file, filled in if left out; given, the file must have it. The file is
+    read once, when the gait is made.
+
+    Refused as slips of the tracking or of the pen: neighbouring elements or chords that bend by more than pi/2, a frame
+    20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close.
+    """
+
+    file: str
+    elements: int = 100
+    period: float | None = None
+    keep_harmonics: int = 0
+    keep_modes: int = 0
+    sha256: str = ""
+
+    def __post_init__(self):
+        object.__setattr__(self, "file", str(self.file))
+        if self.elements not in range(3, 2001):
+            raise ValueError(f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
+        super().__post_init__()
+        if self.centre:
+            raise ValueError("a measured centreline takes no centre: it undulates about the straight body")
+        if self.period is not None and not 0 < self.period < np.inf:
+            raise ValueError(f"period must be a number > 0 in the unit of t, got {self.period!r}")
+        data = frames.read(self.file)
+        if self.sha256 not in ("", data.sha256):
+            raise data.wrong("the file is not the one whose sha256 is given: restore it, or leave sha256 out")
+        object.__setattr__(self, "sha256", data.sha256)
+        object.__setattr__(self, "_curve", self._through(data))
+
+    @property
+    def joints(self) -> int:
+        return self.elements - 1
+
+    @property
+    def harmonics(self) -> int:
+        """The highest kept; 1 for a spline, which has no highest."""
+        return max(1, self.keep_harmonics)
+
+    def _through(self, data: frames.Frames):
+        """Function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
+        from scipy.interpolate import CubicSpline
+
+        phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
+        # Two frames a wave, in the widest gap too: then the least squares are well posed.
+        most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
+        if self.keep_harmonics not in range(most + 1):
+            told = f"keep_harmonics must be a whole number from 0 to {most} for these {len(bends)} frames"
+            raise data.wrong(f"{told}, got {self.keep_harmonics!r}")
+        if not self.keep_harmonics:
+            return CubicSpline(phase, np.concatenate([bends, bends[:1]]), bc_type="periodic")
+        return partial(_series, np.linalg.lstsq(_waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None)[0])
+
+    def unit(self, t) -> np.ndarray:
+        return self._curve(np.asarray(t, float), 0)
+
+    def unit_rate(self, t) -> np.ndarray:
+        return self._curve(np.asarray(t, float), 1)
+
+
+def _series(fitted: np.ndarray, t: np.ndarray, order: int) -> np.ndarray:
+    return _waves(t, len(fitted) // 2, order) @ fitted
+
+
+def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
+    """1, cos t, cos 2t, ..., sin t, sin 2t, ... or, order 1, their derivatives: (..., 2 harmonics + 1)."""
+    k = np.arange(1, harmonics + 1)
+    kt = t[..., None] * k
+    one = np.full((*t.shape, 1), 1.0 - order)
+    parts = (-k * np.sin(kt), k * np.cos(kt)) if order else (np.cos(kt), np.sin(kt))
+    return np.concatenate([one, *parts], -1)
+
+
+def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; ValueError if the frames do not
+    make up one period. A frame that repeats the first is left out."""
+    t, moves = data.t - data.t[0], np.abs(np.diff(bends, axis=0)).max(1)
+    back = np.abs(bends[-1] - bends[0]).max()
+    if period is None:
+        repeats = back <= 0.1 * np.median(moves)
+        period = t[-1] if repeats else _inferred(data, t, moves, back)
+    else:
+        repeats = abs(t[-1] - period) <= 1e-6 * period
+        if t[-1] > period and not repeats:
+            raise data.wrong(f"the frames run over {t[-1]:g} in t, more than period = {period:g}: keep one period")
+    if repeats:
+        t, bends = t[:-1], bends[:-1]
+    gaps = np.diff(t, append=period) / period
+    _check_gaps(data, gaps)
+    allowed = moves.max() if repeats else 3 * moves.max() * max(1.0, gaps[-1] / gaps[:-1].max())
+    if back > allowed + 1e-9:
+        raise data.wrong(
+            f"the gait does not close: bends of the first and the last frame differ by up to {back:.2g} rad, those of "
+            f"neighbouring frames by up to {moves.max():.2g}: keep just one period, or give the right period"
+        )
+    return 2 * np.pi * np.append(t / period, 1.0), bends
+
+
+def _inferred(data: frames.Frames, t, moves, back) -> float:
+    """The period of equally spaced frames of which the last is one spacing before the first comes again."""
+    if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
+        raise data.wrong("the last frame does not repeat the first, and they are not equally spaced in t: give period")
+    if back < moves.min() / 3:
+        raise data.wrong(
+            f"the last frame all but repeats the first (bends differ by up to {back:.2g} rad, those of neighbouring "
+            f"frames by {moves.min():.2g} or more): give period"
+        )
+    return t[-1] * len(t) / (len(t) - 1)
+
+
+def _check_gaps(data: frames.Frames, gaps: np.ndarray) -> None:
+    widest, least = int(gaps.argmax()), int(gaps.argmin())
+    if gaps[widest] > LARGEST_GAP * (1 + 1e-6):
+        raise data.wrong(
+            f"after t = {data.t[widest]:g} there is no frame for {gaps[widest]:.3g} of the period, more than "
+            f"{LARGEST_GAP:g}: give more frames, or the right period"
+        )
+    if gaps[least] < 0.01 / len(gaps):
+        raise data.wrong(f"the frame after t = {data.t[least]:g} comes at almost the same time: drop one of the two")

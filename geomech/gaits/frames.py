@@ -1,0 +1,121 @@
+"""CSV files of measured frames: rows of numbers under a header line that says what they are."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
+LARGEST_FILE = 100_000_000  # bytes, a few million rows
+LARGEST_NUMBER = 1e12
+MOST_FRAMES = 10_000
+FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order.
+
+    name, sha256: of the file. columns: of its header. rows: (N, columns). lines: (N,), the rows' line numbers.
+    t: (F,), ascending. starts: (F,), the first row of each frame.
+    """
+
+    name: str
+    sha256: str
+    columns: tuple[str, ...]
+    rows: np.ndarray
+    lines: np.ndarray
+    t: np.ndarray
+    starts: np.ndarray
+
+    def wrong(self, what: str, row: int | None = None) -> ValueError:
+        """To be raised for what is wrong in a row, or in the whole file."""
+        return ValueError(f"{self.name}{'' if row is None else f', line {self.lines[row]}'}: {what}")
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Rows of each frame, (F,)."""
+        return np.diff(self.starts, append=len(self.rows))
+
+
+def read(path: str | Path) -> Frames:
+    """The frames of a CSV file; ValueError, one line, if it has none that can be used."""
+    name, (text, digest) = Path(path).name, _contents(Path(path))
+    lines = ((k, line.partition("#")[0].strip()) for k, line in enumerate(text.split("\n"), 1))
+    filled = [(k, line) for k, line in lines if line]
+    columns = _header(name, filled)
+    rows = np.array([_row(name, k, line, columns) for k, line in filled[1:]]).reshape(-1, len(columns))
+    keyed = columns[1] in ("s", "point")
+    order = np.lexsort((rows[:, 1] if keyed else np.arange(len(rows)), rows[:, 0]))
+    rows, numbers = rows[order], np.array([k for k, _ in filled[1:]], int)[order]
+    t, starts = np.unique(rows[:, 0], return_index=True)
+    frames = Frames(name, digest, columns, rows, numbers, t, starts)
+    _check_counts(frames)
+    if keyed:
+        _check_grid(frames)
+    return frames
+
+
+def _contents(path: Path) -> tuple[str, str]:
+    """The text of a file and its sha256."""
+    try:
+        if not path.is_file() and path.stat():
+            raise OSError(errno.EINVAL, "it is no ordinary file")
+        if path.stat().st_size > LARGEST_FILE:
+            raise OSError(errno.EFBIG, f"it is larger than {LARGEST_FILE / 1e6:g} MB")
+        raw = path.read_bytes()
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise ValueError(f"cannot read {str(path)!r}: {reason}; file must be a CSV file of one period") from None
+    return text, hashlib.sha256(raw).hexdigest()
+
+
+def _header(name: str, filled: list[tuple[int, str]]) -> tuple[str, ...]:
+    line, text = filled[0] if filled else (1, "")
+    columns = tuple(word.strip().lower() for word in text.split(","))
+    if columns not in HEADERS:
+        known = " or ".join(",".join(h) for h in HEADERS)
+        raise ValueError(f"{name}, line {line}: the header must be {known}, got {text[:40]!r}")
+    return columns
+
+
+def _row(name: str, line: int, text: str, columns: tuple[str, ...]) -> list[float]:
+    cells = text.split(",")
+    try:
+        row = [float(cell) for cell in cells]
+    except ValueError:
+        row = []
+    if len(row) != len(columns) or not all(abs(x) <= LARGEST_NUMBER for x in row):
+        said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
+        raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}")
+    return row
+
+
+def _check_counts(frames: Frames) -> None:
+    if not FEWEST <= len(frames.t) <= MOST_FRAMES:
+        raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t), got {len(frames.t)}")
+    if (frames.counts < FEWEST).any():
+        k = int(frames.counts.argmin())
+        what = "values of s" if frames.columns[1] == "s" else "points"
+        told = f"the frame at t = {frames.t[k]:g} has {frames.counts[k]} {what}: give at least {FEWEST}"
+        raise frames.wrong(told, frames.starts[k])
+
+
+def _check_grid(frames: Frames) -> None:
+    """Every frame has every s or point, once."""
+    key, keys = frames.columns[1], frames.rows[:, 1]
+    twice = np.flatnonzero((np.diff(frames.rows[:, :2], axis=0) == 0).all(1))
+    if twice.size:
+        row = max(twice[0], twice[0] + 1, key=lambda r: frames.lines[r])
+        raise frames.wrong(f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice: keep one", row)
+    known = np.unique(keys)
+    if (frames.counts != len(known)).any():
+        k = int(frames.counts.argmin())
+        lacking = np.setdiff1d(known, keys[frames.starts[k] :][: frames.counts[k]])[0]
+        told = f"the frame at t = {frames.t[k]:g} has no {key} = {lacking:g}: give every {key} at every t, or at none"
+        raise frames.wrong(told, frames.starts[k])
