@@ -1,64 +1,136 @@
 """Fig. 9(c): what a wave along the body achieves against its curvature: sandfish in loose and close glass, snake in loose.
 
-Left: progress per cycle over the arc length of a wave against the mean relative curvature; dots mark the best waves.
-Right: undulation efficiency, progress over the wavelength, against A / lambda. Solid: the whole body, ends and yaw
-included. Dashed and dotted: the balance of force along an endless wave, without and with the sandfish's head drag.
+Rows: progress per cycle over the arc length of a wave; undulation efficiency, progress over the wavelength; slip;
+mechanical cost of transport. Left against the mean relative curvature, right against A / lambda, which are one to one.
+Dots mark the best wave where there is one: efficiency and slip go on improving with the amplitude. Solid: the whole
+body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave, without and with the
+sandfish's head drag. Last row: the sandfish's body velocity through a cycle of its own wave (dash-dotted above).
 """
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
 from figures import main
 from geomech import plots, swimmers
 from geomech.gaits import Sine
-from geomech.scene import load
+from geomech.scene import Scene, load
 
 SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
-AMPLITUDES = np.linspace(0.03, 0.6, 39)
+AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (2 * np.pi)  # equal steps of relative curvature
+SANDFISH = load("sandfish-loose").gait.amplitude  # A / lambda of the animal; the snake's is assumed and not marked
+MEASURES = {  # what is best: the largest (1) or the least (-1)
+    "arc_efficiency": (1, "progress per cycle\n" r"over $\lambda_s$"),
+    "efficiency": (1, "undulation efficiency,\n" r"progress over $\lambda$"),
+    "slip": (-1, "mean slip angle\n(degrees)"),
+    "cost_of_transport": (-1, "cost of transport, work\nover drag x distance"),
+}
 
 
-def compute(amplitudes=AMPLITUDES) -> dict:
-    """For each scene its `swimmers.performance`, "best": {measure: (amplitude, value)}; for the sandfish "endless" and
-    "endless_head": efficiencies (B,)."""
+def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
+    """For each scene, with ``finer`` times its elements, its `swimmers.performance` over amplitudes A / lambda (B,), and
+    "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the amplitudes. For the
+    sandfish "endless" and "endless_head", efficiencies (B,), and "cycle" (N, 3), body velocity at the animal's amplitude.
+
+    finer: a snake's tight bends take some 120 elements a wave; with a third of them its efficiency seems to have an
+    optimum near A / lambda = 0.4, which is none.
+    """
     out = {}
     for name in SCENES:
-        scene = load(name)
+        scene = refined(load(name), finer)
         found = swimmers.performance(scene, amplitudes)
-        found["best"] = {k: swimmers.best(amplitudes, found[k]) for k in ("progress", "arc_efficiency")}
-        lowest = swimmers.best(amplitudes, -np.log(found["cost_of_transport"]))
-        found["best"]["cost_of_transport"] = lowest[0], float(np.exp(-lowest[1]))
+        best = {k: optimum(amplitudes, found[k], sign) for k, (sign, _) in {"progress": (1, ""), **MEASURES}.items()}
+        found["best"] = {k: v for k, v in best.items() if v is not None}
         if name.startswith("sandfish"):
             for key, cap in (("endless", None), ("endless_head", scene.effects[0])):
                 found[key] = np.array([swimmers.endless_sine(scene.medium, a, cap) for a in amplitudes])
+            found["cycle"] = swimmers.performance(scene, [scene.gait.amplitude])["velocity"][0]
         out[name] = found
     return out
 
 
+def refined(scene: Scene, finer: int) -> Scene:
+    """The scene with that many times its elements."""
+    elements = finer * scene.gait.elements
+    gait = dataclasses.replace(scene.gait, elements=elements)
+    return dataclasses.replace(scene, gait=gait, body=dataclasses.replace(scene.body, elements=elements))
+
+
+def optimum(amplitudes, values, sign: int) -> tuple[float, float] | None:
+    """Amplitude and height of the largest (sign 1) or least (-1) of positive values; None at the edge of the range."""
+    heights = sign * np.log(values)
+    if np.argmax(heights) in (0, len(heights) - 1):
+        return None
+    place, height = swimmers.best(amplitudes, heights)
+    return place, float(np.exp(sign * height))
+
+
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(8.6, 3.0, 2)
-    left, right = axes[0]
-    for name, found in numbers.items():
-        style = {"color": SCENES[name], "label": name.replace("-", " ")}
-        left.plot(found["relative_curvature"], found["arc_efficiency"], **style)
-        a, top = found["best"]["arc_efficiency"]
-        left.plot(Sine().relative_curvature(a), top, "o", color=SCENES[name], ms=5)
-        right.plot(found["amplitude"], found["efficiency"], **style)
-        for key, dashes in (("endless", "--"), ("endless_head", ":")):
-            if key in found:
-                arc = found[key] * Sine().wavelength(found["amplitude"])
-                left.plot(found["relative_curvature"], arc, color=SCENES[name], ls=dashes, lw=1.0)
-                right.plot(found["amplitude"], found[key], color=SCENES[name], ls=dashes, lw=1.0)
-    left.set(
-        xlabel=r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)",
-        ylabel=r"progress per cycle / $\lambda_s$",
-    )
-    right.set(xlabel=r"$A/\lambda$", ylabel=r"undulation efficiency $\eta$", xlim=(0, 0.6))
-    for ax in (left, right):
-        ax.set_ylim(0, None)
-    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="dashed: endless wave\ndotted: with head drag")
+    fig, axes = plots.figure(6.7, 8.8, 2, len(MEASURES) + 1)
+    for row, key in zip(axes, MEASURES):
+        for ax, against in zip(row, ("relative_curvature", "amplitude")):
+            draw_measure(ax, numbers, key, against)
+            # A weak wave costs up to a hundred times its drag: cut off, to show the cheapest.
+            ax.set_ylim(0, 8 if key == "cost_of_transport" else 90 if key == "slip" else None)
+            ax.tick_params(labelbottom=key == "cost_of_transport")
+        row[0].set_ylabel(MEASURES[key][1])
+    axes[-2, 0].set_xlabel(r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)")
+    axes[-2, 1].set_xlabel(r"$A/\lambda$")
+    for ax, name in zip(axes[-1], ("sandfish-loose", "sandfish-close")):
+        draw_cycle(ax, numbers[name]["cycle"], name)
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.6)
+    axes[-1, 0].set_ylabel("body velocity")
+    fig.align_ylabels(axes[:, 0])
+    legend(fig, axes[0, 0])
     return fig
+
+
+def draw_measure(ax, numbers: dict, key: str, against: str):
+    place = Sine().relative_curvature if against == "relative_curvature" else np.asarray
+    for name, found in numbers.items():
+        x, colour = found[against], SCENES[name]
+        shown = np.degrees if key == "slip" else np.asarray
+        ax.plot(x, shown(found[key]), color=colour, label=name.replace("-", " "))
+        if key in found["best"]:
+            a, top = found["best"][key]
+            ax.plot(place(a), shown(top), "o", color=colour, ms=5)
+        unit = {"efficiency": 1.0, "arc_efficiency": Sine().wavelength(found["amplitude"])}.get(key)
+        for endless, dashes in (("endless", "--"), ("endless_head", ":")):
+            if unit is not None and endless in found:
+                ax.plot(x, found[endless] * unit, color=colour, ls=dashes, lw=1.0)
+    ax.axvline(place(SANDFISH), color="0.6", ls="-.", lw=0.8, zorder=0)
+    ax.set_xlim(0, place(0.6))
+
+
+def draw_cycle(ax, velocity: np.ndarray, name: str):
+    """xi over a cycle, closed."""
+    t = 2 * np.pi * np.arange(len(velocity) + 1) / len(velocity)
+    closed = np.concatenate([velocity, velocity[:1]])
+    styles = (("-", r"$\xi_x$ (BL/rad)"), ("--", r"$\xi_y$ (BL/rad)"), ("-.", r"$\xi_\theta$ (rad/rad)"))
+    for values, (dashes, label) in zip(closed.T, styles):
+        ax.plot(t, values, ls=dashes, color=SCENES[name], label=label)
+    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    ax.set(xlabel=f"phase of the cycle (rad), {name.replace('-', ' ')}", xlim=(0, 2 * np.pi))
+    ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+
+
+def legend(fig, ax):
+    """Of all panels but the last two, above them."""
+    from matplotlib.lines import Line2D
+
+    handles, labels = ax.get_legend_handles_labels()
+    for style, label in (
+        ({"color": "0.3", "ls": "--", "lw": 1.0}, "endless wave"),
+        ({"color": "0.3", "ls": ":", "lw": 1.0}, "endless wave, head drag"),
+        ({"color": "0.3", "ls": "", "marker": "o", "ms": 5}, "optimum"),
+        ({"color": "0.6", "ls": "-.", "lw": 0.8}, rf"sandfish, $A/\lambda = {SANDFISH:g}$"),
+    ):
+        handles.append(Line2D([], [], **style))
+        labels.append(label)
+    fig.legend(handles, labels, loc="outside upper center", ncols=4)
 
 
 if __name__ == "__main__":

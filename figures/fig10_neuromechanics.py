@@ -1,8 +1,22 @@
 """Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment that holds against the sand.
 
-The sign of the moment is taken for the side that is active (paper Sec. III C). Left: over the body and a cycle, where the
-left side is active, and where it shortens (curvature to the left grows). Right: speed of the wave of moment over that of
-the wave of curvature, against the number of waves on the body.
+The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.swimmers.activation`), for a plain body
+at the animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
+
+(a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded part of the cycle in which
+curvature to the left falls. (b) As Fig. 10(b): curvature and moment at one place. The caption's place is x = 0.71 pi,
+from an origin it does not name; ours is 70 % of the way from head to tail. There the right side starts before the body is
+bent most to the left. (c) Phase by which activation is ahead of curvature: pi / 2 where the side that works is the one
+that shortens, as at the middle of a body that is alike fore and aft; more towards the tail, the advance that Sec. III C
+speaks of. (d) Speed of the wave of activation over that of curvature.
+
+The ratio is above 1: the wave of activation is the faster one, as Sec. III C says of nearly all undulating animals. The
+same section later calls its phase speed the smaller one, as an inverse of a slope; what is smaller here is the slope of
+the lines in (a), time over place, not its inverse. From 0.5 to 1.8 waves the ratio falls, but not evenly:
+between 1 and 1.4 waves it is level to 5 % by the lines of onset and offset, with a shallow dip, and rises by 10 % by the
+first harmonic. As the lines are not straight the ratio depends on the share of the body they are fitted over: from 0.2 to
+0.8 of it instead of 0.1 to 0.9 it is lower by up to 0.3, with the same dip. The comparison with electromyography needs
+the animals' data and is not made.
 """
 
 from __future__ import annotations
@@ -12,64 +26,130 @@ import dataclasses
 import numpy as np
 
 from figures import main
-from geomech import plots
+from geomech import plots, swimmers
 from geomech.gaits import Sine
 from geomech.scene import load
 from rft import Backbone
 
-WAVES = (0.5, 0.75, 1.0, 1.25, 1.5, 1.8)
+WAVES = np.linspace(0.5, 1.8, 27)
+SHOWN = (0.5, 0.75, 1.0, 1.25, 1.5, 1.8)  # of the lags and the table
+PLACE = 0.3  # of the trace in time: 70 % of the way from head to tail
+PLACES = (0.25, 0.5, 0.75)  # of the table
 
 
-def compute(amplitude: float = 0.22, elements: int = 80, phases: int = 128) -> dict:
-    """s (S,) from tail to head; t (T,), share of a cycle; moment and bend rate (T, S) for one wave; onset and offset of
-    left activation and lag (rad, of the fundamental) behind the curvature, (S,); "waves" and "speed" ratios."""
-    out = activation(1.0, amplitude, elements, phases)
-    ratios = [activation(w, amplitude, elements, phases)["speed_ratio"] for w in WAVES]
-    return {**out, "waves": np.array(WAVES), "speed": np.array(ratios)}
+def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
+    """Of a sandfish in loose glass at the scene's A / lambda, for ``waves`` (W,) on its body, without head drag:
+
+    "waves": (W,). "s": (S,), tail 0 to head 1. "lag": (W, S), rad. "speed", "fundamental_speed": (W,), ratios by the lines
+    of onset and offset and by the first harmonic. "one": all of `swimmers.activation` for one wave.
+    "head": {"lag", "speed", "fundamental_speed"}, the same with head drag.
+    """
+    fish = load("sandfish-loose").with_numerics(phases=phases)
+
+    def run(count, effects=()):
+        gait = Sine(waves=count, amplitude=fish.gait.amplitude, elements=elements)
+        return swimmers.activation(dataclasses.replace(fish, gait=gait, body=Backbone(elements), effects=effects))
+
+    keys = {"lag": "lag", "speed": "speed_ratio", "fundamental_speed": "fundamental_speed_ratio"}
+    plain, head = ([run(w, effects) for w in waves] for effects in ((), fish.effects))
+    plain, head = ({k: np.array([r[old] for r in runs]) for k, old in keys.items()} for runs in (plain, head))
+    one = run(1.0)
+    return {"waves": np.array(waves), "s": one["s"], **plain, "one": one, "head": head}
 
 
-def activation(waves: float, amplitude: float, elements: int, phases: int) -> dict:
-    """The moment along a body of that many waves through a cycle, in loose glass, ends left out."""
-    sandfish = load("sandfish-loose")
-    gait = Sine(waves=waves, amplitude=amplitude, elements=elements)
-    scene = dataclasses.replace(sandfish, gait=gait, body=Backbone(elements), effects=())
-    alpha, alphadot = gait.cycle(phases)
-    moment = scene.work(alpha, alphadot, scene.velocity(alpha, alphadot)).moment
-    s = np.arange(1, elements) / elements
-    torque, bend = (np.fft.fft(x, axis=0)[1] for x in (moment, alpha))
-    middle = (s > 0.1) & (s < 0.9)  # at the ends the moment vanishes
-    slopes = [np.polyfit(s[middle], np.unwrap(np.angle(x[middle])), 1)[0] for x in (torque, bend)]
-    lead = np.unwrap(np.angle(torque / bend))
-    lead -= 2 * np.pi * np.round(lead[len(lead) // 2] / (2 * np.pi))
-    onset = np.mod(-np.angle(torque) / (2 * np.pi) - 0.25, 1.0)
-    return {
-        "s": s,
-        "t": np.arange(phases) / phases,
-        "moment": moment,
-        "bend_rate": alphadot,
-        "onset": onset,
-        "offset": np.mod(onset + 0.5, 1.0),
-        "lead": lead,
-        "speed_ratio": float(slopes[1] / slopes[0]),
-    }
+def shown(numbers: dict) -> list[int]:
+    """Rows of the waves in SHOWN."""
+    return [k for k, w in enumerate(numbers["waves"]) if np.isclose(w, SHOWN).any()]
+
+
+def table(numbers: dict) -> str:
+    """For the waves in SHOWN: speed ratios, and phase in rad by which activation is ahead of curvature at three places."""
+    lines = [
+        "        speed of activation / curvature wave     activation ahead by (rad)",
+        "waves   lines   harmonic   lines, head drag     " + "".join(f"s = {s:<6}" for s in PLACES).rstrip(),
+    ]
+    for k in shown(numbers):
+        ratios = numbers["speed"][k], numbers["fundamental_speed"][k], numbers["head"]["speed"][k]
+        lags = np.interp(PLACES, numbers["s"], numbers["lag"][k])
+        row = "{:5.2f}{:8.2f}{:11.2f}{:19.2f}".format(numbers["waves"][k], *ratios)
+        lines.append((row + " " * 5 + "".join(f"{x:<10.2f}" for x in lags)).rstrip())
+    return "\n".join(lines)
 
 
 @plots.styled
 def draw(numbers: dict):
-    fig, axes = plots.figure(8.2, 3.0, 2)
-    left, right = axes[0]
-    s, t = numbers["s"], numbers["t"]
-    left.contourf(s, t, numbers["moment"] > 0, levels=[0.5, 1.5], colors=["#009E73"], alpha=0.55)
-    left.contourf(s, t, numbers["bend_rate"] > 0, levels=[0.5, 1.5], colors="none", hatches=["//"])
-    left.plot([], [], "s", color="#009E73", alpha=0.55, label="left side active")
-    left.plot([], [], "s", mfc="none", color="0.4", label="hatched: bending left")
-    left.set(xlabel="place on the body, tail 0 to head 1", ylabel="time / period", xlim=(0.02, 0.98), ylim=(0, t[-1]))
-    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    right.plot(numbers["waves"], numbers["speed"], "o-", color="black")
-    right.axhline(1.0, color="0.7", lw=0.6)
-    right.set(xlabel="waves on the body", ylabel="speed of moment / curvature wave", ylim=(0, None))
+    fig, axes = plots.figure(6.7, 5.6, 2, 2)
+    draw_map(axes[0, 0], numbers["one"])
+    draw_trace(axes[0, 1], numbers["one"])
+    draw_lag(axes[1, 0], numbers)
+    draw_speed(axes[1, 1], numbers)
+    for ax, letter in zip(axes.flat, "abcd"):
+        ax.set_title(f"({letter})", loc="left")
     return fig
 
 
+SHADE = {"color": "0.82", "lw": 0}
+GREEN, BLUE = "#009E73", "#0072B2"
+QUARTERS = np.pi / 2 * np.arange(5)
+QUARTER_LABELS = ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
+
+
+def draw_map(ax, one: dict):
+    s, t = one["s"], np.append(one["t"], 2 * np.pi)
+    rate = np.concatenate([one["bend_rate"], one["bend_rate"][:1]])
+    ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[SHADE["color"]])
+    for key, dashes in (("onset", "-"), ("offset", "--")):
+        for turn in (-2 * np.pi, 0.0, 2 * np.pi):  # the lines leave the cycle and come back into it
+            ax.plot(s, one[key] + turn, color=GREEN, ls=dashes, label=f"{key} of right side" if turn == 0 else None)
+    ax.fill([], [], label="bending to the right", **SHADE)
+    ax.set(xlabel="place on the body, tail 0 to head 1", ylabel="phase of the cycle (rad)", xlim=(0, 1))
+    ax.set(ylim=(0, 2 * np.pi), yticks=QUARTERS, yticklabels=QUARTER_LABELS)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def draw_trace(ax, one: dict):
+    """Curvature and moment over a cycle at PLACE, each over its largest value, and the span in which the right works."""
+    k, t = np.abs(one["s"] - PLACE).argmin(), np.append(one["t"], 2 * np.pi)
+    for key, color, label in (
+        ("bend", BLUE, "curvature, + to the left"),
+        ("moment", GREEN, "moment, + left side works"),
+    ):
+        trace = np.append(one[key][:, k], one[key][0, k])
+        ax.plot(t, trace / np.abs(trace).max(), color=color, label=label)
+    falls = np.append(one["bend_rate"][:, k], one["bend_rate"][0, k]) < 0
+    ax.fill_between(t, -1.1, 1.1, where=falls, label="bending to the right", **SHADE)
+    for key, dashes in (("onset", "-"), ("offset", "--")):
+        ax.axvline(np.mod(one[key][k], 2 * np.pi), color=GREEN, ls=dashes, lw=1.0)
+    ax.axhline(0.0, color="0.5", lw=0.6)
+    ax.set(xlabel="phase of the cycle (rad)", ylabel=f"over its largest value, at s = {PLACE}", ylim=(-1.1, 1.1))
+    ax.set(xlim=(0, 2 * np.pi), xticks=QUARTERS, xticklabels=QUARTER_LABELS)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def draw_lag(ax, numbers: dict):
+    from cmcrameri import cm
+
+    for k in shown(numbers):
+        waves = numbers["waves"][k]
+        colour = cm.batlow(0.8 * (waves - SHOWN[0]) / (SHOWN[-1] - SHOWN[0]))
+        ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=f"{waves:g}")
+    ax.axhline(np.pi / 2, color="0.5", lw=0.6)
+    ax.text(0.02, np.pi / 2 - 0.08, "works while\nit shortens", va="top", fontsize=8, color="0.3")
+    ax.set(xlabel="place on the body, tail 0 to head 1", ylabel="activation ahead of curvature (rad)", xlim=(0, 1))
+    ax.set(yticks=QUARTERS[:4], yticklabels=QUARTER_LABELS[:4])
+    ax.legend(title="waves on the body", loc="upper right", ncols=2)
+
+
+def draw_speed(ax, numbers: dict):
+    waves, head = numbers["waves"], numbers["head"]
+    for key, colour, label in (("speed", "black", "onset, offset"), ("fundamental_speed", "#D55E00", "first harmonic")):
+        ax.plot(waves, numbers[key], color=colour, label=label)
+        ax.plot(waves, head[key], color=colour, ls="--", lw=1.0)
+    ax.plot([], [], "--", color="0.4", lw=1.0, label="with head drag")
+    ax.axhline(1.0, color="0.5", lw=0.6)
+    ax.set(xlabel="waves on the body", ylabel="speed of activation / curvature", ylim=(0, None))
+    ax.legend(loc="lower left")
+
+
 if __name__ == "__main__":
-    main("fig10", compute, draw)
+    main("fig10", compute, draw, table)
