@@ -9,7 +9,7 @@ import numpy as np
 
 from figures import main
 from geomech import plots
-from geomech.scene import load
+from geomech.scenes import load
 from rft import EndCaps, GrainInertia, SkinFriction
 
 SETS = {

@@ -16,7 +16,8 @@ import numpy as np
 from figures import main
 from geomech import plots, swimmers
 from geomech.gaits import Sine
-from geomech.scene import Scene, load
+from geomech.scene import Scene
+from geomech.scenes import load
 
 SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
 AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (2 * np.pi)  # equal steps of relative curvature

@@ -28,7 +28,7 @@ import numpy as np
 from figures import main
 from geomech import plots, swimmers
 from geomech.gaits import Sine
-from geomech.scene import load
+from geomech.scenes import load
 from rft import Backbone
 
 WAVES = np.linspace(0.5, 1.8, 27)

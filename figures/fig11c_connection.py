@@ -6,7 +6,7 @@ import numpy as np
 
 from figures import main
 from geomech import plots
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from figures import main
 from geomech import plots
 from geomech.gaits import Butterfly
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

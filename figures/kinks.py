@@ -10,7 +10,7 @@ import numpy as np
 
 from figures import main
 from geomech import connection, harmonics, plots
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:

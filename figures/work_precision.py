@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from figures import main
 from geomech import accuracy, plots
-from geomech.scene import load
+from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass") -> dict:

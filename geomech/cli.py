@@ -39,7 +39,7 @@ def run(
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech import report
-    from geomech.scene import load
+    from geomech.scenes import load
 
     scene = load(name)
     with report.whole_folder(out) as folder, progress(f"field of {scene.name}") as bar:
@@ -57,7 +57,7 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
-    from geomech.scene import load
+    from geomech.scenes import load
 
     scene = load(name)
     solution = scene.solve(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
@@ -205,7 +205,7 @@ def explain(name: SceneArgument):
 def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's TOML")] = None):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
-    from geomech.scene import builtin_names, load
+    from geomech.scenes import builtin_names, load
 
     if show is not None:
         print(load(choose("--show", show, builtin_names())).text, end="")
@@ -232,7 +232,7 @@ def progress(title: str):
 
 
 def _loaded(name: str, grid: int | None, extent: float | None):
-    from geomech.scene import load
+    from geomech.scenes import load
 
     return load(name).with_numerics(grid=grid, extent=extent)
 

@@ -36,29 +36,23 @@ def distance(a, b) -> np.ndarray:
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
     """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 8, >= 32."""
     phases = max(32, 8 * -(-phases // 8))
-    if scene.engine != "algebraic":
-        return _marched(scene, gait, amplitudes, max(64, phases))
-    alpha, alphadot = gait.cycle(phases, amplitudes)
-    solution = scene.solve(alpha, alphadot).checked()
-    eighth, coarse, half, full = (displacement(solution.xi[..., ::step, :]) for step in (8, 4, 2, 1))
+    marching = scene.engine != "algebraic"
+    shapes = gait.cycle(max(64, phases) if marching else phases, amplitudes)
+    every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
+    run = scene.run(*shapes)
+    if marching:  # a step rests on the one before: fewer phases are another march
+        eighth, coarse, half, full = *(scene.run(*fewer).net for fewer in every[:3]), run.net
+    else:
+        eighth, coarse, half, full = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2, 1))
     error = _left(
-        *(distance(*pair) for pair in ((coarse, eighth), (half, coarse), (full, half))), scene.medium.dry != ()
+        *(distance(*pair) for pair in ((coarse, eighth), (half, coarse), (full, half))),
+        marching or scene.medium.dry != (),
     )
-    travelled = scene.body.length * np.linalg.norm(alphadot, axis=-1)
-    error += 2 * np.pi * (solution.residual * travelled).mean(-1)
+    error += 2 * np.pi * scene.body.length * run.residual * run.speed
     if finer := finer_model(scene):
-        refined = displacement(finer.velocity(alpha[..., ::4, :], alphadot[..., ::4, :]))
-        error += 1.2 * distance(refined, coarse)
-    return full, error / scene.body.length
-
-
-def _marched(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
-    """`direct` where a step rests on the one before: fewer phases are another march, not some of these."""
-    full, half, coarse, eighth = (scene.cycle(gait, amplitudes, phases // k).net for k in (1, 2, 4, 8))
-    error = _left(distance(coarse, eighth), distance(half, coarse), distance(full, half), True)
-    if finer := finer_model(scene):
-        error += 1.2 * distance(finer.cycle(gait, amplitudes, phases // 4).net, coarse)
-    return full, error / scene.body.length + max([0.0, *(e.settles for e in scene.effects)])
+        error += 1.2 * distance(finer.run(*every[1]).net, coarse)
+    settled = max(e.settles for e in scene.effects) if marching else 0.0
+    return full, error / scene.body.length + settled
 
 
 def _left(d0, d1, d2, kinks: bool) -> np.ndarray:

@@ -1,19 +1,14 @@
-"""Scenes: a medium, a body, a gait and how finely to compute, from TOML. The one place that joins rft and geomech."""
+"""Scenes: a medium, a body, a gait, effects and how finely to compute. The one place that joins rft and geomech."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import time
-import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import resources
-from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 import rft
@@ -23,14 +18,12 @@ from geomech import family as fam
 from geomech import harmonics as harm
 from geomech.curvature import ccf
 from geomech.field import Field
-from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.problem import SceneError, choose
 from geomech.simulate import displacement
-from rft.bodies import KINDS as BODIES
 from rft.effects import KINDS as EFFECTS
 from rft.loads import element_load
-from rft.media import LAWS, is_linear
+from rft.media import is_linear
 
 METHODS = ("area", "adapted", "path", "harmonic", "direct")  # cheapest look-up first
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
@@ -80,11 +73,13 @@ class Numerics:
 
 class Cycle(NamedTuple):
     """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
-    in the frame at its start. residual: (...), the largest of the cycle. work: `rft.Work`, (..., N) each, or None."""
+    in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work:
+    `rft.Work`, (..., N) each, or None."""
 
     xi: np.ndarray
     net: np.ndarray
     residual: np.ndarray
+    speed: np.ndarray
     work: rft.Work | None
 
 
@@ -148,21 +143,26 @@ class Scene:
         return rft.effects.engine(self.effects)
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
-        """A gait, or the scene's own, run by the scene's engine for amplitudes (...,), all at once. RuntimeError if a force
-        balance did not converge or a march did not settle."""
-        gait, n = gait or self.gait, self.numerics
-        alpha, alphadot = gait.cycle(phases or n.phases, amplitudes)
+        """A gait, or the scene's own, run by the scene's engine for amplitudes (...,), all at once; see `run`."""
+        return self.run(*(gait or self.gait).cycle(phases or self.numerics.phases, amplitudes), work)
+
+    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the scene's engine.
+        RuntimeError if a force balance did not converge or a march did not settle."""
+        n = self.numerics
+        speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
         if self.engine == "algebraic":
-            solution = self.solve(alpha, alphadot).checked()
-            done = self.work(alpha, alphadot, solution.xi) if work else None
-            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), done)
+            each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
+            solution = each.solve(alpha, alphadot).checked()
+            done = each.work(alpha, alphadot, solution.xi) if work else None
+            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done)
         march = rft.march(
             self.medium, self.body, alpha, alphadot, effects=self.effects, cycles=n.cycles, with_work=work,
             loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
         ).checked()  # fmt: skip
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
         net = march.displacement if "symmetry" in rft.effects.broken(self.effects) else displacement(march.xi)
-        return Cycle(march.xi, net, march.residual, march.work)
+        return Cycle(march.xi, net, march.residual, speed, march.work)
 
     @property
     def linear(self) -> bool:
@@ -340,112 +340,3 @@ def _timed(f: Callable):
     start = time.perf_counter()
     value = f()
     return value, time.perf_counter() - start
-
-
-def builtin_names() -> list[str]:
-    """Names of the scenes that ship with the package."""
-    return sorted(p.name.removesuffix(".toml") for p in _folder().iterdir() if p.name.endswith(".toml"))
-
-
-def _folder():
-    return resources.files("geomech") / "scenes"
-
-
-def load(scene: str | Path) -> Scene:
-    """The scene of a built-in name or a TOML file; SceneError, one line, if it is not one."""
-    names = builtin_names()
-    if str(scene) in names:
-        return parse((_folder() / f"{scene}.toml").read_text(), str(scene))
-    path = Path(scene)
-    if path.suffix != ".toml" and not path.exists():
-        choose("scene", str(scene), names)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
-        raise SceneError(
-            f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
-        ) from None
-    return parse(text, str(scene))
-
-
-def parse(text: str, name: str = "scene") -> Scene:
-    """The scene of a TOML text; SceneError if it is not one."""
-    try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
-        raise SceneError(f"{name} is not TOML: {error}") from None
-    return from_tables(tables, name, text)
-
-
-def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
-    """The scene of the tables of a TOML text; SceneError if they make none."""
-    tables = dict(tables)
-    for table in tables:
-        choose(f"{name}: table", table, ("medium", "body", "gait", "numerics", "effects"))
-    for table in ("medium", "body", "gait"):
-        if table not in tables:
-            raise SceneError(f"{name}: the table [{table}] is missing: add it, see 'geomech scenes --show NAME'")
-    effects = tables.pop("effects", [])
-    if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
-        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
-    for table, value in tables.items():
-        if not isinstance(value, dict):
-            raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
-    return Scene(
-        medium=_medium(f"{name}: [medium]", tables["medium"]),
-        body=_of_kind(f"{name}: [body]", tables["body"], "kind", BODIES),
-        gait=_of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS),
-        numerics=_build(f"{name}: [numerics]", tables.get("numerics", {}), Numerics),
-        effects=tuple(_of_kind(f"{name}: [[effects]]", e, "kind", EFFECTS) for e in effects),
-        name=name,
-        text=text,
-    )
-
-
-def _located(table: dict, name: str) -> dict:
-    """The table with its data file, if it names one, looked for from the folder of the scene file ``name``."""
-    file = table.get("file")
-    return {**table, "file": str(Path(name).absolute().parent / file)} if isinstance(file, str) else table
-
-
-def _medium(place: str, table: dict) -> rft.Medium:
-    if "name" not in table:
-        return _of_kind(place, table, "law", LAWS)
-    if extra := sorted(set(table) - {"name"}):
-        raise SceneError(
-            f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'"
-        )
-    return rft.CATALOGUE[choose(f"{place} name", table["name"], rft.CATALOGUE)].medium
-
-
-def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type]):
-    if key not in table:
-        raise SceneError(f"{place} has no {key!r}: add {key} = one of {', '.join(kinds)}")
-    kind = kinds[choose(f"{place} {key}", table[key], kinds)]
-    return _build(place, {k: v for k, v in table.items() if k != key}, kind)
-
-
-def _build(place: str, table: dict, kind: type):
-    """A dataclass from a table: keys are its fields, one of its ``angles`` may be given as ``x_deg``; else SceneError."""
-    names = [f.name for f in dataclasses.fields(kind)]
-    values = {}
-    for key, value in table.items():
-        in_degrees = key.endswith("_deg") and key.removesuffix("_deg") in getattr(kind, "angles", ())
-        field = choose(f"{place} key", key.removesuffix("_deg") if in_degrees else key, names)
-        if field in values:
-            raise SceneError(f"{place}: {field} is given twice: keep one of {field} and {field}_deg")
-        values[field] = _radians(value) if in_degrees else value
-    try:
-        return msgspec.convert(values, kind)
-    except (ValueError, OverflowError) as error:
-        raise SceneError(f"{place} {str(error).replace(' - at `$', ' - at `').replace(' - at ``', '')}") from None
-
-
-def _radians(degrees):
-    """Numbers, and numbers in lists, from degrees; anything else as it is, to be refused for what it is."""
-    if isinstance(degrees, list):
-        return [_radians(x) for x in degrees]
-    if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:
-        return math.radians(degrees)
-    return degrees

@@ -16,7 +16,8 @@ import numpy as np
 from geomech import estimate
 from geomech.netcdf import COMPONENTS
 from geomech.problem import SceneError, whole_file
-from geomech.scene import Scene, from_tables
+from geomech.scene import Scene
+from geomech.scenes import from_tables
 
 LARGEST = 1_000_000  # points
 AMPLITUDE = "gait.amplitude"

@@ -110,7 +110,8 @@ def body_velocity(
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
         shape, rate = alpha[:, moving], alphadot[:, moving] / speed[moving]
-        solved = problem.solve(lambda i: problem.body.motion(shape[:, i], rate[:, i]), speed[moving], threads)
+        which = np.flatnonzero(moving)
+        solved = problem.solve(lambda i: problem.body.motion(shape[:, i], rate[:, i]), speed[moving], threads, which)
         scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
         xi[:, moving] = solved.xi * scale
         residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
@@ -225,10 +226,11 @@ class Balance:
         self.inertia = inertia
         self.limit += 1e-14 * inertia.rate * float(np.max(inertia.weight)) / self.unit
 
-    def solve(self, motion: Callable, speed, threads=None, guess=None) -> Solved:
+    def solve(self, motion: Callable, speed, threads=None, which=None, guess=None) -> Solved:
         """Velocities over ``speed`` (B,), the samples' scale. motion(index): `Motion` of those samples at velocities over
-        their scale. guess: (3, B), tried first."""
+        their scale. which: (B,), their places in the batch that effects know. guess: (3, B), tried first."""
         self.motion, self.speed, self.guess = motion, speed, guess
+        self.which = np.arange(speed.size) if which is None else which
         size = speed.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
@@ -270,7 +272,7 @@ class Balance:
 
     def _net(self, motion: Motion, v, xi, eps, index) -> tuple[np.ndarray, np.ndarray]:
         """Element loads (3, 4, n, B) and what they, and the mass, come to on the frame, (3, 4, B)."""
-        load = self.load(*v, eps, Known(self.speed[index], index))
+        load = self.load(*v, eps, Known(self.speed[index], self.which[index]))
         net = motion.assembled(load)
         if self.inertia is not None:
             net += self.inertia(xi, index)

@@ -141,6 +141,10 @@ class _Steps:
     """The march itself: `next` takes one step. All lengths in body lengths, samples on the last axis."""
 
     def __init__(self, medium, body, alpha, alphadot, effects, loads, regularisation, tolerance):
+        self.whole = body
+        for effect in effects:
+            if effect.breaks & {"no memory", "symmetry"}:  # these look at the elements before all others act
+                body = effect.body(body)
         self.medium, self.body, self.alpha, self.alphadot = medium, body, alpha, alphadot
         self.effects, self.how = effects, (loads, regularisation, tolerance)
         self.phases, samples = len(alpha), alpha.shape[-1]
@@ -186,7 +190,7 @@ class _Steps:
             if not first:
                 balance.weigh(self._inertia(M, shape, scale, balance))
         self.limit = max(self.limit, balance.limit)
-        solved = balance.solve(motion.take, scale, 1, None if first else guess / scale)
+        solved = balance.solve(motion.take, scale, 1, guess=None if first else guess / scale)
         xi = solved.xi * scale
         if not first:
             self.pose = _moved(self.pose, (self.xi[-1] + xi) / 2, self.dt)
@@ -198,7 +202,9 @@ class _Steps:
             momentum = scale * (np.einsum("ijb,jb->ib", M, solved.xi) + shape)
             self.momenta = [*self.momenta[-1:], momentum]
         self.step += 1
-        work = done_by(balance.load, motion, solved.xi, scale, regularisation, balance.linear) if with_work else None
+        work = None
+        if with_work:
+            work = done_by(balance, self.whole, motion, solved.xi, scale)
         return xi, self.pose, solved.residual, work
 
     def _here(self, pose: np.ndarray, scale: np.ndarray) -> Here:

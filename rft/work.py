@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion
-from rft.effects.base import Effect, applied
-from rft.loads import Known, element_load
+from rft.balance import Balance
+from rft.bodies.base import Body, Motion, halves
+from rft.effects.base import Effect
+from rft.loads import Known
 from rft.media.base import Medium
 
 
@@ -39,26 +40,29 @@ def work(
     """Power and internal moments for body velocities xi (..., 3) that `body_velocity` gave for the same arguments."""
     alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
     batch = alpha.shape[:-1]
-    load, body = applied(effects, element_load(medium, loads), medium, body)
+    balance = Balance(medium, body, loads, regularisation, 1.0, effects)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = np.asarray(xi, float).reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
     speed = np.sqrt((alphadot**2).sum(0))
     scale = np.where(speed > 0, speed, 1.0)
-    motion = body.motion(alpha, alphadot / scale)
-    done = done_by(load, motion, xi / scale, scale, regularisation, medium.dry == ())
+    motion = balance.body.motion(alpha, alphadot / scale)
+    done = done_by(balance, body, motion, xi / scale, scale)
     return Work(done.power.reshape(batch) * body.length, *(x.reshape(*batch, *x.shape[1:]) for x in done[1:]))
 
 
-def done_by(load, motion: Motion, xi, scale, regularisation: float, linear: bool) -> Work:
+def done_by(balance: Balance, body: Body, motion: Motion, xi, scale) -> Work:
     """`Work` of B samples from body velocities xi (3, B), in body lengths; they and the motion are over scale (B,), as the
-    balance is solved: a linear law is proportional to it, a dry one does not know."""
+    balance was solved: a linear law is proportional to it, a dry one does not know. Moments are those between the
+    elements of ``body``, of which the balance's may be pieces."""
     v = motion.v + motion.carried(xi)
-    f = load(*v, np.full_like(scale, regularisation), Known(scale))[:, 0] * motion.weight
-    if linear:
+    f = balance.load(*v, np.full_like(scale, balance.regularisation), Known(scale))[:, 0] * motion.weight
+    if balance.linear:
         f = f * scale
     n = np.count_nonzero(motion.half)
     slip = np.average(np.arctan2(np.abs(v[1, :n]), np.abs(v[0, :n])), 0, motion.half[:n, 0])
-    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n), slip)
+    ends, wanted = (np.cumsum(2 * h) for h in (motion.half[:n, 0], halves(body)))
+    points = np.searchsorted(ends, wanted[:-1] - 1e-9 * wanted[0])
+    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n)[:, points], slip)
 
 
 def _moments(motion, f, n: int) -> np.ndarray:

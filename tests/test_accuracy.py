@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from figures import cost_scaling, work_precision
-from geomech import accuracy, connection, predict, scene
+from geomech import accuracy, connection, predict, scenes
 from geomech.gaits import Circle, Ellipse
 from rft import Chain, Viscous, body_velocity
 
@@ -18,7 +18,7 @@ def glass():
 
 @pytest.fixture(scope="module")
 def viscous():
-    return accuracy.study(scene.load("three-link-viscous"))
+    return accuracy.study(scenes.load("three-link-viscous"))
 
 
 def line(results, label):
@@ -67,7 +67,7 @@ def test_interpolation_is_of_order_degree_plus_one(degree, order):
 
 
 def test_families_are_of_order_four_where_nothing_kinks():
-    viscous = scene.load("three-link-viscous")
+    viscous = scenes.load("three-link-viscous")
     counts = np.array([8, 16, 32, 64])
     a = np.linspace(0.0, 1.5, 2001)[1:]
     exact = predict.direct(viscous.velocity, Circle(), a)
@@ -90,7 +90,7 @@ def test_phases_are_spectral_where_nothing_kinks():
 
 def test_phases_are_of_order_two_across_kinks():
     """Averaged over gaits, since where a kink falls between two phases is chance."""
-    glass = scene.load("three-link-glass")
+    glass = scenes.load("three-link-glass")
     radii, counts = np.linspace(0.4, 2.0, 25), np.array([32, 64, 128, 256, 512])
     exact = predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, 4096)
     off = [predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact for n in counts]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from geomech import cli, scene
+from geomech import cli, scenes
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
 from geomech.problem import SceneError
@@ -96,7 +96,7 @@ def test_order_along_the_body(kind, tmp_path):
 @pytest.fixture(scope="module")
 def sandfish():
     """The built-in sandfish with fewer elements, and its displacement."""
-    full = scene.load("sandfish-loose").with_numerics(phases=64)
+    full = scenes.load("sandfish-loose").with_numerics(phases=64)
     made = dataclasses.replace(full, body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS))
     return made, made.displacement("direct")
 
@@ -234,13 +234,13 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     surroundings = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path / "elsewhere", env=surroundings)
     assert (done.returncode, done.stderr) == (0, "")
-    made = scene.load(toml)
+    made = scenes.load(toml)
     sine = made.displacement("direct", Sine(amplitude=0.1, elements=ELEMENTS))
     assert float(done.stdout.splitlines()[2].split()[1]) == pytest.approx(np.hypot(*sine[:2]), abs=2e-5)
     with pytest.raises(SceneError, match="cannot read"):
-        scene.parse(toml.read_text())
+        scenes.parse(toml.read_text())
     monkeypatch.chdir(tmp_path)
-    assert scene.parse(toml.read_text()).gait == made.gait
+    assert scenes.parse(toml.read_text()).gait == made.gait
 
 
 def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
@@ -248,11 +248,11 @@ def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
 
     toml = scene_in(tmp_path, 12)
     write(tmp_path / "data", "points", count=12, places=20)
-    before = scene.load(toml)
-    assert sweep._mark(before, {}) == sweep._mark(scene.load(toml), {})
+    before = scenes.load(toml)
+    assert sweep._mark(before, {}) == sweep._mark(scenes.load(toml), {})
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
-    assert sweep._mark(before, {}) != sweep._mark(scene.load(toml), {})
-    swept = sweep.sweep(scene.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
+    assert sweep._mark(before, {}) != sweep._mark(scenes.load(toml), {})
+    swept = sweep.sweep(scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
     assert np.isfinite(swept["displacement"]).all()
 
 
@@ -337,7 +337,7 @@ def test_bad_files_get_one_line(name, tmp_path, monkeypatch, capsys):
     toml = scene_in(tmp_path, 12, more)
     make(tmp_path / "data" / "swim.csv")
     with pytest.raises(ValueError, match=said):
-        scene.load(toml)
+        scenes.load(toml)
     monkeypatch.setattr(sys, "argv", ["geomech", "displacement", str(toml), "--amplitudes", "1"])
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     with pytest.raises(SystemExit) as left:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import scene
+from geomech import scenes
 
 SMALL = ["--grid", "9"]
 
@@ -39,7 +39,7 @@ def test_connection_is_a_self_describing_file(tmp_path):
         assert data.component.values.tolist() == ["x", "y", "theta"]
         assert (data.alpha_1.values[[0, -1]] == [-2.0, 2.0]).all()
         assert all("units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1"))
-        again = scene.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0).fitted
+        again = scenes.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0).fitted
         np.testing.assert_array_equal(data.A, again.A)
     assert plot.read_text().lstrip().startswith("<?xml")
     assert {p.name for p in tmp_path.iterdir()} == {"a.nc", "a.svg"}
@@ -76,7 +76,7 @@ def test_displacement_to_a_tolerance():
 
 
 def test_accuracy_leaves_its_study(tmp_path):
-    (tmp_path / "s.toml").write_text(scene.load("three-link-viscous").text)
+    (tmp_path / "s.toml").write_text(scenes.load("three-link-viscous").text)
     code, out, err = geomech("accuracy", "s.toml", "-o", "out", cwd=tmp_path)
     assert (code, err) == (0, "")
     files = {p.name for p in (tmp_path / "out").iterdir()}
@@ -109,9 +109,9 @@ def test_run_leaves_everything(tmp_path):
 def test_scenes_are_listed():
     code, out, _ = geomech("scenes")
     assert code == 0
-    assert all(name in out for name in scene.builtin_names())
+    assert all(name in out for name in scenes.builtin_names())
     assert "glass-0.3mm-loose" in out
-    assert geomech("scenes", "--show", "three-link-glass")[1] == scene.load("three-link-glass").text
+    assert geomech("scenes", "--show", "three-link-glass")[1] == scenes.load("three-link-glass").text
 
 
 BAD = [
@@ -161,7 +161,7 @@ def test_bad_input_gets_one_line_and_exit_code_2(args, said, tmp_path):
 
 
 def test_letters_of_any_alphabet_are_kept(tmp_path):
-    text = scene.load("three-link-viscous").text + "# schön ☃\n"
+    text = scenes.load("three-link-viscous").text + "# schön ☃\n"
     (tmp_path / "schön.toml").write_text(text, encoding="utf-8")
     assert geomech("connection", "schön.toml", *SMALL, "-o", "ö.nc", cwd=tmp_path)[0] == 0
     with xarray.open_dataset(tmp_path / "ö.nc") as data:
@@ -176,7 +176,7 @@ def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
         raise ValueError("half way")
 
     monkeypatch.setattr(plots, "displacement", fail)
-    small = scene.load("three-link-glass").with_numerics(grid=5)
+    small = scenes.load("three-link-glass").with_numerics(grid=5)
     with pytest.raises(ValueError, match="half way"), report.whole_folder(tmp_path / "out") as folder:
         report.write(small, folder, None)
     assert list(tmp_path.iterdir()) == []

@@ -38,7 +38,7 @@ def test_the_misfit_of_the_plane_in_loose_glass(tmp_path):
     """26 to 33 % rms of each component in the middle-link frame."""
     import dataclasses
 
-    from geomech.scene import load
+    from geomech.scenes import load
 
     glass = load("three-link-glass").with_numerics(directions=24)
     fitted = dataclasses.replace(glass, body=dataclasses.replace(glass.body, frame="link-2")).fitted

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from geomech import scene
+from geomech import scenes
 
 VALUES = [
     "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",
@@ -48,7 +48,7 @@ def mutated(text, rng):
 def outcome(text):
     """'run' or 'refused'; anything else raises."""
     try:
-        read = scene.parse(text)
+        read = scenes.parse(text)
         read = read.with_numerics(phases=max(16, 2 * read.gait.harmonics + 1), loads="exact")
         solution = read.solve(*read.gait.cycle(16 if read.gait.harmonics < 8 else 64))
         assert (solution.status != "unconverged").all()
@@ -65,8 +65,8 @@ def outcome(text):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_scenes_are_run_or_refused(seed):
-    rng, names = np.random.default_rng(seed), scene.builtin_names()
-    texts = [mutated(scene.load(names[rng.integers(len(names))]).text, rng) for _ in range(800)]
+    rng, names = np.random.default_rng(seed), scenes.builtin_names()
+    texts = [mutated(scenes.load(names[rng.integers(len(names))]).text, rng) for _ in range(800)]
     seen = [outcome(text) for text in texts]
     assert seen.count("run") > 50
     assert seen.count("refused") > 400

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from geomech import scene
+from geomech import scenes
 from geomech.problem import SceneError
 from rft import Chain, Granular, Viscous
 
@@ -31,9 +31,9 @@ grid = 21
 """
 
 
-@pytest.mark.parametrize("name", scene.builtin_names())
+@pytest.mark.parametrize("name", scenes.builtin_names())
 def test_builtin_scenes_move(name):
-    loaded = scene.load(name).with_numerics(grid=11, phases=64)
+    loaded = scenes.load(name).with_numerics(grid=11, phases=64)
     table = loaded.study([0.8], loaded.methods)
     assert all(np.isfinite(table[m]).all() and abs(table[m][0][0]) > 1e-3 for m in loaded.methods)
     assert set(table["seconds"]) >= set(loaded.methods)
@@ -41,16 +41,16 @@ def test_builtin_scenes_move(name):
 
 
 def test_every_key_arrives():
-    read = scene.parse(GOOD, "good")
+    read = scenes.parse(GOOD, "good")
     assert read.medium == Granular(1.8, math.radians(13.8))
     assert read.body == Chain((1, 2, 1), 0.4, "link-2")
     assert read.gait.tilt == pytest.approx(math.pi / 4)
     assert (read.numerics.grid, read.name, read.unit) == (21, "good", "m")
-    assert scene.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).medium.gamma0 == 0.24
-    assert scene.parse(GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")).gait.centre[0] == pytest.approx(
+    assert scenes.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).medium.gamma0 == 0.24
+    assert scenes.parse(GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")).gait.centre[0] == pytest.approx(
         math.pi / 2
     )
-    assert scene.load("three-link-viscous").medium == Viscous(2.0)
+    assert scenes.load("three-link-viscous").medium == Viscous(2.0)
 
 
 BAD = [
@@ -97,20 +97,20 @@ BAD += [
 @pytest.mark.parametrize(("text", "said"), BAD)
 def test_bad_scenes_are_refused_in_one_line(text, said):
     with pytest.raises(SceneError, match=said) as caught:
-        scene.parse(text)
+        scenes.parse(text)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 450
 
 
 def test_unknown_names_and_files():
     with pytest.raises(SceneError, match="did you mean 'three-link-glass'"):
-        scene.load("three-link-glas")
+        scenes.load("three-link-glas")
     with pytest.raises(SceneError, match="cannot read scene 'nowhere.toml': No such file"):
-        scene.load("nowhere.toml")
+        scenes.load("nowhere.toml")
 
 
 def test_the_path_of_a_linear_medium_needs_no_field():
-    viscous = scene.load("three-link-viscous")
+    viscous = scenes.load("three-link-viscous")
     table = viscous.study([1.0], ["path", "direct"])
     assert "field" not in table["seconds"]
     assert math.hypot(*table["path"][0][:2]) == pytest.approx(0.0512808243, abs=5e-11)
@@ -119,7 +119,7 @@ def test_the_path_of_a_linear_medium_needs_no_field():
 
 def test_four_links_have_no_area_tier():
     text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
-    four = scene.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
+    four = scenes.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
     assert four.methods == ("path", "direct")
     assert np.isfinite(four.displacement("direct")).all()
     with pytest.raises(SceneError, match="two joints"):
@@ -128,7 +128,7 @@ def test_four_links_have_no_area_tier():
 
 def test_loose_glass_circles():
     """Displacement per cycle on circles of 0.5, 1 and 1.75 rad, an independent computation's three digits."""
-    got = scene.load("three-link-glass").displacement("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
+    got = scenes.load("three-link-glass").displacement("direct", amplitudes=np.array([0.5, 1.0, 1.75]))
     np.testing.assert_allclose(np.hypot(got[:, 0], got[:, 1]), [0.0121, 0.0638, 0.1378], rtol=0.01)
 
 
@@ -136,7 +136,7 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     """101 x 101 x 16 samples of loose glass over +-2.8 rad."""
     import resource
 
-    glass = scene.load("three-link-glass")
+    glass = scenes.load("three-link-glass")
     axis = np.linspace(-2.8, 2.8, 101)
     alpha = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1)[:, :, None]
     angle = np.pi * np.arange(16) / 16

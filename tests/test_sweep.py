@@ -7,16 +7,16 @@ import pytest
 import xarray
 from test_cli import geomech
 
-from geomech import estimate, scene, sweep
+from geomech import estimate, scenes, sweep
 from geomech.problem import SceneError
 
-GLASS = scene.load("three-link-glass").with_numerics(phases=32)
+GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
 
 def test_every_point_is_the_scene_there():
     results = sweep.sweep(GLASS, {"gait.amplitude": [0.5, 1.0, 1.5], "body.length": [1.0, 2.0]})
     assert results["displacement"].shape == (3, 2, 3)
-    alone = scene.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 ")).with_numerics(phases=32)
+    alone = scenes.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 ")).with_numerics(phases=32)
     poses, error = estimate.direct(alone, alone.gait, np.array([1.5]), alone.numerics.phases)
     np.testing.assert_allclose(results["displacement"][2, 1], poses[0], atol=1e-12)
     np.testing.assert_allclose(results["estimate"][2, 1], error[0], rtol=1e-6)
@@ -24,7 +24,7 @@ def test_every_point_is_the_scene_there():
 
 
 def test_effects_and_whole_numbers_can_be_swept():
-    fish = scene.load("sandfish-loose")
+    fish = scenes.load("sandfish-loose")
     results = sweep.sweep(fish, {"effects.end-caps.radius": [0.0, 0.1], "numerics.phases": [32, 64]})
     assert (results["displacement"][0, :, 0] > results["displacement"][1, :, 0]).all()
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import connection, estimate, family, harmonics, plots, predict, scene
+from geomech import connection, estimate, family, harmonics, plots, predict, scenes
 from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.problem import SceneError
 from geomech.scene import METHODS, Numerics, Scene
 from rft import Chain
 
-GLASS = scene.load("three-link-glass")
+GLASS = scenes.load("three-link-glass")
 RADII = np.linspace(0.5, 2.0, 13)
 SCALES = np.linspace(0.25, 1.0, 7)
 

@@ -7,10 +7,8 @@ import pytest
 from scipy.optimize import brentq
 
 from figures import fig09c_efficiency, fig10_neuromechanics
-from geomech import plots, scene, swimmers
-from geomech.explain import explain
+from geomech import plots, scenes, swimmers
 from geomech.gaits import Circle, Sine
-from geomech.problem import SceneError
 from geomech.simulate import displacement
 from rft import (
     CATALOGUE,
@@ -19,7 +17,6 @@ from rft import (
     ConstantCurvature,
     Coulomb,
     EndCaps,
-    GrainInertia,
     Granular,
     Serpenoid,
     SkinFriction,
@@ -27,10 +24,9 @@ from rft import (
     body_velocity,
     work,
 )
-from rft.effects import KINDS as EFFECT_KINDS
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
-SANDFISH = scene.load("sandfish-loose")
+SANDFISH = scenes.load("sandfish-loose")
 
 
 def test_the_sine_is_a_sine():
@@ -176,80 +172,8 @@ def test_long_bodies_approach_the_endless_wave():
     assert off[2] < 0.03
 
 
-EFFECTS = {
-    "grain-inertia": (lambda x: GrainInertia(frequency=x, length=1.0, depth=0.1), 2.0),
-    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.0, length=0.1, depth=0.1, strength=x), 1.0),
-    "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1.0),
-    "end-caps": (lambda x: EndCaps(radius=0.1 * x, tail=4.0), 1.0),
-}
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_effects_vanish_at_their_limit(name):
-    make, order = EFFECTS[name]
-    body, (alpha, alphadot) = Backbone(20), Sine(elements=20).cycle(16)
-    plain = body_velocity(GLASS, body, alpha, alphadot).xi
-    sizes = np.array([0.04, 0.02, 0.01, 0.005])
-    off = [np.abs(body_velocity(GLASS, body, alpha, alphadot, effects=(make(x),)).xi - plain).max() for x in sizes]
-    assert np.polyfit(np.log(sizes), np.log(off), 1)[0] == pytest.approx(order, abs=0.1)
-    np.testing.assert_allclose(body_velocity(GLASS, body, alpha, alphadot, effects=(make(0.0),)).xi, plain, atol=1e-8)
-
-
-def test_end_caps_are_the_written_formula():
-    cap, psi, e = EndCaps(radius=0.08, head=4.0, tail=0.0), np.linspace(0.01, 3.1, 20), 4.0
-    along, across = cap.traction(GLASS, np.cos(psi), np.sin(psi))
-    unit = 2 * 0.08  # 2 r C_F L with C_F = L = 1
-    axial = e * np.pi * 0.08**2 * GLASS.C * np.sin(np.arctan(np.cos(psi) / np.tan(GLASS.gamma0))) / unit
-    np.testing.assert_allclose(along, axial, rtol=1e-12)
-    np.testing.assert_allclose(across, e * np.pi * 0.08**2 * np.sin(psi) / unit, rtol=1e-12)
-
-
-def test_effects_that_are_off_are_not_evaluated(monkeypatch):
-    calls = []
-    for kind in (EndCaps, SkinFriction):
-        for method in ("load", "body"):
-            original = getattr(kind, method)
-            monkeypatch.setattr(kind, method, lambda self, *a, f=original: calls.append(type(self)) or f(self, *a))
-    plain = dataclasses.replace(SANDFISH, effects=())
-    plain.velocity(*plain.gait.cycle(16))
-    assert calls == []
-    SANDFISH.velocity(*SANDFISH.gait.cycle(16))
-    assert set(calls) == {EndCaps}
-
-
-def test_explain_names_effects_engine_and_losses():
-    told = explain(scene.load("shovel-nosed-snake"))
-    assert "on:  skin-friction" in told
-    assert "on:  end-caps" in told
-    assert "engine: algebraic" in told
-    assert "not available: CCF maps" in told
-    plain = explain(scene.load("three-link-glass"))
-    assert "off, not evaluated: " + ", ".join(EFFECT_KINDS) in plain
-    assert "not available" not in plain
-
-
-BAD = [
-    ('kind = "end-cap"\nradius = 0.1', "'end-cap' is unknown; did you mean 'end-caps'"),
-    ('kind = "end-caps"', "missing required field `radius`"),
-    ('kind = "end-caps"\nradius = -1', "radius must lie from 0 to 1"),
-    ('kind = "skin-friction"\nforward = 0', "forward must be a coefficient"),
-    ('kind = "end-caps"\nradius = 0.1\n[[effects]]\nkind = "end-caps"\nradius = 0.2', "asked for twice"),
-]
-
-
-@pytest.mark.parametrize(("effects", "said"), BAD)
-def test_bad_effects_are_refused(effects, said):
-    with pytest.raises(SceneError, match=said):
-        scene.parse(scene.load("three-link-glass").text + "[[effects]]\n" + effects)
-
-
-def test_end_caps_need_grains():
-    with pytest.raises(SceneError, match="end caps take a granular medium, got Viscous"):
-        scene.parse(scene.load("three-link-viscous").text + '[[effects]]\nkind = "end-caps"\nradius = 0.1')
-
-
 def test_serpenoid_has_a_connection_and_a_ccf():
-    swimmer = scene.load("serpenoid-glass").with_numerics(grid=15)
+    swimmer = scenes.load("serpenoid-glass").with_numerics(grid=15)
     table = swimmer.study([6.0], swimmer.methods)
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
@@ -292,13 +216,13 @@ def test_cost_and_slip(numbers, name):
     found = numbers[name]
     assert found["best"]["cost_of_transport"] == (pytest.approx(place, abs=0.006), pytest.approx(cost, rel=0.015))
     assert np.interp(0.22, found["amplitude"], found["slip"]) == pytest.approx(slip, rel=0.02)
-    fine = [swimmers.performance(fig09c_efficiency.refined(scene.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
+    fine = [swimmers.performance(fig09c_efficiency.refined(scenes.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
     costs, slips = (np.array([f[key][k] for f in fine]) for key, k in (("cost_of_transport", 0), ("slip", 1)))
     assert costs[-1] == pytest.approx(cost, rel=1e-3)
     assert slips[-1] == pytest.approx(slip, rel=1e-3)
     for x in (costs, slips):
         assert abs(x[2] - x[1]) < 0.4 * abs(x[1] - x[0])
-    phases = swimmers.performance(scene.load(name).with_numerics(phases=128), [place, 0.22])
+    phases = swimmers.performance(scenes.load(name).with_numerics(phases=128), [place, 0.22])
     assert phases["cost_of_transport"][0] == pytest.approx(costs[0], rel=1e-3)
     assert phases["slip"][1] == pytest.approx(slips[0], rel=2e-3)
 
@@ -307,10 +231,10 @@ def test_efficiency_and_slip_have_no_optimum():
     """They go on improving; what the snake's own elements show at large amplitudes is their coarseness."""
     amplitudes = [0.3, 0.4, 0.5]
     for name, finer in (("sandfish-loose", 1), ("sandfish-close", 1), ("shovel-nosed-snake", 3)):
-        found = swimmers.performance(fig09c_efficiency.refined(scene.load(name), finer), amplitudes)
+        found = swimmers.performance(fig09c_efficiency.refined(scenes.load(name), finer), amplitudes)
         assert fig09c_efficiency.optimum(amplitudes, found["efficiency"], 1) is None
         assert fig09c_efficiency.optimum(amplitudes, found["slip"], -1) is None
-    coarse = swimmers.performance(scene.load("shovel-nosed-snake"), amplitudes)
+    coarse = swimmers.performance(scenes.load("shovel-nosed-snake"), amplitudes)
     assert coarse["efficiency"][2] < coarse["efficiency"][1] < found["efficiency"][1]
 
 
@@ -339,7 +263,7 @@ def test_a_sweep_is_one_batch_of_everything():
 def test_granular_only_when_asked():
     assert isinstance(GLASS, Granular)
     with pytest.raises(ValueError, match="sine wave"):
-        swimmers.performance(scene.load("three-link-glass"), [0.1])
+        swimmers.performance(scenes.load("three-link-glass"), [0.1])
 
 
 def waving(waves, elements=50, phases=64, effects=(), **gait):
@@ -445,69 +369,6 @@ def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
 
 def test_activation_is_refused_without_a_wave():
     with pytest.raises(ValueError, match="activation is that of a sine wave, got a butterfly"):
-        swimmers.activation(scene.load("butterfly-glass"))
+        swimmers.activation(scenes.load("butterfly-glass"))
     with pytest.raises(ValueError, match="amplitude > 0"):
         swimmers.activation(waving(1.0, amplitude=0.0))
-
-
-def test_squared_speed_is_integrated_exactly():
-    from rft.effects.grain_inertia import squared_speed_load
-
-    rng = np.random.default_rng(0)
-    m, w = rng.normal(size=(2, 60))
-    m[:10], w[10:20], w[20:30] = 0.0, 0.0, m[20:30] * rng.choice([-1.0, 1.0], 10)
-    x, weight = np.polynomial.legendre.leggauss(3)
-    pivot = np.clip(np.where(w == 0, -1.0, -m / np.where(w == 0, 1.0, w)), -1, 1)
-    exact = np.zeros((2, 60))
-    for low, high in ((-1.0, pivot), (pivot, 1.0)):  # a polynomial on either side, for which three nodes are exact
-        s = (low + high) / 2 + (high - low) / 2 * x[:, None]
-        u = m + w * s
-        part = np.array([np.abs(u) * u, s * np.abs(u) * u])
-        exact += (weight[:, None] * part).sum(1) * (high - low) / 4
-    got = squared_speed_load(m, w)
-    np.testing.assert_allclose(got[:, 0], exact, atol=1e-14)
-    h = 1e-6
-    np.testing.assert_allclose(
-        got[:, 2], (squared_speed_load(m + h, w) - squared_speed_load(m - h, w))[:, 0] / (2 * h), atol=1e-5
-    )
-    np.testing.assert_allclose(
-        got[:, 3], (squared_speed_load(m, w + h) - squared_speed_load(m, w - h))[:, 0] / (2 * h), atol=1e-5
-    )
-
-
-INERTIAL = (
-    scene.load("three-link-glass").text
-    + '[[effects]]\nkind = "grain-inertia"\nfrequency = {f}\nlength = 0.3\ndepth = 0.05'
-)
-
-
-def test_with_grain_inertia_frequency_matters():
-    slow, fast = (scene.parse(INERTIAL.format(f=f)) for f in (0.01, 3.0))
-    plain = scene.load("three-link-glass").displacement("direct")
-    np.testing.assert_allclose(slow.displacement("direct"), plain, atol=1e-4)
-    assert np.abs(fast.displacement("direct") - plain).max() > 5e-3
-    alpha, alphadot = fast.gait.cycle(16)
-    twice = fast.velocity(alpha, 2 * alphadot) / 2
-    assert np.abs(twice - fast.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
-
-
-@pytest.mark.parametrize("method", ["area", "path", "harmonic"])
-def test_what_an_effect_breaks_is_refused_by_name(method):
-    inertial = scene.parse(INERTIAL.format(f=1.0))
-    assert inertial.methods == ("direct",)
-    with pytest.raises(SceneError, match="the effect grain-inertia, which breaks rate independence"):
-        inertial.displacement(method)
-    assert "breaks rate independence" in explain(inertial)
-    assert "not available: connection, CCF" in explain(inertial)
-    np.testing.assert_allclose(inertial.displacement("adapted"), inertial.displacement("direct"), atol=1e-3)
-
-
-def test_the_cost_of_effects_draws(tmp_path):
-    from figures import effects_cost
-    from geomech import plots
-
-    numbers = effects_cost.compute(phases=16, repeats=1)
-    assert numbers["none"]["ratio"] == 1.0
-    assert set(numbers) == set(effects_cost.SETS)
-    plots.save(effects_cost.draw(numbers), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 8_000

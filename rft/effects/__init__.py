@@ -1,6 +1,6 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine
+from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine, repeated, together
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -34,4 +34,6 @@ __all__ = [
     "applied",
     "broken",
     "engine",
+    "repeated",
+    "together",
 ]

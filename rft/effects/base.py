@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -78,6 +79,36 @@ class Effect:
     def after(self, memory, here: Here, v: np.ndarray):
         """What is remembered after a step that ended with element velocities v (3, n, B), body lengths per rad."""
         return memory
+
+
+def together(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
+    """One effect with the parameters of several of its kind, each for ``count`` samples of a batch, side by side.
+    ValueError if they differ in a parameter that cannot differ within a batch."""
+    first = effects[0]
+    joined = {}
+    for field in fields(first):
+        values = [getattr(e, field.name) for e in effects]
+        if any(v != values[0] for v in values):
+            if field.name not in first.batched:
+                raise ValueError(f"{type(first).__name__}: {field.name} cannot differ within a batch")
+            joined[field.name] = np.repeat(np.array(values, float), counts)
+    return _with(first, joined)
+
+
+def repeated(effects: Sequence[Effect], times: int) -> list[Effect]:
+    """Effects for a batch in which each sample is ``times`` samples, one after the other."""
+    arrays = [{f.name: getattr(e, f.name) for f in fields(e) if np.ndim(getattr(e, f.name))} for e in effects]
+    return [_with(e, {k: np.repeat(x, times) for k, x in a.items() if k in e.batched}) for e, a in zip(effects, arrays)]
+
+
+def _with(effect: Effect, values: dict) -> Effect:
+    """The effect with some parameters set to arrays; its own checks are for single numbers, and were made."""
+    if not values:
+        return effect
+    changed = copy.copy(effect)
+    for name, value in values.items():
+        object.__setattr__(changed, name, value)
+    return changed
 
 
 def broken(effects: Sequence[Effect]) -> frozenset:

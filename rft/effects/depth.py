@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.bodies.base import Body, stations
+from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.loads import ALONE
 from rft.media.base import require
@@ -18,8 +19,8 @@ class DepthProfile(Effect):
 
     along: |z| over that depth at equally spaced places from tail to head, linear between them; (1, 1) is level. slope:
     what the place on the ground adds to it per body length (a surface that is not level above a level plane of motion),
-    rising in the direction ``towards``, rad from the frame's heading at the start. An element counts as its centre: order
-    2 in its length. With a slope, place and heading matter.
+    rising in the direction ``towards``, rad from the frame's heading at the start. A piece of body
+    counts as its centre; links longer than a fortieth of the body are cut. With a slope, place and heading matter.
     """
 
     along: tuple[float, ...] = (1.0, 1.0)
@@ -43,29 +44,40 @@ class DepthProfile(Effect):
     def breaks(self) -> frozenset:
         return frozenset({"symmetry"}) if np.any(self.slope) else frozenset()
 
+    def body(self, body: Body) -> Body:
+        return cut(body)
+
     def load(self, load, medium, body: Body):
-        s = stations(body)
-        depth = np.interp(s, np.linspace(0, 1, len(self.along)), self.along)[:, None]
+        depth = _depths(self.along, cut(body))
         return _scaled(load, lambda known: depth)
 
     def at(self, memory, here: Here) -> Effect:
-        return _There(self.along, self.slope * (here.place * np.exp(-1j * self.towards)).real) if self.breaks else self
+        if not self.breaks:
+            return self
+        reach = here.motion.half * here.along
+        place = np.concatenate([here.place, here.place[:1] - reach[:1], here.place[-1:] + reach[-1:]])  # and both ends
+        return _There(self.along, self.slope * (place * np.exp(-1j * self.towards)).real)
 
 
 @dataclass(frozen=True, eq=False)
 class _There(Effect):
-    """The effect at one place: added (n, B), relative depth that the ground adds there."""
+    """The effect at one place: added (n + 2, B), relative depth that the ground adds at the elements and both ends."""
 
     along: tuple[float, ...]
     added: np.ndarray
     rank = DepthProfile.rank
 
     def load(self, load, medium, body: Body):
-        s = stations(body)
-        depth = np.interp(s, np.linspace(0, 1, len(self.along)), self.along)[:, None] + self.added
+        depth = _depths(self.along, body)
+        depth = depth + self.added[: len(depth)]  # the ends count where they have caps
         if not (depth > 0).all():
             raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
         return _scaled(load, lambda known: known.of(depth))
+
+
+def _depths(along, body: Body) -> np.ndarray:
+    """(n, 1): depth of the elements' centres on a level ground."""
+    return np.interp(stations(body), np.linspace(0, 1, len(along)), along)[:, None]
 
 
 def _scaled(load, depth):

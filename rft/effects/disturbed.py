@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
 from rft.media.base import require
@@ -27,7 +28,7 @@ class DisturbedGround(Effect):
     """
 
     radius: float
-    weakening: float = 0.5
+    weakening: float
 
     breaks = frozenset({"no memory"})
     limit = "weakening = 0"
@@ -37,8 +38,11 @@ class DisturbedGround(Effect):
     settles = 1e-3  # the map has cells, and no two cycles meet them alike
 
     def __post_init__(self):
-        require(0.005 <= self.radius <= 0.25, f"radius must lie from 0.005 to 0.25 body lengths, got {self.radius!r}")
+        require(0.01 <= self.radius <= 0.25, f"radius must lie from 0.01 to 0.25 body lengths, got {self.radius!r}")
         require(0 <= self.weakening <= 1, f"weakening must lie from 0 to 1, got {self.weakening!r}")
+
+    def body(self, body):
+        return cut(body)
 
     def start(self, elements: int, samples: int) -> Ground:
         return Ground(self.radius / CELLS, samples)

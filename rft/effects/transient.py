@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
 from rft.media.base import require
 
+SHORTEST = 1e-6  # body lengths: a travel of an element at rest, which creeps at the regularisation
 DEVELOPED = 3.0  # e-foldings: 95 % of the steady drag is there after the travel
 
 
@@ -21,7 +23,7 @@ class Transient(Effect):
     dh/dx = -3 h / travel. The drag across is the steady one times the share of the side it moves to. travel: body
     lengths over which 95 % comes back; the paper gives about a fifth of the amplitude of an oscillating rod. That the
     approach is exponential, that it starts from nothing, and that the drag along the body needs none are assumed.
-    An element counts as its centre: cut long links (a backbone has many elements).
+    A piece of body counts as its centre; links longer than a fortieth of the body are cut.
     """
 
     travel: float
@@ -34,6 +36,9 @@ class Transient(Effect):
 
     def __post_init__(self):
         require(0 <= self.travel <= 10, f"travel must lie from 0 to 10 body lengths, got {self.travel!r}")
+
+    def body(self, body):
+        return cut(body)
 
     def start(self, elements: int, samples: int) -> np.ndarray:
         """(2, n, B): shares to the left and right; ground at rest resists with none of its drag."""
@@ -68,7 +73,7 @@ class _Now(Effect):
 
 
 def _rate(travel):
-    return DEVELOPED / np.maximum(travel, 1e-12)
+    return np.where(np.asarray(travel) > 0, DEVELOPED / np.maximum(travel, SHORTEST), np.inf)
 
 
 def _developed(shares, before, now, dt: float, rate):
@@ -80,6 +85,8 @@ def _developed(shares, before, now, dt: float, rate):
     old, new = np.abs(before) / total, np.abs(now) / total
     # Travel first the old way and then, past a reversal, the new way; and its growth with |now|.
     travels = dt / 2 * total * np.array([np.where(same, old + new, old**2), np.where(same, 0.0, new**2)])
+    at_once = np.isinf(rate)
+    rate = np.where(at_once, 0.0, rate)
     growths = dt / 2 * np.array([np.where(same, 1.0, -(old**2)), np.where(same, 0.0, new**2 + 2 * old * new)])
     leftward = now > 0
     ways = np.where(same, leftward, before > 0), leftward
@@ -90,4 +97,4 @@ def _developed(shares, before, now, dt: float, rate):
         left = np.exp(-rate * travel)
         shares = goal + (shares - goal) * left
         slopes = slopes * left + (goal - shares) * rate * growth * sign
-    return shares, slopes
+    return np.where(at_once, 1.0, shares), slopes

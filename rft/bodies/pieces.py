@@ -1,0 +1,49 @@
+"""A body with its longer elements cut into pieces that move as before: for laws that differ from place to place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rft.bodies.base import Body, Motion, halves
+
+LONGEST = 1 / 40  # of a piece, in body lengths
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """``inner`` with every element cut into equal pieces no longer than ``longest``."""
+
+    inner: Body
+    longest: float = LONGEST
+
+    @property
+    def length(self) -> float:
+        return self.inner.length
+
+    @property
+    def joints(self) -> int:
+        return self.inner.joints
+
+    @cached_property
+    def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(owner, centre, share): of each piece its element, and its middle and half length in the element's [-1, 1]."""
+        counts = np.maximum(1, np.ceil(2 * halves(self.inner) / self.longest - 1e-9).astype(int))
+        owner = np.repeat(np.arange(counts.size), counts)
+        rank = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        return owner, ((2 * rank + 1) / counts[owner] - 1)[:, None], (1 / counts[owner])[:, None]
+
+    def motion(self, alpha, alphadot) -> Motion:
+        owner, centre, share = self._cuts
+        c, s, r_t, r_n, half, weight, v = self.inner.motion(alpha, alphadot)
+        a, m, w = v[:, owner]
+        at = half[owner] * centre
+        v = np.stack([a, m + w * centre, w * share])
+        return Motion(c[owner], s[owner], r_t[owner], r_n[owner] + at, half[owner] * share, weight[owner] * share, v)
+
+
+def cut(body: Body, longest: float = LONGEST) -> Body:
+    """``body`` in pieces, or as it is where its elements are short enough."""
+    return Pieces(body, longest) if (2 * halves(body) > longest * (1 + 1e-9)).any() else body
