@@ -14,12 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from geomech import estimate
+from geomech.gaits import Gait
 from geomech.netcdf import COMPONENTS
 from geomech.problem import SceneError, whole_file
 from geomech.scene import Scene
 from geomech.scenes import from_tables
+from rft.effects import together
 
 LARGEST = 1_000_000  # points
+SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to show progress and lose little
 AMPLITUDE = "gait.amplitude"
 SAVE_EVERY = 2.0  # seconds between savings of what there is
 
@@ -46,7 +49,8 @@ def sweep(
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...)} by the direct tier.
 
-    Amplitudes go through the solver as one batch. kept: a file that holds what is done and is taken up again when the
+    Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
+    solver together. kept: a file that holds what is done and is taken up again when the
     same sweep is asked for; removed at the end. SceneError if a point of the grid makes no scene.
     """
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
@@ -65,10 +69,11 @@ def sweep(
     rows = _taken_up(kept, scene, values)
     saved = _now()
     try:
-        for k in range(len(rows), len(points)):
-            rows.append(_row(_scene_at(tables, scene, names, points[k]), values.get(AMPLITUDE)))
+        at_once = max(1, SAMPLES_TOGETHER // len(values.get(AMPLITUDE, [0])))
+        for k in range(len(rows), len(points), at_once):
+            rows += _rows([_scene_at(tables, scene, names, p) for p in points[k : k + at_once]], values.get(AMPLITUDE))
             if progress:
-                progress((k + 1) / len(points))
+                progress(len(rows) / len(points))
             if kept and _now() - saved > SAVE_EVERY:
                 _keep(kept, scene, values, rows)
                 saved = _now()
@@ -96,11 +101,55 @@ def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
     return from_tables(tables, scene.name, scene.text)
 
 
-def _row(scene: Scene, amplitudes) -> list:
-    """[[x, y, theta, error], ...] for all amplitudes at one point of the other parameters."""
-    a = np.array([scene.gait.amplitude] if amplitudes is None else amplitudes)
-    poses, error = estimate.direct(scene, scene.gait, a, scene.numerics.phases)
-    return np.column_stack([poses, error]).tolist()
+def _rows(scenes: list[Scene], amplitudes) -> list:
+    """[[[x, y, theta, error], ...], ...] for all amplitudes of every scene, those that fit into one batch together."""
+    groups: dict = {}
+    for k, scene in enumerate(scenes):
+        groups.setdefault(_kind(scene), []).append(k)
+    rows: list = [None] * len(scenes)
+    for members in groups.values():
+        joined = beside([scenes[k] for k in members], amplitudes)
+        found = np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
+        for k, part in zip(members, np.split(found, len(members))):
+            rows[k] = part.tolist()
+    return rows
+
+
+def _kind(scene: Scene) -> str:
+    """The same for scenes that can share a batch."""
+    effects = [
+        (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched]) for e in scene.effects
+    ]
+    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, scene.engine, effects))
+
+
+def beside(scenes: list[Scene], amplitudes=None) -> Scene:
+    """One scene with the gaits and effects of several side by side, each for all amplitudes or its own one."""
+    count = 1 if amplitudes is None else len(amplitudes)
+    gaits = Beside(tuple(s.gait for s in scenes), amplitudes)
+    effects = tuple(together(same, [count] * len(scenes)) for same in zip(*(s.effects for s in scenes)))
+    return dataclasses.replace(scenes[0], gait=gaits, effects=effects)
+
+
+@dataclasses.dataclass(frozen=True)
+class Beside:
+    """Several gaits run at once, each for ``amplitudes`` or its own one: what a batch asks of a gait."""
+
+    gaits: tuple[Gait, ...]
+    amplitudes: list[float] | None
+
+    @property
+    def joints(self) -> int:
+        return self.gaits[0].joints
+
+    @property
+    def harmonics(self) -> int:
+        return max(g.harmonics for g in self.gaits)
+
+    def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
+        """alpha, alphadot (gaits x amplitudes, phases, joints)."""
+        each = [g.cycle(phases, [g.amplitude] if self.amplitudes is None else self.amplitudes) for g in self.gaits]
+        return tuple(np.concatenate(x) for x in zip(*each))
 
 
 def _mark(scene: Scene, values) -> str:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.gaits import Sine
-from geomech.simulate import displacement
 
 if TYPE_CHECKING:
     from geomech.scene import Scene
@@ -31,11 +30,9 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     """
     gait = _sine(scene, "performance")
     amplitudes = np.asarray(amplitudes, float)
-    alpha, alphadot = gait.cycle(scene.numerics.phases, amplitudes)
-    xi = scene.velocity(alpha, alphadot)
-    spent, length = scene.work(alpha, alphadot, xi), scene.body.length
-    g = displacement(xi)
-    progress = np.hypot(g[:, 0], g[:, 1]) / length
+    run, length = scene.cycle(gait, amplitudes, work=True), scene.body.length
+    spent = run.work
+    progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
     wavelength = gait.wavelength(amplitudes)
     energy = 2 * np.pi * spent.power.mean(-1) / length
     return {
@@ -47,7 +44,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
         "relative_curvature": gait.relative_curvature(amplitudes),
         "cost_of_transport": energy / np.maximum(progress, 1e-300),
         "slip": spent.slip.mean(-1),
-        "velocity": xi / np.array([length, length, 1.0]),
+        "velocity": run.xi / np.array([length, length, 1.0]),
     }
 
 
@@ -119,7 +116,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     if gait.amplitude == 0:
         raise ValueError("activation takes a wave of amplitude > 0: a straight body at rest needs no muscles")
     bend, rate = gait.cycle(scene.numerics.phases)
-    moment = scene.work(bend, rate, scene.velocity(bend, rate)).moment
+    moment = scene.run(bend, rate, work=True).work.moment
     s = np.arange(1, gait.elements) / gait.elements
     onset, offset, changes = _zeros(moment)
     right, left, _ = _zeros(bend)

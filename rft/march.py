@@ -131,7 +131,7 @@ def _shaped(found: March, batch: tuple, length: float) -> March:
     xi, pose = (np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units for x in found[:2])
     work = found.work
     if work is not None:  # (N, B, ...)
-        power, moment, slip = (np.moveaxis(x, 1, 0).reshape(*batch, len(x), *x.shape[2:]) for x in work)
+        power, moment, slip = (np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work)
         work = Work(power * length, moment, slip)
     residual, status, drift = (x.reshape(batch) for x in found[2:5])
     return March(xi, pose, residual, status, drift, found.cycles, work)

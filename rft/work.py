@@ -47,7 +47,7 @@ def work(
     scale = np.where(speed > 0, speed, 1.0)
     motion = balance.body.motion(alpha, alphadot / scale)
     done = done_by(balance, body, motion, xi / scale, scale)
-    return Work(done.power.reshape(batch) * body.length, *(x.reshape(*batch, *x.shape[1:]) for x in done[1:]))
+    return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 
 
 def done_by(balance: Balance, body: Body, motion: Motion, xi, scale) -> Work:

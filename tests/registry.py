@@ -3,7 +3,22 @@
 import math
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
-from rft import Backbone, Chain, ConstantCurvature, Coulomb, Granular, Serpenoid, Viscous
+from rft import (
+    Backbone,
+    BodyInertia,
+    Chain,
+    ConstantCurvature,
+    Coulomb,
+    DepthProfile,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    Granular,
+    Serpenoid,
+    SkinFriction,
+    Transient,
+    Viscous,
+)
 from rft.media import CATALOGUE
 
 MEDIA = {
@@ -36,6 +51,20 @@ GAITS = {
     "backwards": Butterfly(reverse=True),
     "fourier": Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0))),
     "points": Points(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9))),
+}
+
+# name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)
+EFFECTS = {
+    "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1),
+    "end-caps": (lambda x: EndCaps(radius=0.1 * x, tail=4.0), 1),
+    "depth-profile": (lambda x: DepthProfile(along=(1, 1 + x)), 1),
+    "depth-profile, slope": (lambda x: DepthProfile(slope=x, towards=1.0), 1),
+    "grain-inertia": (lambda x: GrainInertia(frequency=x, length=1.0, depth=0.1), 2),
+    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.0, length=0.1, depth=0.1, strength=x), 1),
+    "body-inertia": (lambda x: BodyInertia(mass=x, frequency=0.5, length=1.0, drag=1.0), 1),
+    "body-inertia, frequency": (lambda x: BodyInertia(mass=1.0, frequency=0.5 * x, length=1.0, drag=1.0), 2),
+    "transient": (lambda x: Transient(travel=2 * x), 1),
+    "disturbed-ground": (lambda x: DisturbedGround(radius=0.05, weakening=x), 1),
 }
 
 assert Coulomb in {type(m) for m in MEDIA.values()}

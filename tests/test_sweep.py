@@ -29,18 +29,66 @@ def test_effects_and_whole_numbers_can_be_swept():
     assert (results["displacement"][0, :, 0] > results["displacement"][1, :, 0]).all()
 
 
+PAST = "\n[[effects]]\nkind = "
+BATCHES = {
+    "wave number": ("", {"gait.waves": [0.8, 1.0, 1.5], "gait.amplitude": [0.1, 0.2]}),
+    "friction": (PAST + '"skin-friction"', {"effects.skin-friction.forward": [0.05, 0.1, 0.2]}),
+    "frequency": (
+        PAST + '"body-inertia"\nmass = 0.02\nfrequency = 1.0\nlength = 0.1\ndrag = 1.0',
+        {"effects.body-inertia.frequency": [0.0, 2.0, 5.0], "gait.amplitude": [0.1, 0.2]},
+    ),
+    "frequency of grains": (
+        PAST + '"grain-inertia"\nfrequency = 1.0\nlength = 0.1\ndepth = 0.05',
+        {"effects.grain-inertia.frequency": [0.0, 2.0, 5.0]},
+    ),
+    "travel": (PAST + '"transient"\ntravel = 0.1', {"effects.transient.travel": [0.0, 0.02, 0.1]}),
+    "ground": (
+        PAST + '"disturbed-ground"\nradius = 0.05\nweakening = 0.0',
+        {"effects.disturbed-ground.weakening": [0.0, 0.1]},
+    ),
+    "slope": (PAST + '"depth-profile"\nslope = 0.1', {"effects.depth-profile.slope": [0.05, 0.1]}),
+}
+
+
+@pytest.mark.parametrize("name", BATCHES)
+def test_sweeps_are_batches(name, monkeypatch):
+    """Points that differ in gait and effects are one call of the engine, and each is what it is alone."""
+    effect, over = BATCHES[name]
+    text = scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 16")
+    fish = scenes.parse(text + effect).with_numerics(phases=64)
+    calls, direct = [], estimate.direct
+    monkeypatch.setattr(estimate, "direct", lambda *args: calls.append(args) or direct(*args))
+    at_once = sweep.sweep(fish, over)
+    assert len(calls) == 1
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
+    alone = sweep.sweep(fish, over)
+    # Side by side all settle before any stops; the rest is rounding.
+    atol = 2e-3 if name == "ground" else 2e-6
+    np.testing.assert_allclose(at_once["displacement"], alone["displacement"], atol=atol)
+    np.testing.assert_allclose(at_once["estimate"], alone["estimate"], rtol=0.2, atol=atol)
+
+
+def test_what_cannot_share_a_batch_gets_its_own(monkeypatch):
+    fish = scenes.load("sandfish-loose").with_numerics(phases=32)
+    calls, direct = [], estimate.direct
+    monkeypatch.setattr(estimate, "direct", lambda *args: calls.append(args) or direct(*args))
+    sweep.sweep(fish, {"effects.end-caps.radius": [0.02, 0.06], "gait.waves": [0.9, 1.1]})
+    assert len(calls) == 2
+
+
 def test_an_interrupted_sweep_is_taken_up(tmp_path, monkeypatch):
     kept, over = tmp_path / ".s.partial", {"body.length": [1.0, 2.0, 3.0, 4.0], "gait.amplitude": [0.5, 1.0]}
     whole = sweep.sweep(GLASS, over)
-    row, calls = sweep._row, []
+    rows, calls = sweep._rows, []
 
     def failing(at, amplitudes):
-        calls.append(at.body.length)
+        calls.append(at[0].body.length)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return row(at, amplitudes)
+        return rows(at, amplitudes)
 
-    monkeypatch.setattr(sweep, "_row", failing)
+    monkeypatch.setattr(sweep, "_rows", failing)
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 2)  # both amplitudes of one length
     with pytest.raises(KeyboardInterrupt):
         sweep.sweep(GLASS, over, kept)
     assert len(json.loads(kept.read_text())["rows"]) == 2

@@ -29,7 +29,7 @@ class DepthProfile(Effect):
 
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
-    rank = 3
+    rank = 4
     batched = ("slope", "towards")
     angles = ("towards",)
 

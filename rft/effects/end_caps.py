@@ -44,7 +44,7 @@ class EndCaps(Effect):
 
     limit = "radius = 0"
     cost = "one point load an end"
-    rank = 2
+    rank = 3
 
     def __post_init__(self):
         require(0 <= self.radius <= 1, f"radius must lie from 0 to 1 body length, got {self.radius!r}")

@@ -33,7 +33,7 @@ class GrainInertia(Effect):
     breaks = frozenset({"rate independence"})
     limit = "frequency = 0 (order 2) or strength = 0 (order 1)"
     cost = "a dozen operations an element"
-    rank = 4  # the flux of grains does not know the ground's pressure
+    rank = 5  # the flux of grains does not know the ground's pressure
     batched = ("frequency", "length", "depth", "strength")
 
     def __post_init__(self):

@@ -31,7 +31,7 @@ class Transient(Effect):
     breaks = frozenset({"no memory"})
     limit = "travel = 0"
     cost = "two shares an element, one link integral more where its pivot lies inside"
-    rank = 1
+    rank = 2  # outside disturbed ground: its memory is that of whole elements
     batched = ("travel",)
 
     def __post_init__(self):

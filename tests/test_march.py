@@ -1,0 +1,251 @@
+"""The march: equation of motion against an independent integrator, orders in the step, hard cases, refusals."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from registry import BODIES, MEDIA
+from scipy.integrate import solve_ivp
+
+from geomech import scenes, swimmers
+from geomech.gaits import Butterfly, Circle, Sine
+from geomech.simulate import displacement
+from rft import (
+    CATALOGUE,
+    Backbone,
+    BodyInertia,
+    Chain,
+    DepthProfile,
+    DisturbedGround,
+    EndCaps,
+    Transient,
+    Viscous,
+    body_velocity,
+    march,
+)
+from rft.bodies.base import halves
+
+GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+SANDFISH = scenes.load("sandfish-loose")
+
+
+def heavy(inertia):
+    """Body inertia of mass x length x (rad/s)^2 / drag = inertia."""
+    return BodyInertia(mass=inertia, frequency=1 / (2 * np.pi), length=1.0, drag=1.0)
+
+
+@pytest.mark.parametrize("medium", MEDIA)
+def test_without_effects_a_march_is_the_balance(medium):
+    for body in (BODIES["uneven"], BODIES["serpenoid"], BODIES["backbone"]):
+        t = 2 * np.pi * np.arange(16) / 16
+        k = np.arange(body.joints)
+        alpha, alphadot = 0.4 * np.cos(t[:, None] - k), -0.4 * np.sin(t[:, None] - k)
+        found = march(MEDIA[medium], body, alpha, alphadot, cycles=1, tolerance=1e-12).checked()
+        wanted = body_velocity(MEDIA[medium], body, alpha, alphadot, tolerance=1e-12).xi
+        np.testing.assert_allclose(found.xi, wanted, atol=1e-8)
+
+
+def newton(medium, inertia, gait, cycles, eps):
+    """The three-link swimmer on the ground by world momenta: x, y, heading of the first link and both momenta, by an
+    adaptive integrator; forces by the midpoints of fine pieces. Shares nothing with the march but the force law.
+
+    Returns the pose of the centre of mass and mean heading at the end of every cycle."""
+    pieces = 60
+    offset = ((np.arange(pieces) + 0.5) / pieces - 0.5) / 3
+
+    def parts(t, theta):
+        alpha, rate = gait.shape(t), gait.rate(t)
+        heading = theta + np.concatenate([[0.0], np.cumsum(alpha)])
+        turn = np.concatenate([[0.0], np.cumsum(rate)])
+        unit = np.exp(1j * heading)
+        centre = np.cumsum(unit / 3) - unit / 6
+        flow = np.cumsum(1j * turn * unit / 3) - 1j * turn * unit / 6  # while the first link keeps its heading
+        place = centre[:, None] + offset * unit[:, None]
+        velocity = flow[:, None] + offset * (1j * turn * unit)[:, None]
+        middle = place.mean()
+        return unit, place - middle, velocity - velocity.mean()
+
+    def rate(t, y):
+        unit, place, velocity = parts(t, y[2])
+        # Momenta of the centre of mass and about it give its velocity and the turning of the first link.
+        v = y[3] + 1j * y[4]
+        spin = (y[5] - np.mean((place.conj() * velocity).imag)) / np.mean(np.abs(place) ** 2)
+        flow = v + 1j * spin * place + velocity
+        along = (flow * unit.conj()[:, None]).real
+        across = (flow * unit.conj()[:, None]).imag
+        f_t, f_n = medium.traction(along, across, eps)
+        force = -(f_t + 1j * f_n) * unit[:, None] / inertia
+        moment = np.mean((place.conj() * force).imag)
+        return [v.real, v.imag, spin, force.mean().real, force.mean().imag, moment]
+
+    _, place, velocity = parts(0.0, -gait.shape(0.0) @ [2 / 3, 1 / 3])
+    start = [0.0, 0.0, -gait.shape(0.0) @ [2 / 3, 1 / 3], 0.0, 0.0, np.mean((place.conj() * velocity).imag)]
+    times = 2 * np.pi * np.arange(cycles + 1)
+    found = solve_ivp(rate, (0, times[-1]), start, "LSODA", times, rtol=1e-8, atol=1e-10)
+    assert found.success
+    x, y, theta = found.y[:3]
+    theta = theta + gait.shape(0.0) @ [2 / 3, 1 / 3]
+    z = np.diff(x + 1j * y) * np.exp(-1j * theta[:-1])
+    return np.stack([z.real, z.imag, np.diff(theta)], -1)
+
+
+@pytest.mark.parametrize(
+    ("medium", "inertia", "eps"), [(Viscous(2.0), 0.5, 0.0), (Viscous(2.0), 4.0, 0.0), (GLASS, 3.0, 1e-3)]
+)
+def test_motion_by_an_independent_integrator(medium, inertia, eps):
+    gait = Circle(amplitude=1.0)
+    wanted = newton(medium, inertia, gait, 8, eps * np.sqrt(np.mean(np.sum(gait.rate(np.zeros(1)) ** 2))))[-1]
+    alpha, alphadot = gait.cycle(512)
+    found = march(medium, Chain(), alpha, alphadot, effects=(heavy(inertia),), regularisation=max(eps, 1e-6)).checked()
+    np.testing.assert_allclose(displacement(found.xi), wanted, atol=3e-5)
+    plain = displacement(body_velocity(medium, Chain(), alpha, alphadot).xi)
+    assert np.abs(plain - wanted).max() > 3e-4  # mass matters here
+
+
+def test_a_body_in_almost_nothing_keeps_its_momentum():
+    """With a millionth of drag the momentum over the ground stays what it was at the start."""
+    alpha, alphadot = Circle(amplitude=1.0).cycle(256)
+    found = march(Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e6),), cycles=1)
+    xi, theta = found.xi, found.pose[:-1, 2]
+    over_ground = (xi[:, 0] + 1j * xi[:, 1]) * np.exp(1j * theta)  # the mean frame moves with the centre of mass
+    np.testing.assert_allclose(over_ground, over_ground[0], atol=1e-4)
+    assert np.abs(xi[:, 2] - xi[0, 2]).max() > 0.1  # it turns with its shape all the same
+
+
+@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
+def test_massless_comes_back_at_order_one(medium):
+    """Net displacement: quasi-static as the mass goes to zero, at order 1."""
+    alpha, alphadot = Sine(elements=30).cycle(64)
+    plain = march(medium, Backbone(30), alpha, alphadot, cycles=1).xi
+    sizes = np.array([0.04, 0.02, 0.01])
+    off = [np.abs(march(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi - plain).max() for m in sizes]
+    assert np.polyfit(np.log(sizes), np.log(off), 1)[0] == pytest.approx(1, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "effect", [heavy(3.0), Transient(travel=0.05), DepthProfile(slope=0.3, towards=1.0)], ids=lambda e: type(e).__name__
+)
+def test_order_two_in_the_step(effect):
+    gait, phases = Sine(elements=20), np.array([64, 128, 256])
+    poses = [march(GLASS, Backbone(20), *gait.cycle(n), effects=(effect,)).displacement for n in (*phases, 1024)]
+    errors = [np.hypot(*(p - poses[-1])[:2]) for p in poses[:-1]]
+    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
+
+
+def test_transients_slow_the_sandfish():
+    """A build-up over a fifth of the wave's amplitude costs a tenth of the speed; 30 %, the most by which resistive force
+    theory exceeds discrete-element simulation, takes three fifths (paper Secs. III B, IV A)."""
+    plain = dataclasses.replace(SANDFISH, effects=()).with_numerics(phases=128)
+    wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
+    net = lambda scene: np.hypot(*scene.displacement("direct")[:2])
+    lost = {}
+    for share in (0.1, 0.2, 0.4, 0.65):
+        slowed = dataclasses.replace(plain, effects=(Transient(travel=share * wave),))
+        lost[share] = 1 - net(slowed) / net(plain)
+    assert list(lost.values()) == sorted(lost.values())
+    assert lost[0.2] == pytest.approx(0.098, abs=0.003)
+    assert lost[0.65] == pytest.approx(0.30, abs=0.02)
+
+
+def test_the_built_in_march_is_slower_than_the_plain_sandfish():
+    slowed = scenes.load("sandfish-transient")
+    assert slowed.engine == "marching"
+    found = swimmers.performance(slowed, [0.15, 0.22])
+    plain = swimmers.performance(SANDFISH, [0.15, 0.22])
+    assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
+    assert (found["cost_of_transport"] > 0).all()
+
+
+def test_work_is_done_by_the_joints_in_a_march_too():
+    """Without mass, what the joints put in goes into the ground at every phase, memories and caps included."""
+    alpha, alphadot = Butterfly(amplitude=0.8).cycle(32)
+    effects = (Transient(travel=0.05), EndCaps(radius=0.05), DisturbedGround(radius=0.05, weakening=0.2))
+    found = march(GLASS, Chain((1, 2, 1), length=0.2), alpha, alphadot, effects=effects, cycles=2, with_work=True)
+    put_in = (found.work.moment * alphadot).sum(-1) * 0.2
+    np.testing.assert_allclose(put_in, found.work.power, rtol=1e-6)
+    assert found.work.moment.shape == (32, 2)
+
+
+HARD = {
+    "light": (heavy(1e-9),),
+    "heavy": (heavy(1e3),),
+    "quick to build up": (Transient(travel=1e-9),),
+    "slow to build up": (Transient(travel=5.0),),
+    "no drag left on the track": (DisturbedGround(radius=0.1, weakening=1.0),),
+    "steep": (DepthProfile(slope=0.5, along=(0.8, 3.0)),),
+    "all": (
+        heavy(0.3),
+        Transient(travel=0.05),
+        DisturbedGround(radius=0.05, weakening=0.3),
+        DepthProfile(slope=0.1),
+        EndCaps(radius=0.1, tail=4.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", HARD)
+@pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
+def test_hard_marches_converge(case, medium):
+    """Links that stick, joints that pause, straight bodies and kinks, phase after phase."""
+    t = 2 * np.pi * np.arange(24) / 24
+    gaits = {
+        "both joints alike": np.stack([np.cos(t), np.cos(t)], -1),
+        "one joint": np.stack([1.5 * np.sin(t), 0 * t], -1),
+        "pauses": np.stack([np.clip(2 * np.cos(t), -1, 1), np.clip(2 * np.sin(t), -1, 1)], -1),
+    }
+    alpha = np.stack(list(gaits.values()))
+    alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * t[1])
+    found = march(MEDIA[medium], Chain(), alpha, alphadot, effects=HARD[case], cycles=2)
+    assert (found.status != "unconverged").all()
+    assert found.residual.max() < 1e-9
+    assert np.isfinite(found.xi).all()
+    assert np.abs(found.xi).max() < 10
+
+
+def test_status_and_refusals():
+    alpha, alphadot = Circle().cycle(16)
+    running = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.3),), cycles=1)
+    assert running.status == "running"
+    assert np.isinf(running.drift)
+    running.checked()
+    coasting = march(Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e4),))
+    assert coasting.status == "unsettled"
+    with pytest.raises(RuntimeError, match="give 'cycles' to take it as it is, or lower the mass"):
+        coasting.checked()
+    once = march(GLASS, Chain(), alpha, alphadot, effects=(DepthProfile(slope=0.1),))
+    assert once.cycles == 1
+    with pytest.raises(ValueError, match="takes 8 phases or more"):
+        march(GLASS, Chain(), alpha[:4], alphadot[:4])
+    with pytest.raises(ValueError, match="cycles must be a whole number"):
+        march(GLASS, Chain(), alpha, alphadot, cycles=0)
+    with pytest.raises(ValueError, match="alpha must be finite"):
+        march(GLASS, Chain(), alpha * np.nan, alphadot)
+
+
+def test_batches_march_as_each_alone():
+    effects = (Transient(travel=0.04), EndCaps(radius=0.05), heavy(0.2))
+    gait, amplitudes = Sine(elements=15), np.array([[0.1, 0.2], [0.3, 0.4]])
+    together = march(GLASS, Backbone(15), *gait.cycle(16, amplitudes), effects=effects, cycles=2, tolerance=1e-12)
+    assert together.xi.shape == (2, 2, 16, 3)
+    assert together.pose.shape == (2, 2, 17, 3)
+    alone = march(GLASS, Backbone(15), *gait.cycle(16, 0.3), effects=effects, cycles=2, tolerance=1e-12)
+    np.testing.assert_allclose(together.xi[1, 0], alone.xi, atol=1e-9)
+
+
+def test_estimates_of_marches_cover_the_truth():
+    """Against four times the phases."""
+    from geomech import estimate
+
+    for effect in (Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)):
+        scene = dataclasses.replace(SANDFISH, body=Backbone(30), gait=Sine(elements=30), effects=(effect,))
+        a = np.array([0.12, 0.22, 0.35])
+        found, error = estimate.direct(scene, scene.gait, a, 64)
+        truth = scene.with_numerics(phases=256).displacement("direct", scene.gait, a)
+        off = estimate.distance(found, truth)
+        assert (off <= error).all(), type(effect)
+        assert (error <= 100 * off + 1e-4).all(), type(effect)
+
+
+def test_halves_are_the_whole_body():
+    for body in BODIES.values():
+        assert 2 * halves(body).sum() == pytest.approx(1)
