@@ -74,13 +74,14 @@ class Numerics:
 class Cycle(NamedTuple):
     """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
     in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work:
-    `rft.Work`, (..., N) each, or None."""
+    `rft.Work`, (..., N) each, or None. cycles: how many a march took, 1 without one."""
 
     xi: np.ndarray
     net: np.ndarray
     residual: np.ndarray
     speed: np.ndarray
     work: rft.Work | None
+    cycles: int
 
 
 @dataclass(frozen=True)
@@ -155,14 +156,14 @@ class Scene:
             each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
             solution = each.solve(alpha, alphadot).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
-            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done)
+            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1)
         march = rft.march(
             self.medium, self.body, alpha, alphadot, effects=self.effects, cycles=n.cycles, with_work=work,
             loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
         ).checked()  # fmt: skip
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
         net = march.displacement if "symmetry" in rft.effects.broken(self.effects) else displacement(march.xi)
-        return Cycle(march.xi, net, march.residual, speed, march.work)
+        return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles)
 
     @property
     def linear(self) -> bool:

@@ -218,6 +218,7 @@ class Balance:
         self.nodes = parse(loads)[1]
         axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
         self.unit = axial
+        self.viscous_unit = medium.viscous[0] if medium.dry and medium.viscous else 0.0
         self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
         self.linear = medium.dry == ()
 
@@ -231,6 +232,8 @@ class Balance:
         their scale. which: (B,), their places in the batch that effects know. guess: (3, B), tried first."""
         self.motion, self.speed, self.guess = motion, speed, guess
         self.which = np.arange(speed.size) if which is None else which
+        # The unit of the residual: beside dry terms viscous ones count as much as the samples are fast.
+        self.units = self.unit + self.viscous_unit * np.maximum(speed - 1.0, 0.0)
         size = speed.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
@@ -292,7 +295,7 @@ class Balance:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.motion.carried(s.dx)
         load, net = self._net(s.motion, v, s.xi + s.dx, s.eps_next, s.index)
-        residual = np.abs(net[:, 0]).max(0) / self.unit
+        residual = np.abs(net[:, 0]).max(0) / self.units[s.index]
         kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
         s.iterations = s.iterations + 1
         s.xi = np.where(kept, s.xi + s.dx, s.xi)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import Medium
+from rft.media.base import Medium, TermLaw
 
 TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
 SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
@@ -109,13 +109,18 @@ def exact(medium: Medium) -> LoadLaw:
     def load(a, m, w, eps, known=ALONE):
         out = np.zeros((3, 4, *a.shape))
         if any(medium.viscous):
-            _add_viscous(out, medium.viscous, a, m, w)
+            _add_viscous(out, _weighted(medium, known), a, m, w)
         if terms:
             ends = Ends.of(q2 * (a * a) + eps * eps, m, w)
             _add_dry(out, ends, a, q2 * a, k_t, k_n)
         return out
 
     return load
+
+
+def _weighted(medium: Medium, known: Known):
+    """(c_t, c_n) for velocities over the samples' speed: beside dry terms, which do not know it, times that speed."""
+    return [c * known.speed for c in medium.viscous] if medium.dry else medium.viscous
 
 
 def _add_viscous(out, coefficients, a, m, w) -> None:
@@ -155,6 +160,8 @@ def _weighed(k: np.ndarray, rows: np.ndarray) -> np.ndarray:
 def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:
     """The load by a quadrature rule on [-1, 1] (weights summing to 1), for any medium with a `traction`."""
     s, weight = (np.asarray(x, float)[:, None, None] for x in (nodes, weights))
+    if medium.dry and any(medium.viscous):
+        return _sum(quadrature(_dry_part(medium), nodes, weights), medium)
 
     def load(a, m, w, eps, known=ALONE):
         u = m + w * s
@@ -167,6 +174,23 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
 
         rows = (f_t, tt, tn, s * tn), (f_n, nt, nn, s * nn), (s * f_n, s * nt, s * nn, s * s * nn)
         return np.array([[mean(x) for x in row] for row in rows])
+
+    return load
+
+
+def _dry_part(medium: Medium) -> Medium:
+    part = TermLaw()
+    part.dry = medium.dry
+    return part
+
+
+def _sum(dry: LoadLaw, medium: Medium) -> LoadLaw:
+    """The load of dry terms with the medium's viscous ones, which are polynomials in s and need no rule."""
+
+    def load(a, m, w, eps, known=ALONE):
+        out = dry(a, m, w, eps, known)
+        _add_viscous(out, _weighted(medium, known), a, m, w)
+        return out
 
     return load
 

@@ -9,6 +9,7 @@ from registry import BODIES, DRY, LINEAR, MEDIA
 from geomech import symbolic
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 from rft.balance import ATTEMPTS
+from rft.media.base import TermLaw
 from rft.symbolic import viscous_chain
 
 GLASS = MEDIA["glass-0.3mm-loose"]
@@ -193,3 +194,35 @@ def test_granular_with_no_extra_force_is_coulomb():
     alpha, alphadot = samples(THREE, 50)
     a, b = (body_velocity(m, THREE, alpha, alphadot).xi for m in (Granular(0.0, 0.3), Coulomb()))
     np.testing.assert_allclose(a, b, atol=1e-9)
+
+
+class Mud(TermLaw):
+    """A yield stress and a viscosity: it knows speed."""
+
+    dry = ((1.0, 1.0, 1.0), (0.3, 0.0, 1.2))
+    viscous = (0.5, 1.0)
+
+
+@pytest.mark.parametrize("speed", [1e-6, 0.3, 5.0, 1e9])
+@pytest.mark.parametrize("loads", ["exact", "gauss:40"])
+def test_yield_stress_and_viscosity_together(speed, loads):
+    """At the true velocities, by far more nodes on each link."""
+    alpha, alphadot = np.array([0.5, -0.9]), speed * np.array([1.0, 0.4])
+    solution = body_velocity(Mud(), Chain(), alpha, alphadot, loads=loads).checked()
+    motion = Chain().motion(alpha[:, None], alphadot[:, None])
+    a, m, w = (motion.v + motion.carried(solution.xi[:, None]))[..., 0]
+    net = np.zeros(3)
+    for k in range(3):
+        at = lambda s: np.array(Mud().traction(a[k], m[k] + w[k] * s))
+        x, weights = np.polynomial.legendre.leggauss(400)
+        f = np.array([at(s) for s in x]).T * weights / 2
+        total = motion.total(
+            np.array([f[0].sum(), f[1].sum(), (x * f[1]).sum()])[:, None, None] * (np.arange(3) == k)[:, None]
+        )
+        net += total[:, 0]
+    assert np.abs(net).max() < (1e-4 if loads == "exact" else 5e-3) * (1 + speed)  # kinks in links cost Gauss digits
+    slow = body_velocity(Mud(), Chain(), alpha, alphadot / speed * 1e-9).xi * 1e9
+    fast = body_velocity(Mud(), Chain(), alpha, alphadot / speed * 1e9).xi / 1e9
+    assert np.abs(slow - fast).max() > 1e-3  # one is a yield stress, the other a viscous medium
+    viscous = body_velocity(Viscous(2.0), Chain(), alpha, alphadot / speed).xi
+    np.testing.assert_allclose(fast, viscous, atol=1e-7)

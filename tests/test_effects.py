@@ -226,11 +226,26 @@ def test_what_an_effect_breaks_is_refused_by_name(method):
     np.testing.assert_allclose(inertial.displacement("adapted"), inertial.displacement("direct"), atol=1e-3)
 
 
+def test_transients_draw(tmp_path):
+    from figures import transients
+    from geomech import plots
+
+    numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=40, phases=64)
+    assert (np.diff(numbers["net"], axis=1) < 0).all()
+    assert numbers["net"][1] == pytest.approx([1, 0.902, 0.70], abs=0.01)
+    plots.save(transients.draw(numbers), tmp_path / "f.png")
+    assert (tmp_path / "f.png").stat().st_size > 15_000
+
+
 def test_the_cost_of_effects_draws(tmp_path):
     from figures import effects_cost
     from geomech import plots
 
     numbers = effects_cost.compute(phases=16, repeats=1)
+    assert numbers["none"]["engine"] == numbers["these four"]["engine"] == "algebraic"
+    assert numbers["transient"]["engine"] == "marching"
+    assert numbers["body inertia"]["engine"] == "dynamic"
+    assert numbers["transient"]["cycles"] > 1
     assert numbers["none"]["ratio"] == 1.0
     assert set(numbers) == set(effects_cost.SETS)
     plots.save(effects_cost.draw(numbers), tmp_path / "f.png")

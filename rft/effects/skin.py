@@ -32,7 +32,7 @@ class SkinFriction(Effect):
     def __post_init__(self):
         for name in ("forward", "backward", "reference"):
             value = getattr(self, name)
-            require(0 < value < 100, f"{name} must be a coefficient of friction > 0 and < 100, got {value!r}")
+            require(1e-3 <= value <= 100, f"{name} must be a coefficient of friction from 0.001 to 100, got {value!r}")
 
     def load(self, load, medium, body):
         ahead, astern = self.forward / self.reference, self.backward / self.reference
