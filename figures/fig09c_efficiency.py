@@ -101,7 +101,10 @@ def draw_measure(ax, numbers: dict, key: str, against: str):
         unit = {"efficiency": 1.0, "arc_efficiency": Sine().wavelength(found["amplitude"])}.get(key)
         for endless, dashes in (("endless", "--"), ("endless_head", ":")):
             if unit is not None and endless in found:
-                ax.plot(x, found[endless] * unit, color=colour, ls=dashes, lw=1.0)
+                values = found[endless] * unit
+                ax.plot(x, values, color=colour, ls=dashes, lw=1.0)
+                if best := optimum(found["amplitude"], values, 1):
+                    ax.plot(place(best[0]), best[1], "o", mfc="white", color=colour, ms=4, mew=1.0)
     ax.axvline(place(SANDFISH), color="0.6", ls="-.", lw=0.8, zorder=0)
     ax.set_xlim(0, place(0.6))
 
@@ -126,7 +129,7 @@ def legend(fig, ax):
     for style, label in (
         ({"color": "0.3", "ls": "--", "lw": 1.0}, "endless wave"),
         ({"color": "0.3", "ls": ":", "lw": 1.0}, "endless wave, head drag"),
-        ({"color": "0.3", "ls": "", "marker": "o", "ms": 5}, "optimum"),
+        ({"color": "0.3", "ls": "", "marker": "o", "ms": 5}, "optimum (open: endless)"),
         ({"color": "0.6", "ls": "-.", "lw": 0.8}, rf"sandfish, $A/\lambda = {SANDFISH:g}$"),
     ):
         handles.append(Line2D([], [], **style))

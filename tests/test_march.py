@@ -18,6 +18,9 @@ from rft import (
     DepthProfile,
     DisturbedGround,
     EndCaps,
+    GrainInertia,
+    Granular,
+    SkinFriction,
     Transient,
     Viscous,
     body_velocity,
@@ -249,3 +252,48 @@ def test_estimates_of_marches_cover_the_truth():
 def test_halves_are_the_whole_body():
     for body in BODIES.values():
         assert 2 * halves(body).sum() == pytest.approx(1)
+
+
+def random_march(rng):
+    """A medium, a body, a batch of eight closed gaits of 16 phases, and one to four effects; scales over many decades."""
+    many = lambda low, high: 10 ** rng.uniform(low, high)
+    medium = [
+        Granular(C=many(-1, 2), gamma0=np.radians(rng.uniform(1, 80))),
+        Viscous(many(0, 2)),
+        GLASS,
+    ][rng.integers(3)]
+    joints = int(rng.integers(1, 6))
+    body = Chain(tuple(many(-1, 0) for _ in range(joints + 1)), frame=["mean", "link-1"][rng.integers(2)])
+    t = 2 * np.pi * np.arange(16) / 16
+    waves = rng.normal(size=(4, 8, 1, joints)) * rng.uniform(0, 1.5)
+    basis = np.cos(t), np.sin(t), np.cos(2 * t), np.sin(2 * t)
+    rates = -np.sin(t), np.cos(t), -2 * np.sin(2 * t), 2 * np.cos(2 * t)
+    alpha, alphadot = (sum(w * f[:, None] for w, f in zip(waves, fs)) for fs in (basis, rates))
+    choices = [
+        heavy(many(-6, 3)),
+        Transient(travel=many(-6, 0)),
+        DisturbedGround(radius=many(-1.7, -0.7), weakening=rng.uniform()),
+        DepthProfile(slope=rng.uniform(0, 0.02), towards=rng.uniform(-3, 3), along=(1.0, many(0, 1))),
+        SkinFriction(*(many(-2, 0) for _ in range(3))),
+        GrainInertia(frequency=many(-1, 1), length=0.3, depth=0.05),
+    ]
+    kept = [choices[k] for k in rng.permutation(len(choices))[: rng.integers(1, 5)]]
+    return medium, body, alpha, alphadot, kept
+
+
+@pytest.mark.soak
+def test_two_hundred_thousand_steps_of_random_marches():
+    """800 marches of eight gaits, two cycles each, to 1e-10: prints the README's reliability row."""
+    rng, residuals, failures = np.random.default_rng(2026), [], 0
+    for _ in range(800):
+        medium, body, alpha, alphadot, effects = random_march(rng)
+        try:
+            found = march(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11)
+        except ValueError as error:
+            assert "comes to the surface" in str(error)
+            continue
+        residuals.append(found.residual)
+        failures += np.count_nonzero(found.status == "unconverged")
+    residuals = np.concatenate(residuals)
+    print(f"\n{residuals.size * 32:,} steps: {failures} marches failed, worst residual {residuals.max():.1e}")
+    assert failures == 0
