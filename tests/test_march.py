@@ -290,7 +290,8 @@ def test_two_hundred_thousand_steps_of_random_marches():
         try:
             found = march(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11)
         except ValueError as error:
-            assert "comes to the surface" in str(error)
+            if "comes to the surface" not in str(error):
+                raise
             continue
         residuals.append(found.residual)
         failures += np.count_nonzero(found.status == "unconverged")
