@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
 )
+FEWEST_STEPS = 64  # of a march that is refined: an eighth of them still makes one
 REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
 MOST_PHASES = 1 << 16
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
@@ -37,7 +38,7 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 8, >= 32."""
     phases = max(32, 8 * -(-phases // 8))
     marching = scene.engine != "algebraic"
-    shapes = gait.cycle(max(64, phases) if marching else phases, amplitudes)
+    shapes = gait.cycle(max(FEWEST_STEPS, phases) if marching else phases, amplitudes)
     every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = scene.run(*shapes)
     if marching:  # a step rests on the one before: fewer phases are another march
@@ -51,8 +52,12 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     error += 2 * np.pi * scene.body.length * run.residual * run.speed
     if finer := finer_model(scene):
         error += 1.2 * distance(finer.run(*every[1]).net, coarse)
-    settled = max(e.settles for e in scene.effects) if marching else 0.0
-    return full, error / scene.body.length + settled
+    return full, error / scene.body.length + settling(scene)
+
+
+def settling(scene: Scene) -> float:
+    """Change of displacement between cycles, body lengths, at which a march of the scene ends; 0 where none is needed."""
+    return 0.0 if scene.engine == "algebraic" else max(e.settles for e in scene.effects)
 
 
 def _left(d0, d1, d2, kinks: bool) -> np.ndarray:
@@ -113,8 +118,12 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
     if not (np.isfinite(tol) and tol > 0):
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {tol!r}")
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
+    if tol <= settling(scene):
+        raise SceneError(f"{scene.name}: a march with these effects repeats to {settling(scene):g} only: raise --tol")
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
-    pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, max(32, 8 * gait.harmonics))
+    phases = max(32 if scene.engine == "algebraic" else FEWEST_STEPS, 8 * gait.harmonics)
+    if scene.lookups:
+        pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, phases)
     for method in sorted(scene.lookups, key=lambda m: solves(scene, m, len(amplitudes), phases)):
         if solves(scene, method, len(amplitudes), phases) >= solves(scene, "direct", len(amplitudes), phases):
             break

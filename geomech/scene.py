@@ -162,7 +162,8 @@ class Scene:
             loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
         ).checked()  # fmt: skip
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
-        net = march.displacement if "symmetry" in rft.effects.broken(self.effects) else displacement(march.xi)
+        repeats = "symmetry" not in rft.effects.broken(self.effects) and (march.status == "settled").all()
+        net = displacement(march.xi) if repeats else march.displacement
         return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles)
 
     @property
@@ -265,13 +266,10 @@ class Scene:
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
         gait, phases = gait or self.gait, self.numerics.phases
-        choose("methods", method, METHODS)
-        if method in ("area", "harmonic") and self.body.joints != 2:
-            raise SceneError(f"{self.name}: the {method} tier takes a body of two joints: use path, adapted or direct")
+        self._allow(method)
         if method == "area":
             return predict.area(self.curvature, gait, amplitudes, phases)
         if method == "adapted":
-            self._refuse("adapted tier", ALGEBRAIC, "use the direct tier")
             a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
             return self.family(gait, float(a.max(initial=0.0))).area(a)
         if method == "path" and self.needs_field(method):
@@ -279,8 +277,6 @@ class Scene:
         if method == "harmonic" and not self.linear:
             return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
         if self.engine != "algebraic":
-            if method != "direct":
-                self.require_connection()
             return self.cycle(gait, amplitudes).net
         # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
@@ -298,6 +294,16 @@ class Scene:
                     f"{', '.join(sorted(effect.breaks))}: {instead}, or drop the effect"
                 )
 
+    def _allow(self, method: str) -> None:
+        """SceneError if this scene has no such tier."""
+        choose("methods", method, METHODS)
+        if method not in ("direct", "adapted"):
+            self.require_connection()
+        if method in ("area", "harmonic") and self.body.joints != 2:
+            raise SceneError(f"{self.name}: the {method} tier takes a body of two joints: use path, adapted or direct")
+        if method == "adapted":
+            self._refuse("adapted tier", ALGEBRAIC, "use the direct tier")
+
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""
         return method == "area" or (method == "path" and not self.linear)
@@ -310,6 +316,8 @@ class Scene:
         estimate: error of each number in body lengths (`geomech.estimate`). Fields are timed on their own.
         """
         gait, amplitudes = gait or self.gait, np.array(amplitudes, float)
+        for method in methods:
+            self._allow(method)
         out: dict = {"amplitude": amplitudes.tolist()}
         seconds, errors, reference = {}, {}, None
         if any(map(self.needs_field, methods)):

@@ -19,7 +19,7 @@ from geomech.netcdf import COMPONENTS
 from geomech.problem import SceneError, whole_file
 from geomech.scene import Scene
 from geomech.scenes import from_tables
-from rft.effects import together
+from rft.effects import broken, together
 
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to show progress and lose little
@@ -56,15 +56,19 @@ def sweep(
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
     values = {k: [float(x) for x in over[k]] for k in names}
     shape = tuple(len(v) for v in values.values())
-    if not names or np.prod(shape) > LARGEST:
+    if not names or not 0 < np.prod(shape) <= LARGEST:
         raise SceneError(f"--over must span 1 to {LARGEST} points, got {int(np.prod(shape)) if names else 0}")
     outer = [values[k] for k in names if k != AMPLITUDE]
     if not scene.text:
         raise SceneError(f"{scene.name}: a sweep takes a scene that was read from TOML")
     numerics = {k: v for k, v in dataclasses.asdict(scene.numerics).items() if v is not None}
     tables = {**tomllib.loads(scene.text), "numerics": numerics}
+    if not _same(from_tables(tables, scene.name, scene.text), scene):
+        raise SceneError(
+            f"{scene.name}: a sweep takes a scene as its TOML text has it: change that, or sweep the change"
+        )
     points = list(itertools.product(*outer))
-    for corner in itertools.product(*([v[0], v[-1]] for v in outer)):
+    for corner in _corners(outer):
         _scene_at(tables, scene, names, corner)  # refuse before computing
     rows = _taken_up(kept, scene, values)
     saved = _now()
@@ -87,6 +91,17 @@ def sweep(
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
     return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], "estimate": flat[..., 3]}
+
+
+def _same(a: Scene, b: Scene) -> bool:
+    return (a.medium, a.body, a.gait, a.effects) == (b.medium, b.body, b.gait, b.effects)
+
+
+def _corners(outer: list[list[float]]):
+    """The grid's corners, and every value of each parameter with the others at their first."""
+    yield from itertools.product(*([v[0], v[-1]] for v in outer))
+    for k, values in enumerate(outer):
+        yield from ([*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])] for x in values)
 
 
 def _now() -> float:
@@ -120,7 +135,7 @@ def _kind(scene: Scene) -> str:
     effects = [
         (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched]) for e in scene.effects
     ]
-    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, scene.engine, effects))
+    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, sorted(broken(scene.effects)), effects))
 
 
 def beside(scenes: list[Scene], amplitudes=None) -> Scene:

@@ -21,6 +21,7 @@ from rft.media.base import Medium, require
 from rft.work import Work, done_by
 
 MOST_CYCLES = 60
+PAUSE = 1e-9  # of the usual joint speed, below which a phase is a pause and has no scale of its own
 UNIT_MASS = np.array([1.0, 1.0, 1 / 3])[:, None, None]  # <a>, <u> and <s u> of an element from its (a, m, w)
 
 
@@ -83,12 +84,22 @@ def march(
     good = cycles is None or (isinstance(cycles, int) and 1 <= cycles <= 10_000)
     require(good, f"cycles must be a whole number from 1 to 10000, got {cycles!r}")
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
+    if 0 in batch:
+        return _nothing(batch, phases)
     if cycles is None and "symmetry" in broken(effects):
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
     steps = _Steps(medium, body, *shapes, effects, loads, regularisation, tolerance)
     found = _round_and_round(steps, phases, cycles, with_work)
     return _shaped(found, batch, body.length)
+
+
+def _nothing(batch: tuple, phases: int) -> March:
+    """The march of no samples."""
+    none = np.zeros(batch)
+    return March(
+        np.zeros((*batch, phases, 3)), np.zeros((*batch, phases + 1, 3)), none, none.astype(str), none, 0, None
+    )
 
 
 def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> March:
@@ -154,9 +165,11 @@ class _Steps:
         usual = np.where(usual > 0, usual, 1.0)
         self.inertia = sum(np.asarray(e.inertia, float) for e in effects)
         self.heavy = "no inertia" in broken(effects)
-        self.scales = np.broadcast_to(usual, speed.shape) if self.heavy else np.where(speed > 0, speed, usual)
+        self.scales = (
+            np.broadcast_to(usual, speed.shape) if self.heavy else np.where(speed > PAUSE * usual, speed, usual)
+        )
         self.step, self.pose = 0, np.zeros((3, samples))
-        self.xi, self.momenta, self.velocity = [], [], None
+        self.xi, self.momenta, self.flows, self.velocity = [], [], [], None
         self.memories = [e.start(len(self._motion().half), samples) for e in effects]
         self.limit = 0.0
 
@@ -204,7 +217,7 @@ class _Steps:
         self.step += 1
         work = None
         if with_work:
-            work = done_by(balance, self.whole, motion, solved.xi, scale)
+            work = done_by(balance, self.whole, motion, solved.xi, scale, self._moving(motion, v, balance))
         return xi, self.pose, solved.residual, work
 
     def _here(self, pose: np.ndarray, scale: np.ndarray) -> Here:
@@ -214,6 +227,22 @@ class _Steps:
         place = pose[0] + 1j * pose[1] + turn * motion.place
         before = np.zeros_like(motion.v) if self.velocity is None else self.velocity
         return Here(self.dt, place, turn * along, motion, before, scale)
+
+    def _moving(self, motion: Motion, v, balance: Balance):
+        """(force, moment) that moves each element's mass, by the same difference in time; None without mass."""
+        if not self.heavy:
+            return None
+        n = np.count_nonzero(motion.half)
+        turn = np.exp(1j * self.pose[2])
+        along = (motion.c + 1j * motion.s)[:n] * turn
+        self.flows = [*self.flows[-2:], np.stack([(v[0, :n] + 1j * v[1, :n]) * along, v[2, :n] + 0j])]
+        if len(self.flows) < 3:
+            change = (self.flows[-1] - self.flows[0]) / (self.dt if len(self.flows) > 1 else 1.0)
+        else:
+            change = (1.5 * self.flows[2] - 2 * self.flows[1] + 0.5 * self.flows[0]) / self.dt
+        half = motion.half[:n]
+        mass = self.inertia * balance.unit * 2 * half
+        return mass * change[0] * turn.conj(), mass * half / 3 * change[1].real
 
     def _inertia(self, M, shape, scale, balance: Balance) -> Inertia:
         if len(self.momenta) < 2:

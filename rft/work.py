@@ -16,9 +16,10 @@ from rft.media.base import Medium
 
 class Work(NamedTuple):
     """power: (...), rate of work against the medium, >= 0, in units of (the whole body's axial drag) x (length / time).
-    moment: (..., n - 1), internal moment at the points between the n elements that holds against the medium, in axial
-    drag x length: positive where the body works to bend to the left (counter-clockwise, tail to head), as muscles on its
-    left side do; moment . d(bend)/dt sums to the power. slip: (...), mean over the body of the angle between an element's
+    moment: (..., n - 1), internal moment at the points between the n elements that holds against the medium, and moves
+    the mass where the body has any, in axial drag x body length: positive where the body works to bend to the left
+    (counter-clockwise, tail to head), as muscles on its left side do; moment . d(bend)/dt x length sums to the power, with
+    mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an element's
     direction and the velocity of its centre, 0 to pi/2 rad."""
 
     power: np.ndarray
@@ -50,10 +51,11 @@ def work(
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 
 
-def done_by(balance: Balance, body: Body, motion: Motion, xi, scale) -> Work:
+def done_by(balance: Balance, body: Body, motion: Motion, xi, scale, mass=None) -> Work:
     """`Work` of B samples from body velocities xi (3, B), in body lengths; they and the motion are over scale (B,), as the
     balance was solved: a linear law is proportional to it, a dry one does not know. Moments are those between the
-    elements of ``body``, of which the balance's may be pieces."""
+    elements of ``body``, of which the balance's may be pieces. mass: (force, moment), (n, B) each, that moves every element:
+    a complex force in the body frame and a moment about the element's centre, over the axial drag."""
     v = motion.v + motion.carried(xi)
     f = balance.load(*v, np.full_like(scale, balance.regularisation), Known(scale))[:, 0] * motion.weight
     if balance.linear:
@@ -62,10 +64,10 @@ def done_by(balance: Balance, body: Body, motion: Motion, xi, scale) -> Work:
     slip = np.average(np.arctan2(np.abs(v[1, :n]), np.abs(v[0, :n])), 0, motion.half[:n, 0])
     ends, wanted = (np.cumsum(2 * h) for h in (motion.half[:n, 0], halves(body)))
     points = np.searchsorted(ends, wanted[:-1] - 1e-9 * wanted[0])
-    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n)[:, points], slip)
+    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n, mass)[:, points], slip)
 
 
-def _moments(motion, f, n: int) -> np.ndarray:
+def _moments(motion, f, n: int, mass=None) -> np.ndarray:
     """(B, n - 1) from drags f (3, n or n + 2, B) that oppose the motion, the two end caps' last if there are any.
 
     The medium pushes with -f. At a point between two elements the body must hold the tail's side, and pushes the head's
@@ -74,7 +76,11 @@ def _moments(motion, f, n: int) -> np.ndarray:
     along, half = motion.c + 1j * motion.s, motion.half
     place = motion.place
     force = (f[0] + 1j * f[1]) * along
-    torque = (place.conj() * force).imag + half * f[2]
+    torque = half * f[2]
+    if mass is not None:
+        force[:n] += mass[0]
+        torque[:n] += mass[1]
+    torque = torque + (place.conj() * force).imag
     if len(along) > n:  # the tail's cap belongs to the first element's side of every point, the head's to none
         force[0] += force[n]
         torque[0] += torque[n]

@@ -148,8 +148,18 @@ def test_length_scales_translation_only():
     np.testing.assert_allclose(tiny, one * [1e-6, 1e-6, 1.0], rtol=1e-13)
 
 
+def test_scattered_starts_find_what_the_descents_find(monkeypatch):
+    problem = samples(THREE, 8)
+    wanted = body_velocity(GLASS, THREE, *problem)
+    monkeypatch.setattr("rft.balance.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
+    found = body_velocity(GLASS, THREE, *problem).checked()
+    np.testing.assert_allclose(found.xi, wanted.xi, atol=1e-6)
+    assert (found.status == wanted.status).all()
+
+
 def test_a_starved_solver_says_so(monkeypatch):
     monkeypatch.setattr("rft.balance.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
+    monkeypatch.setattr("rft.balance.SCATTERED", 0)
     solution = body_velocity(GLASS, THREE, *samples(THREE, 20))
     assert (solution.status == "unconverged").all()
     assert (solution.residual > 1e-10).all()

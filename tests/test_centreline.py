@@ -311,6 +311,9 @@ BAD = {
     "bend": (edited("curvature", at(30, 2 / 12, 6 / 11, 90.0)), "", "t = 0.1666.* and s = 0.583 .* bend by .* elements"),
     "turn": (edited("points", lambda t: [*t[:29], t[30], t[29], *t[31:]]), "", "line 3[2-4]: the midline turns by"),
     "length": (edited("points", lambda t: [*t[:24], *t[28:]]), "", "line 27: the midline at t = 0.1666.* is 0.6"),
+    "turned round": (
+        edited("points", lambda t: [*t[:36], *t[36:48][::-1], *t[48:]]), "", "t = 0.25 seems to run from head to tail"
+    ),
     "half": (edited("points", lambda t: t[:84]), "", "the gait does not close"),
     "not closed": (edited("points", lambda t: t[:84]), "period = 0.55", "the gait does not close"),
     "not repeated": (edited("points", lambda t: t[:84]), "period = 0.5", "the gait does not close"),

@@ -169,6 +169,12 @@ def test_bad_effects_are_refused(effects, said):
         scenes.parse(scenes.load("three-link-glass").text + "[[effects]]\n" + effects)
 
 
+def test_grain_inertia_needs_grains():
+    effect = '[[effects]]\nkind = "grain-inertia"\nfrequency = 1\nlength = 0.1\ndepth = 0.05'
+    with pytest.raises(SceneError, match="grain inertia takes a medium of grains, got Viscous"):
+        scenes.parse(scenes.load("three-link-viscous").text + effect)
+
+
 def test_end_caps_need_grains():
     with pytest.raises(SceneError, match="end caps take a granular medium, got Viscous"):
         scenes.parse(scenes.load("three-link-viscous").text + '[[effects]]\nkind = "end-caps"\nradius = 0.1')

@@ -8,7 +8,8 @@ from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 
 from geomech import scenes, swimmers
-from geomech.gaits import Butterfly, Circle, Sine
+from geomech.gaits import Butterfly, Circle, Ellipse, Sine
+from geomech.problem import SceneError
 from geomech.simulate import displacement
 from rft import (
     CATALOGUE,
@@ -167,6 +168,56 @@ def test_work_is_done_by_the_joints_in_a_march_too():
     put_in = (found.work.moment * alphadot).sum(-1) * 0.2
     np.testing.assert_allclose(put_in, found.work.power, rtol=1e-6)
     assert found.work.moment.shape == (32, 2)
+
+
+@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
+def test_work_moves_the_mass(medium):
+    """With mass the joints put in what the ground takes in the mean over a cycle, and it does not matter from which end
+    the links are counted: the moments include what moves them."""
+    gait, effects = Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3)), (heavy(3.0),)
+    alpha, alphadot = gait.cycle(256)
+    found = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True).checked().work
+    assert (found.moment * alphadot).sum(-1).mean() == pytest.approx(found.power.mean(), rel=1e-3)
+    turned = march(medium, Chain((1.5, 2, 1)), alpha[:, ::-1], alphadot[:, ::-1], effects=effects, with_work=True).work
+    np.testing.assert_allclose(found.moment, turned.moment[:, ::-1], atol=2e-3 * np.abs(found.moment).max())
+    light = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, with_work=True).work
+    assert np.abs(found.moment - light.moment).max() > 0.05 * np.abs(light.moment).max()
+
+
+def test_a_first_cycle_is_of_order_two_as_well():
+    effects, phases = (Transient(travel=0.05), DepthProfile(slope=0.2)), np.array([64, 128, 256])
+    poses = [
+        march(GLASS, Backbone(20), *Sine(elements=20).cycle(n), effects=effects).displacement for n in (*phases, 1024)
+    ]
+    errors = [np.hypot(*(p - poses[-1])[:2]) for p in poses[:-1]]
+    assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.4)
+
+
+def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
+    slow = dataclasses.replace(scenes.load("three-link-glass"), effects=(heavy(20.0),)).with_numerics(
+        cycles=1, phases=64
+    )
+    alpha, alphadot = slow.gait.cycle(64)
+    wanted = march(GLASS, slow.body, alpha, alphadot, effects=slow.effects, cycles=1).displacement
+    np.testing.assert_allclose(slow.displacement("direct"), wanted, atol=1e-12)
+
+
+def test_a_tolerance_below_what_a_march_repeats_to_is_refused():
+    from geomech import estimate
+
+    slowed = scenes.load("sandfish-transient")
+    with pytest.raises(SceneError, match="repeats to 1e-06 only: raise --tol"):
+        estimate.cheapest(slowed, [0.2], 1e-7)
+
+
+def test_pauses_and_empty_batches():
+    alpha, alphadot = Circle().cycle(16)
+    alphadot[3] = [1e-99, 0.0]
+    found = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),)).checked()
+    assert np.isfinite(found.xi).all()
+    assert np.abs(found.xi[3]).max() < 1e-8
+    nothing = march(GLASS, Chain(), alpha[None][:0], alphadot[None][:0], effects=(Transient(travel=0.1),))
+    assert nothing.xi.shape == (0, 16, 3)
 
 
 HARD = {

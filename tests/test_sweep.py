@@ -68,6 +68,23 @@ def test_sweeps_are_batches(name, monkeypatch):
     np.testing.assert_allclose(at_once["estimate"], alone["estimate"], rtol=0.2, atol=atol)
 
 
+def test_a_level_ground_is_no_gentle_slope():
+    """Without a slope a march settles, with one it is one cycle: they do not share a batch."""
+    text = scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 16")
+    effects = PAST + '"transient"\ntravel = 0.1' + PAST + '"depth-profile"\nslope = 0.0'
+    found = sweep.sweep(scenes.parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
+    level = scenes.parse(text + PAST + '"transient"\ntravel = 0.1').displacement("direct")
+    np.testing.assert_allclose(found["displacement"][0], level, atol=2e-6)
+
+
+def test_a_scene_changed_since_it_was_read_is_refused():
+    import dataclasses
+
+    fish = dataclasses.replace(scenes.load("sandfish-loose"), effects=())
+    with pytest.raises(SceneError, match="a sweep takes a scene as its TOML text has it"):
+        sweep.sweep(fish, {"gait.amplitude": [0.1]})
+
+
 def test_what_cannot_share_a_batch_gets_its_own(monkeypatch):
     fish = scenes.load("sandfish-loose").with_numerics(phases=32)
     calls, direct = [], estimate.direct

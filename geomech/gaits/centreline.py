@@ -55,7 +55,7 @@ class Centreline(Gait):
         if self.period is not None and not 0 < self.period < np.inf:
             raise ValueError(f"period must be a number > 0 in the unit of t, got {self.period!r}")
         data = frames.read(self.file)
-        if self.sha256 not in ("", data.sha256):
+        if self.sha256.lower() not in ("", data.sha256):
             raise data.wrong("the file is not the one whose sha256 is given: restore it, or leave sha256 out")
         object.__setattr__(self, "sha256", data.sha256)
         object.__setattr__(self, "_curve", self._through(data))
@@ -74,6 +74,7 @@ class Centreline(Gait):
         from scipy.interpolate import CubicSpline
 
         phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
+        _check_turned(data, bends)
         # Two frames a wave, in the widest gap too: then the least squares are well posed.
         most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
         if self.keep_harmonics not in range(most + 1):
@@ -138,6 +139,14 @@ def _inferred(data: frames.Frames, t, moves, back) -> float:
             f"frames by {moves.min():.2g} or more): give period"
         )
     return t[-1] * len(t) / (len(t) - 1)
+
+
+def _check_turned(data: frames.Frames, bends: np.ndarray) -> None:
+    """A frame whose points run from the head to the tail has the bends of its neighbours in reverse, with the other sign."""
+    between = (np.roll(bends, 1, 0) + np.roll(bends, -1, 0)) / 2
+    off, off_turned = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
+    if (bad := np.flatnonzero(3 * off_turned < off)).size:
+        raise data.wrong(f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail: turn its rows round")
 
 
 def _check_gaps(data: frames.Frames, gaps: np.ndarray) -> None:

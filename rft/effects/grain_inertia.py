@@ -20,7 +20,7 @@ class GrainInertia(Effect):
     """A normal force strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C: at high speed the
     inertia of grains counts; the form is the momentum flux of grains swept up, as in impact laws).
 
-    In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density.
+    In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
     frequency: cycles per second, alphadot being per radian of phase. length: of the body, m. depth: |z|, m.
     strength: lambda, no unit; 1 is assumed.
     """
@@ -47,6 +47,7 @@ class GrainInertia(Effect):
             require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
 
     def load(self, load, medium, body):
+        require(medium.dry != (), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         beta = self.strength * speed_per_rad**2 / (PRESSURE_FACTOR * GRAVITY * self.depth)
 

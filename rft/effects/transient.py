@@ -41,8 +41,8 @@ class Transient(Effect):
         return cut(body)
 
     def start(self, elements: int, samples: int) -> np.ndarray:
-        """(2, n, B): shares to the left and right; ground at rest resists with none of its drag."""
-        return np.zeros((2, elements, samples))
+        """(2, n, B): shares to the left and right; a march starts where the ground resists fully either way."""
+        return np.ones((2, elements, samples))
 
     def at(self, memory: np.ndarray, here: Here) -> Effect:
         return _Now(self.travel, memory, here.before[1], here.dt, here.scale)
