@@ -14,15 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.balance import Balance, Inertia, checked_input
+from rft.balance import checked_input
 from rft.bodies.base import Body, Motion
 from rft.effects.base import Effect, Here, broken
+from rft.inertia import Mass
 from rft.media.base import Medium, require
+from rft.newton import Balance
 from rft.work import Work, done_by
 
 MOST_CYCLES = 60
 PAUSE = 1e-9  # of the usual joint speed, below which a phase is a pause and has no scale of its own
-UNIT_MASS = np.array([1.0, 1.0, 1 / 3])[:, None, None]  # <a>, <u> and <s u> of an element from its (a, m, w)
 
 
 class March(NamedTuple):
@@ -163,13 +164,12 @@ class _Steps:
         speed = np.sqrt((alphadot**2).sum(1))
         usual = np.sqrt((speed**2).mean(0))
         usual = np.where(usual > 0, usual, 1.0)
-        self.inertia = sum(np.asarray(e.inertia, float) for e in effects)
-        self.heavy = "no inertia" in broken(effects)
-        self.scales = (
-            np.broadcast_to(usual, speed.shape) if self.heavy else np.where(speed > PAUSE * usual, speed, usual)
-        )
+        self.mass, self.scales = None, np.where(speed > PAUSE * usual, speed, usual)
+        if "no inertia" in broken(effects):  # a heavy body moves while its joints pause
+            self.mass = Mass(sum(np.asarray(e.inertia, float) for e in effects), self.dt)
+            self.scales = np.broadcast_to(usual, speed.shape)
         self.step, self.pose = 0, np.zeros((3, samples))
-        self.xi, self.momenta, self.flows, self.velocity = [], [], [], None
+        self.xi, self.velocity = [], None
         self.memories = [e.start(len(self._motion().half), samples) for e in effects]
         self.limit = 0.0
 
@@ -198,10 +198,8 @@ class _Steps:
         balance = Balance(self.medium, self.body, loads, regularisation, tolerance, now)
         k = self.step % self.phases
         motion = balance.body.motion(self.alpha[k], self.alphadot[k] / scale)
-        if self.heavy:
-            M, shape = _momentum(motion)
-            if not first:
-                balance.weigh(self._inertia(M, shape, scale, balance))
+        if self.mass and not first:
+            balance.weigh(self.mass.term(motion, scale, balance.unit, balance.linear))
         self.limit = max(self.limit, balance.limit)
         solved = balance.solve(motion.take, scale, 1, guess=None if first else guess / scale)
         xi = solved.xi * scale
@@ -211,13 +209,9 @@ class _Steps:
         n = len(here.place)
         self.memories = [m if first else e.after(m, here, v[:, :n]) for e, m in zip(self.effects, self.memories)]
         self.xi, self.velocity = [*self.xi[-1:], xi], v[:, :n]
-        if self.heavy:
-            momentum = scale * (np.einsum("ijb,jb->ib", M, solved.xi) + shape)
-            self.momenta = [*self.momenta[-1:], momentum]
+        moved = self.mass.moved(motion, solved.xi, scale, self.pose[2]) if self.mass else None
         self.step += 1
-        work = None
-        if with_work:
-            work = done_by(balance, self.whole, motion, solved.xi, scale, self._moving(motion, v, balance))
+        work = done_by(balance, self.whole, motion, solved.xi, scale, moved) if with_work else None
         return xi, self.pose, solved.residual, work
 
     def _here(self, pose: np.ndarray, scale: np.ndarray) -> Here:
@@ -227,35 +221,3 @@ class _Steps:
         place = pose[0] + 1j * pose[1] + turn * motion.place
         before = np.zeros_like(motion.v) if self.velocity is None else self.velocity
         return Here(self.dt, place, turn * along, motion, before, scale)
-
-    def _moving(self, motion: Motion, v, balance: Balance):
-        """(force, moment) that moves each element's mass, by the same difference in time; None without mass."""
-        if not self.heavy:
-            return None
-        n = np.count_nonzero(motion.half)
-        turn = np.exp(1j * self.pose[2])
-        along = (motion.c + 1j * motion.s)[:n] * turn
-        self.flows = [*self.flows[-2:], np.stack([(v[0, :n] + 1j * v[1, :n]) * along, v[2, :n] + 0j])]
-        if len(self.flows) < 3:
-            change = (self.flows[-1] - self.flows[0]) / (self.dt if len(self.flows) > 1 else 1.0)
-        else:
-            change = (1.5 * self.flows[2] - 2 * self.flows[1] + 0.5 * self.flows[0]) / self.dt
-        half = motion.half[:n]
-        mass = self.inertia * balance.unit * 2 * half
-        return mass * change[0] * turn.conj(), mass * half / 3 * change[1].real
-
-    def _inertia(self, M, shape, scale, balance: Balance) -> Inertia:
-        if len(self.momenta) < 2:
-            rate, past = 1 / self.dt, self.momenta[-1] / self.dt
-        else:
-            rate, past = 1.5 / self.dt, (2 * self.momenta[-1] - 0.5 * self.momenta[-2]) / self.dt
-        weight = self.inertia * balance.unit * (np.ones_like(scale) if balance.linear else scale)
-        return Inertia(M, shape, rate, past / scale, weight, weight * scale)
-
-
-def _momentum(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """(3, 3, B) and (3, B): momentum of a uniform body of unit mass from its velocity, and from its change of shape."""
-    mass = motion._replace(weight=2 * motion.half)
-    units = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, motion.c.shape[1]))
-    M = np.stack([mass.total(UNIT_MASS * motion.carried(unit)) for unit in units], 1)
-    return M, mass.total(UNIT_MASS * motion.v)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.balance import Balance
 from rft.bodies.base import Body, Motion, halves
 from rft.effects.base import Effect
 from rft.loads import Known
 from rft.media.base import Medium
+from rft.newton import Balance
 
 
 class Work(NamedTuple):
@@ -64,10 +64,10 @@ def done_by(balance: Balance, body: Body, motion: Motion, xi, scale, mass=None) 
     slip = np.average(np.arctan2(np.abs(v[1, :n]), np.abs(v[0, :n])), 0, motion.half[:n, 0])
     ends, wanted = (np.cumsum(2 * h) for h in (motion.half[:n, 0], halves(body)))
     points = np.searchsorted(ends, wanted[:-1] - 1e-9 * wanted[0])
-    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n, mass)[:, points], slip)
+    return Work(scale * (f * v).sum((0, 1)), _moments(motion, f, n, mass, balance.unit)[:, points], slip)
 
 
-def _moments(motion, f, n: int, mass=None) -> np.ndarray:
+def _moments(motion, f, n: int, mass=None, unit: float = 1.0) -> np.ndarray:
     """(B, n - 1) from drags f (3, n or n + 2, B) that oppose the motion, the two end caps' last if there are any.
 
     The medium pushes with -f. At a point between two elements the body must hold the tail's side, and pushes the head's
@@ -78,8 +78,8 @@ def _moments(motion, f, n: int, mass=None) -> np.ndarray:
     force = (f[0] + 1j * f[1]) * along
     torque = half * f[2]
     if mass is not None:
-        force[:n] += mass[0]
-        torque[:n] += mass[1]
+        force[:n] += unit * mass[0]
+        torque[:n] += unit * mass[1]
     torque = torque + (place.conj() * force).imag
     if len(along) > n:  # the tail's cap belongs to the first element's side of every point, the head's to none
         force[0] += force[n]

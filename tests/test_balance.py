@@ -8,8 +8,8 @@ from registry import BODIES, DRY, LINEAR, MEDIA
 
 from geomech import symbolic
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity
-from rft.balance import ATTEMPTS
 from rft.media.base import TermLaw
+from rft.newton import ATTEMPTS
 from rft.symbolic import viscous_chain
 
 GLASS = MEDIA["glass-0.3mm-loose"]
@@ -151,15 +151,15 @@ def test_length_scales_translation_only():
 def test_scattered_starts_find_what_the_descents_find(monkeypatch):
     problem = samples(THREE, 8)
     wanted = body_velocity(GLASS, THREE, *problem)
-    monkeypatch.setattr("rft.balance.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
+    monkeypatch.setattr("rft.newton.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
     found = body_velocity(GLASS, THREE, *problem).checked()
     np.testing.assert_allclose(found.xi, wanted.xi, atol=1e-6)
     assert (found.status == wanted.status).all()
 
 
 def test_a_starved_solver_says_so(monkeypatch):
-    monkeypatch.setattr("rft.balance.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
-    monkeypatch.setattr("rft.balance.SCATTERED", 0)
+    monkeypatch.setattr("rft.newton.ATTEMPTS", (ATTEMPTS[0]._replace(budget=2),))
+    monkeypatch.setattr("rft.newton.SCATTERED", 0)
     solution = body_velocity(GLASS, THREE, *samples(THREE, 20))
     assert (solution.status == "unconverged").all()
     assert (solution.residual > 1e-10).all()

@@ -1,0 +1,282 @@
+"""Newton's method for the balance of forces, for many samples at once.
+
+A dry medium is first taken with its kinks rounded off widely (``eps``, a speed), where the problem is easy, then with
+less and less rounding down to the wanted ``regularisation``; the tangent dx/d(eps) carries the solution from one level
+to the next. On a level the steps are Newton's, halved while the residual does not fall; samples that need too many go
+back to the start and come down in smaller strides. Element velocities are carried beside xi and updated by small steps,
+so that an element at rest keeps all its digits.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.bodies.base import Body, Motion
+from rft.effects.base import applied
+from rft.inertia import Inertia
+from rft.loads import Known, element_load, parse
+
+LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
+SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
+LENGTHEN = 2.0  # the next part to try, after a success
+STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
+ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
+
+# glibc hands freed memory back to the system, page by page, until it has once seen a large block freed. Then it keeps
+# up to twice that much for the next temporaries: half the solver's time on Linux, nothing elsewhere.
+np.empty(2**21)
+
+
+class Descent(NamedTuple):
+    """How an attempt comes down to the wanted regularisation."""
+
+    widest: float  # the first rounding of the kinks, in body lengths per radian
+    ratio: float  # of the rounding from one level to the next
+    loose: float  # residual at which a level is left
+    free: float  # elements faster than this many times the rounding let a sample go all the way at once
+    budget: int  # iterations allowed
+
+
+ATTEMPTS = (
+    Descent(0.03, 0.03, 1e-3, 5.0, 60),
+    Descent(0.1, 0.1, 1e-4, 1e3, 150),
+    Descent(0.3, 0.3, 1e-6, np.inf, 500),
+    Descent(1.0, 0.6, 1e-8, np.inf, 3000),
+)
+SCATTERED, STARTS = 8, 200  # balances that no descent solves, and starts for each
+WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
+
+
+class Solved(NamedTuple):
+    """xi: (3, B), velocities over the sample's scale; the others (B,)."""
+
+    xi: np.ndarray
+    residual: np.ndarray
+    iterations: np.ndarray
+    stuck: np.ndarray
+
+
+@dataclass
+class _State:
+    """Samples under way. Every array has them on its last axis."""
+
+    index: np.ndarray
+    motion: Motion
+    xi: np.ndarray  # (3, B)
+    dx: np.ndarray  # (3, B) the step to try
+    v: np.ndarray  # (3, n, B) element velocities at xi
+    eps: np.ndarray  # the rounding at xi
+    eps_next: np.ndarray  # the rounding to try
+    stride: np.ndarray  # the part of a Newton step to try
+    residual: np.ndarray
+    iterations: np.ndarray
+
+    def take(self, keep: np.ndarray) -> _State:
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _State(**{k: x.take(keep) if k == "motion" else x[..., keep] for k, x in parts.items()})
+
+    @staticmethod
+    def join(states: list[_State]) -> _State:
+        parts = {f.name: [getattr(s, f.name) for s in states] for f in fields(_State) if f.name != "motion"}
+        motion = Motion.join([s.motion for s in states])
+        return _State(motion=motion, **{k: np.concatenate(x, -1) for k, x in parts.items()})
+
+
+class Balance:
+    """A medium, a body and how finely to solve; `solve` takes the motion of samples under a scale of their velocities."""
+
+    inertia: Inertia | None = None
+
+    def __init__(self, medium, body: Body, loads: str, regularisation: float, tolerance: float, effects=()):
+        self.regularisation = regularisation
+        self.load, self.body = applied(effects, element_load(medium, loads), medium, body)
+        self.nodes = parse(loads)[1]
+        axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
+        self.unit = axial
+        self.viscous_unit = medium.viscous[0] if medium.dry and medium.viscous else 0.0
+        self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
+        self.linear = medium.dry == ()
+
+    def weigh(self, inertia: Inertia) -> None:
+        """Let mass take part."""
+        self.inertia = inertia
+        self.limit += 1e-14 * inertia.rate * float(np.max(inertia.weight)) / self.unit
+
+    def solve(self, motion: Callable, speed, threads=None, which=None, guess=None) -> Solved:
+        """Velocities over ``speed`` (B,), the samples' scale. motion(index): `Motion` of those samples at velocities over
+        their scale. which: (B,), their places in the batch that effects know. guess: (3, B), tried first."""
+        self.motion, self.speed, self.guess = motion, speed, guess
+        self.which = np.arange(speed.size) if which is None else which
+        # The unit of the residual: beside dry terms viscous ones count as much as the samples are fast.
+        self.units = self.unit + self.viscous_unit * np.maximum(speed - 1.0, 0.0)
+        size = speed.size
+        out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
+        todo = np.arange(size)
+        for descent in ((WARM,) if guess is not None else ()) + ATTEMPTS:
+            self._attempt(todo, descent, out, threads)
+            todo = np.flatnonzero(out.residual > self.limit)
+            if not todo.size:
+                break
+        for sample in todo[:SCATTERED]:
+            self._scatter(sample, out)
+        return out
+
+    def _scatter(self, sample: int, out: Solved) -> None:
+        """Least squares from scattered starts, for a balance whose kinks stop every descent: one in 200,000 steps of random
+        marches, with weakened sides and hardly any axial drag."""
+        from scipy.optimize import least_squares
+
+        index, rng = np.array([sample]), np.random.default_rng(0)
+        motion, eps = self.motion(index), np.array([self.regularisation])
+
+        def net(x):
+            x = x[:, None]
+            return self._net(motion, motion.v + motion.carried(x), x, eps, index)[1][..., 0] / self.units[sample]
+
+        for _ in range(STARTS):
+            start = out.xi[:, sample] + rng.normal(size=3) * 10 ** rng.uniform(-6, 0)
+            found = least_squares(
+                lambda x: net(x)[:, 0], start, lambda x: net(x)[:, 1:], xtol=1e-15, ftol=1e-15, gtol=1e-15
+            )
+            residual = np.abs(found.fun).max()
+            if residual < out.residual[sample]:
+                v = motion.v + motion.carried(found.x[:, None])
+                out.xi[:, sample], out.residual[sample] = found.x, residual
+                out.stuck[sample] = self._stuck(v)[0]
+            out.iterations[sample] += found.nfev
+            if residual <= self.limit:
+                return
+
+    def _stuck(self, v: np.ndarray) -> np.ndarray:
+        """(B,): whether some element is at rest, from (a, m, w) as (3, n, B)."""
+        slowest = _slowest(v)
+        return np.zeros(slowest.shape, bool) if self.linear else slowest < STUCK_BELOW * self.regularisation
+
+    def _attempt(self, todo, descent: Descent, out: Solved, threads) -> None:
+        """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
+        elements = self.motion(todo[:1]).half.shape[0] * self.nodes
+        batch = max(16, ELEMENTS_TOGETHER // elements)
+
+        def work(share):
+            queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
+            while queue or state is not None:
+                while queue and (state is None or state.index.size <= batch // 2):
+                    index = queue.pop()
+                    fresh = self._start(descent, index, self.motion(index))
+                    state = fresh if state is None else _State.join([state, fresh])
+                state = self._advance(state, descent, out)
+
+        _map(work, np.array_split(todo, _workers(threads, todo.size // (2 * batch))))
+
+    def _start(self, descent: Descent, index, motion: Motion) -> _State:
+        """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
+        size = index.size
+        at_rest, worst = np.zeros((3, size)), np.full(size, np.inf)
+        first = self.regularisation if self.linear else max(descent.widest, self.regularisation)
+        eps = np.full(size, first)
+        if descent is WARM:
+            dx = self.guess[:, index]
+        else:
+            net = self._net(motion, motion.v, at_rest, np.full(size, 1e3), index)[1]
+            dx = -_solve3(net[:, 1:], net[:, 0])
+        return _State(index, motion, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
+
+    def _net(self, motion: Motion, v, xi, eps, index) -> tuple[np.ndarray, np.ndarray]:
+        """Element loads (3, 4, n, B) and what they, and the mass, come to on the frame, (3, 4, B)."""
+        load = self.load(*v, eps, Known(self.speed[index], self.which[index]))
+        net = motion.assembled(load)
+        if self.inertia is not None:
+            net += self.inertia(xi, index)
+        return load, net
+
+    def _advance(self, s: _State, descent: Descent, out: Solved) -> _State | None:
+        """One step of all samples; those that end are written to ``out`` and leave. None when none are left."""
+        kept = self._step(s, descent)
+        ended = kept & (s.eps <= self.regularisation) & (s.residual <= self.limit)
+        ended |= s.iterations >= descent.budget
+        if ended.any():
+            self._write(s, ended, out)
+            s = s.take(np.flatnonzero(~ended))
+        return s if s.index.size else None
+
+    def _step(self, s: _State, descent: Descent) -> np.ndarray:
+        """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
+        v = s.v + s.motion.carried(s.dx)
+        load, net = self._net(s.motion, v, s.xi + s.dx, s.eps_next, s.index)
+        residual = np.abs(net[:, 0]).max(0) / self.units[s.index]
+        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
+        s.iterations = s.iterations + 1
+        s.xi = np.where(kept, s.xi + s.dx, s.xi)
+        s.v = np.where(kept, v, s.v)
+        s.residual = np.where(kept, residual, s.residual)
+        s.eps = s.eps_next
+        halved = 0.5 * s.dx
+        s.stride = np.where(kept, np.minimum(1.0, LENGTHEN * s.stride), 0.5 * s.stride)
+        s.dx = np.where(kept, self._next_step(s, load, net, kept, descent), halved)
+        return kept
+
+    def _next_step(self, s: _State, load, net, kept, descent: Descent) -> np.ndarray:
+        """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
+        down = kept & (s.eps > self.regularisation) & (s.residual < descent.loose)
+        right = -s.stride * net[:, 0]
+        if down.any():
+            d = np.flatnonzero(down)
+            # Where every element moves much faster than the rounding, its kinks no longer matter: go all the way.
+            free = _slowest(s.v[..., d]) > descent.free * s.eps[d]
+            ratio = np.where(free, 0.0, descent.ratio)
+            s.eps_next = s.eps.copy()
+            s.eps_next[d] = np.maximum(ratio * s.eps[d], self.regularisation)
+            # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v. An element at rest creeps
+            # in proportion to eps; one that slides feels eps^2.
+            slope = np.einsum("ijnb,jnb->inb", load[:, 1:][..., d], s.v[..., d])
+            change = s.eps_next[d] / s.eps[d]
+            right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.motion.take(d).total(slope)
+        dx = _solve3(net[:, 1:], right)
+        return np.clip(dx, -LARGEST_STEP, LARGEST_STEP)
+
+    def _write(self, s: _State, ended: np.ndarray, out: Solved) -> None:
+        i = s.index[ended]
+        out.xi[:, i], out.residual[i] = s.xi[:, ended], s.residual[ended]
+        out.iterations[i] += s.iterations[ended]
+        out.stuck[i] = self._stuck(s.v[..., ended])
+
+
+def _slowest(v: np.ndarray) -> np.ndarray:
+    """(B,): the speed of the slowest element, each by its faster end, from (a, m, w) as (3, n, B)."""
+    a, m, w = v
+    return np.sqrt((a * a + (np.abs(m) + np.abs(w)) ** 2).min(0))
+
+
+def _workers(threads: int | None, useful: int) -> int:
+    return max(1, min(threads or os.cpu_count() or 1, useful))
+
+
+def _map(f: Callable, shares: list) -> None:
+    """f of each share, side by side: NumPy lets go of the interpreter inside its loops."""
+    if len(shares) == 1:
+        f(shares[0])
+    else:
+        with ThreadPoolExecutor(len(shares)) as pool:
+            list(pool.map(f, shares))
+
+
+def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """x (3, B) with matrix x = right, by Cramer's rule on (3, 3, B); a singular matrix gives no step."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    A, B, C = e * i - f * h, f * g - d * i, d * h - e * g
+    det = a * A + b * B + c * C
+    inverse = np.where(det == 0.0, 0.0, 1.0 / np.where(det == 0.0, 1.0, det))
+    x, y, z = right
+    rows = (
+        A * x + (c * h - b * i) * y + (b * f - c * e) * z,
+        B * x + (a * i - c * g) * y + (c * d - a * f) * z,
+        C * x + (b * g - a * h) * y + (a * e - b * d) * z,
+    )
+    return np.stack(rows) * inverse
