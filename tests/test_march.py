@@ -329,6 +329,7 @@ def random_march(rng):
         GrainInertia(frequency=many(-1, 1), length=0.3, depth=0.05),
     ]
     kept = [choices[k] for k in rng.permutation(len(choices))[: rng.integers(1, 5)]]
+    kept = [e for e in kept if medium.dry or not isinstance(e, GrainInertia)]
     return medium, body, alpha, alphadot, kept
 
 
