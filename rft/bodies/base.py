@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -88,6 +89,21 @@ class Body(Protocol):
     joints: int
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Wrapped:
+    """Base of bodies that are another body with changed elements."""
+
+    inner: Body
+
+    @property
+    def length(self) -> float:
+        return self.inner.length
+
+    @property
+    def joints(self) -> int:
+        return self.inner.joints
 
 
 def halves(body: Body) -> np.ndarray:

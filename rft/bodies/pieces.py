@@ -7,25 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion, halves
+from rft.bodies.base import Body, Motion, Wrapped, halves
 
 LONGEST = 1 / 40  # of a piece, in body lengths
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(Wrapped):
     """``inner`` with every element cut into equal pieces no longer than ``longest``."""
 
-    inner: Body
     longest: float = LONGEST
-
-    @property
-    def length(self) -> float:
-        return self.inner.length
-
-    @property
-    def joints(self) -> int:
-        return self.inner.joints
 
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion
+from rft.bodies.base import Body, Motion, Wrapped
 from rft.effects.base import Effect
 from rft.loads import ALONE
 from rft.media.base import TermLaw, require
@@ -74,19 +74,10 @@ class EndCaps(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class _Capped:
+class _Capped(Wrapped):
     """A body with two points more, at its tail and its head."""
 
-    inner: Body
     weight: np.ndarray
-
-    @property
-    def length(self) -> float:
-        return self.inner.length
-
-    @property
-    def joints(self) -> int:
-        return self.inner.joints
 
     def motion(self, alpha, alphadot) -> Motion:
         m = self.inner.motion(alpha, alphadot)
