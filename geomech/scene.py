@@ -107,6 +107,7 @@ class Scene:
             element_load(self.medium, self.numerics.loads)
         except ValueError as error:
             raise SceneError(f"{self.name}: [numerics] {error}") from None
+        self._agree()
         kinds = [type(e) for e in self.effects]
         for effect in self.effects:
             if kinds.count(type(effect)) > 1:
@@ -115,6 +116,17 @@ class Scene:
                 effect.load(None, self.medium, self.body)
             except ValueError as error:
                 raise SceneError(f"{self.name}: [[effects]] {error}: drop it, or change the medium") from None
+
+    def _agree(self) -> None:
+        """SceneError if effects, or the body, say different things of the same swimmer."""
+        sized = self.body.length != 1.0
+        for what, said in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
+            said += [(type(e).__name__, getattr(e, what)) for e in self.effects if hasattr(e, what)]
+            for name, value in said[1:]:
+                if np.any(np.asarray(value) != said[0][1]):
+                    raise SceneError(
+                        f"{self.name}: {said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}: it is one swimmer"
+                    )
 
     def solve(self, alpha, alphadot) -> rft.Solution:
         """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. SceneError

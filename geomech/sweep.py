@@ -28,12 +28,18 @@ SAVE_EVERY = 2.0  # seconds between savings of what there is
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
-    """The tables with one parameter set: "section.key", or "effects.KIND.key" for an effect that is on."""
+    """The tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
+    "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
     if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics"):
         old = tables.get(parts[0], {}).get(parts[1])
         value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
         return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
+    if len(parts) == 2 and parts[0] == "effects":
+        effects = tables.get("effects", [])
+        if any(parts[1] in e for e in effects):
+            return {**tables, "effects": [{**e, parts[1]: value} if parts[1] in e else e for e in effects]}
+        raise SceneError(f"--over {parameter}: no effect of the scene gives {parts[1]!r}: name the effect, or add it")
     if len(parts) == 3 and parts[0] == "effects":
         effects = tables.get("effects", [])
         if any(e.get("kind") == parts[1] for e in effects):
@@ -223,11 +229,12 @@ def draw(scene: Scene, results: dict):
     net, label = plots.net(results["displacement"]), f"displacement per cycle ({scene.unit})"
     fig, axes = plots.figure(4.0, 3.0)
     ax, names = axes[0, 0], list(over)
+    named = [scene.gait.amplitude_label if name == AMPLITUDE else name for name in names]
     if len(over) == 1:
         ax.errorbar(over[names[0]], net, yerr=results["estimate"], fmt="o-", color="black", ms=3, lw=1)
-        ax.set(xlabel=names[0], ylabel=label)
+        ax.set(xlabel=named[0], ylabel=label)
     else:
         image = ax.pcolormesh(over[names[0]], over[names[1]], net.T, shading="nearest", cmap="viridis", rasterized=True)
         fig.colorbar(image, ax=ax).set_label(label)
-        ax.set(xlabel=names[0], ylabel=names[1])
+        ax.set(xlabel=named[0], ylabel=named[1])
     return fig

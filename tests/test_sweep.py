@@ -85,6 +85,21 @@ def test_a_scene_changed_since_it_was_read_is_refused():
         sweep.sweep(fish, {"gait.amplitude": [0.1]})
 
 
+def test_one_frequency_for_all_effects():
+    both = scenes.load("sandfish-heavy").text.replace("elements = 100", "elements = 12") + (
+        PAST + '"grain-inertia"\nfrequency = 3.0\nlength = 0.1\ndepth = 0.05'
+    )
+    found = sweep.sweep(scenes.parse(both), {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
+    np.testing.assert_allclose(found[1], scenes.parse(both).displacement("direct"), atol=1e-9)
+    assert np.abs(found[0] - found[2]).max() > 3e-3
+    with pytest.raises(SceneError, match="BodyInertia gives frequency = 3.0 and GrainInertia 2.0: it is one swimmer"):
+        sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})
+    with pytest.raises(SceneError, match=r"\[body\] gives length = 0.2 and BodyInertia 0.1"):
+        sweep.sweep(scenes.parse(both), {"body.length": [0.2]})
+    with pytest.raises(SceneError, match="no effect of the scene gives 'speed'"):
+        sweep.sweep(scenes.parse(both), {"effects.speed": [2.0]})
+
+
 def test_what_cannot_share_a_batch_gets_its_own(monkeypatch):
     fish = scenes.load("sandfish-loose").with_numerics(phases=32)
     calls, direct = [], estimate.direct
