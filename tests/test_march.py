@@ -138,7 +138,7 @@ def test_order_two_in_the_step(effect):
 
 def test_transients_slow_the_sandfish():
     """A build-up over a fifth of the wave's amplitude costs a tenth of the speed; 30 %, the most by which resistive force
-    theory exceeds discrete-element simulation, takes three fifths (paper Secs. III B, IV A)."""
+    theory exceeds discrete-element simulation, takes 0.65 of it (paper Secs. III B, IV A)."""
     plain = dataclasses.replace(SANDFISH, effects=()).with_numerics(phases=128)
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
     net = lambda scene: np.hypot(*scene.displacement("direct")[:2])
