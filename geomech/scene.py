@@ -283,6 +283,8 @@ class Scene:
             return predict.area(self.curvature, gait, amplitudes, phases)
         if method == "adapted":
             a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
+            if (a < 0).any():
+                raise SceneError(f"{self.name}: the adapted tier takes amplitudes >= 0: use the direct tier below")
             return self.family(gait, float(a.max(initial=0.0))).area(a)
         if method == "path" and self.needs_field(method):
             return predict.path(self.fitted, gait, amplitudes, phases)

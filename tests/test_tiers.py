@@ -192,3 +192,8 @@ def test_estimates_are_in_body_lengths():
     (poses, error), (small, same) = (estimate.direct(s, s.gait, a, 64) for s in (GLASS, tiny))
     np.testing.assert_allclose(same, error, rtol=1e-6)
     np.testing.assert_allclose(small[:, :2], 1e-6 * poses[:, :2], rtol=1e-9)
+
+
+def test_the_adapted_tier_refuses_amplitudes_below_zero():
+    with pytest.raises(SceneError, match="adapted tier takes amplitudes >= 0"):
+        GLASS.displacement("adapted", amplitudes=[-0.5, 0.5])
