@@ -14,7 +14,8 @@ def explain(scene: Scene) -> str:
     for effect in scene.effects:
         broken = ", ".join(sorted(effect.breaks)) or "nothing"
         lines.append(
-            f"on:  {kinds[type(effect)]}: {effect}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}"
+            f"on:  {kinds[type(effect)]}: {effect}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}, "
+            f"order {effect.order}"
         )
     off = [name for name in KINDS if name not in on]
     lines.append("off, not evaluated: " + (", ".join(off) or "none"))

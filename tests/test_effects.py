@@ -39,6 +39,8 @@ def test_effects_say_what_they_are(name):
     effect = EFFECTS[name][0](0.01)
     assert effect.breaks <= set(PREMISES)
     assert effect.limit
+    if "," not in name:  # the limit it declares, not one more
+        assert EFFECTS[name][1] == effect.order
     assert effect.cost
     assert engine((effect,)) in ENGINES
     assert set(effect.batched) <= {f.name for f in dataclasses.fields(effect)}

@@ -31,7 +31,8 @@ class GrainInertia(Effect):
     strength: float = 1.0
 
     breaks = frozenset({"rate independence"})
-    limit = "frequency = 0 (order 2) or strength = 0 (order 1)"
+    limit = "frequency = 0"
+    order = 2  # of strength = 0 it is 1
     cost = "a dozen operations an element"
     rank = 5  # the flux of grains does not know the ground's pressure
     batched = ("frequency", "length", "depth", "strength")
