@@ -7,9 +7,9 @@ from geomech import accuracy, plots
 from geomech.scenes import load
 
 
-def compute(scene: str = "three-link-glass") -> dict:
+def compute(scene: str = "three-link-glass", runs: int = 2) -> dict:
     """As `accuracy.study` gives it."""
-    return accuracy.study(load(scene))
+    return accuracy.study(load(scene), runs=runs)
 
 
 def draw(numbers: dict):

@@ -71,9 +71,11 @@ KNOBS = (
 )  # fmt: skip
 
 
-def study(scene: Scene, progress: Callable | None = None) -> dict:
+def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict:
     """{"scene", "amplitudes", "lines": [{"label", "tier", "knob", "order", "against", "value", "error", "seconds",
-    "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}."""
+    "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}.
+
+    runs: each setting is timed so often, and the quickest counts; a march once, it is long enough for that to tell."""
     amplitudes = scene.gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
     phases = TRUTH_PHASES if scene.engine == "algebraic" else TRUTH_STEPS
@@ -81,7 +83,7 @@ def study(scene: Scene, progress: Callable | None = None) -> dict:
     knobs = [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
     lines = []
     for done, knob in enumerate(knobs):
-        lines.append(_sweep(scene, knob, amplitudes, truth))
+        lines.append(_sweep(scene, knob, amplitudes, truth, runs if scene.engine == "algebraic" else 1))
         if progress:
             progress((done + 1) / len(knobs))
     return {
@@ -92,7 +94,7 @@ def study(scene: Scene, progress: Callable | None = None) -> dict:
     }
 
 
-def _sweep(scene: Scene, knob: Knob, amplitudes, truth) -> dict:
+def _sweep(scene: Scene, knob: Knob, amplitudes, truth, runs: int) -> dict:
     at_limit = {"loads": {"loads": "exact"}, "regularisation": {"regularisation": 1e-9}}.get(knob.setting)
     if knob.against == "limit":
         limit = scene.with_numerics(**(at_limit or {knob.setting: 192 if knob.setting == "directions" else 5}))
@@ -101,7 +103,6 @@ def _sweep(scene: Scene, knob: Knob, amplitudes, truth) -> dict:
         truth = limit.displacement(knob.tier, None, amplitudes)
     errors, seconds = [], []
     for value in knob.values:
-        runs = 2 if scene.engine == "algebraic" else 1  # a march is long enough for one timing to tell
         poses, took = _timed(partial(_fresh, knob, scene, value, amplitudes), runs)
         errors.append(float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.body.length) ** 2))))
         seconds.append(took)

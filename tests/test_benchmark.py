@@ -93,9 +93,3 @@ def test_direct_tier_of_a_circle_to_four_digits():
             times.append(time.perf_counter() - start)
         print(f"\ncircle of {radius} rad to 1e-4: {n} phases, {1e3 * np.median(times):.1f} ms", end="")
         assert n <= 128
-
-
-def test_field(benchmark):
-    alpha, alphadot = field_samples()
-    solution = benchmark(lambda: body_velocity(GLASS, Chain(), alpha, alphadot))
-    assert (solution.status != "unconverged").all()

@@ -1,8 +1,11 @@
-"""The command line as a user meets it, in processes of its own where exit codes and streams matter."""
+"""The command line as a user meets it: in the tests' own process, and a few commands in processes of their own."""
 
+import contextlib
+import io
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 
@@ -10,14 +13,42 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import scenes
+from geomech import cli, scenes
 
 SMALL = ["--grid", "9"]
 
 
-def geomech(*args, cwd=None):
+def geomech(*args, cwd="."):
+    """(exit code, standard output, standard error) of a command, run by `cli.main` in this process."""
+    kept, out, err = (sys.argv, signal.getsignal(signal.SIGTERM)), io.StringIO(), io.StringIO()
+    sys.argv = ["geomech", *map(str, args)]
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), contextlib.chdir(cwd):
+            cli.main()
+    except SystemExit as left:
+        return left.code, out.getvalue(), err.getvalue()
+    finally:
+        sys.argv = kept[0]
+        signal.signal(signal.SIGTERM, kept[1])
+
+
+def as_process(*args, cwd=None):
+    """As `geomech`, by a Python of its own."""
     done = subprocess.run([sys.executable, "-m", "geomech", *map(str, args)], capture_output=True, text=True, cwd=cwd)
     return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["velocity", "three-link-viscous", "--alpha", "0,0", "--alphadot", "-1,0", "--json"],
+        ["scenes", "--show", "three-link-glass"],
+        ["velocity", "nothing", "--alpha", "0,0", "--alphadot", "1,0"],
+        ["fly"],
+    ],
+)
+def test_a_process_says_what_the_tests_see(args):
+    assert as_process(*args) == geomech(*args)
 
 
 def test_velocity_speaks_json():

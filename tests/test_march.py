@@ -96,9 +96,10 @@ def newton(medium, inertia, gait, cycles, eps):
 @pytest.mark.parametrize(
     ("medium", "inertia", "eps"), [(Viscous(2.0), 0.5, 0.0), (Viscous(2.0), 4.0, 0.0), (GLASS, 3.0, 1e-3)]
 )
-def test_motion_by_an_independent_integrator(medium, inertia, eps):
+def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     gait = Circle(amplitude=1.0)
-    wanted = newton(medium, inertia, gait, 8, eps * np.sqrt(np.mean(np.sum(gait.rate(np.zeros(1)) ** 2))))[-1]
+    speed = np.sqrt(np.mean(np.sum(gait.rate(np.zeros(1)) ** 2)))
+    wanted = truths("newton", newton, medium, inertia, gait, 8, eps * speed)[-1]
     alpha, alphadot = gait.cycle(512)
     found = march(medium, Chain(), alpha, alphadot, effects=(heavy(inertia),), regularisation=max(eps, 1e-6)).checked()
     np.testing.assert_allclose(displacement(found.xi), wanted, atol=3e-5)
@@ -126,13 +127,18 @@ def test_massless_comes_back_at_order_one(medium):
     assert np.polyfit(np.log(sizes), np.log(off), 1)[0] == pytest.approx(1, abs=0.05)
 
 
+def net(effects, gait, body, phases):
+    """Pose after a cycle in loose glass."""
+    return march(GLASS, body, *gait.cycle(phases), effects=effects).displacement
+
+
 @pytest.mark.parametrize(
     "effect", [heavy(3.0), Transient(travel=0.05), DepthProfile(slope=0.3, towards=1.0)], ids=lambda e: type(e).__name__
 )
-def test_order_two_in_the_step(effect):
+def test_order_two_in_the_step(effect, truths):
     gait, phases = Sine(elements=20), np.array([64, 128, 256])
-    poses = [march(GLASS, Backbone(20), *gait.cycle(n), effects=(effect,)).displacement for n in (*phases, 1024)]
-    errors = [np.hypot(*(p - poses[-1])[:2]) for p in poses[:-1]]
+    true = truths("marches", net, (effect,), gait, Backbone(20), 1024)
+    errors = [np.hypot(*(net((effect,), gait, Backbone(20), n) - true)[:2]) for n in phases]
     assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
 
 
@@ -184,12 +190,14 @@ def test_work_moves_the_mass(medium):
     assert np.abs(found.moment - light.moment).max() > 0.05 * np.abs(light.moment).max()
 
 
-def test_a_first_cycle_is_of_order_two_as_well():
-    effects, phases = (Transient(travel=0.05), DepthProfile(slope=0.2)), np.array([64, 128, 256])
-    poses = [
-        march(GLASS, Backbone(20), *Sine(elements=20).cycle(n), effects=effects).displacement for n in (*phases, 1024)
-    ]
-    errors = [np.hypot(*(p - poses[-1])[:2]) for p in poses[:-1]]
+def test_a_first_cycle_is_of_order_two_as_well(truths):
+    effects, gait, phases = (
+        (Transient(travel=0.05), DepthProfile(slope=0.2)),
+        Sine(elements=20),
+        np.array([64, 128, 256]),
+    )
+    true = truths("marches", net, effects, gait, Backbone(20), 1024)
+    errors = [np.hypot(*(net(effects, gait, Backbone(20), n) - true)[:2]) for n in phases]
     assert -np.polyfit(np.log(phases), np.log(errors), 1)[0] == pytest.approx(2, abs=0.4)
 
 
@@ -286,7 +294,13 @@ def test_batches_march_as_each_alone():
     np.testing.assert_allclose(together.xi[1, 0], alone.xi, atol=1e-9)
 
 
-def test_estimates_of_marches_cover_the_truth():
+def periodic(effects, gait, body, phases, amplitudes):
+    """Poses after a settled cycle of the sandfish, as its scene gives them."""
+    scene = dataclasses.replace(SANDFISH, body=body, gait=gait, effects=effects).with_numerics(phases=phases)
+    return scene.displacement("direct", None, amplitudes)
+
+
+def test_estimates_of_marches_cover_the_truth(truths):
     """Against four times the phases."""
     from geomech import estimate
 
@@ -294,7 +308,7 @@ def test_estimates_of_marches_cover_the_truth():
         scene = dataclasses.replace(SANDFISH, body=Backbone(30), gait=Sine(elements=30), effects=(effect,))
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
-        truth = scene.with_numerics(phases=256).displacement("direct", scene.gait, a)
+        truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
         off = estimate.distance(found, truth)
         assert (off <= error).all(), type(effect)
         assert (error <= 100 * off + 1e-4).all(), type(effect)

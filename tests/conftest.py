@@ -1,0 +1,38 @@
+"""One thread a process, as many processes as cores for the whole suite, and the truths that are kept."""
+
+import os
+
+import pytest
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(threads, "1")  # before NumPy loads: the processes share the cores already
+
+TRUTHS = pytest.StashKey()
+
+
+def pytest_addoption(parser):
+    parser.addoption("--renew-truths", action="store_true", help="compute what tests/data keeps, and write it anew")
+
+
+def pytest_configure(config):
+    from truths import Truths
+
+    config.stash[TRUTHS] = Truths(config.getoption("--renew-truths"))
+
+
+def pytest_sessionfinish(session):
+    truths = session.config.stash[TRUTHS]
+    if truths.renew:
+        truths.write()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_xdist_auto_num_workers(config):
+    """None (a process for each core) for the whole suite; 0 for tests picked by hand, for what prints and what writes."""
+    picked = config.args_source is not config.ArgsSource.TESTPATHS
+    return 0 if picked or config.option.capture == "no" or config.getoption("--renew-truths") else None
+
+
+@pytest.fixture(scope="session")
+def truths(request):
+    return request.config.stash[TRUTHS]
