@@ -1,0 +1,175 @@
+"""Golden numbers: what every medium, body, effect and built-in scene of the registry gives, kept in data/golden.json.
+
+    python tests/golden.py            which entries changed, appeared or went, and by how much
+    python tests/golden.py --write    records them; lines that did not change stay as they are
+
+They guard against a change nobody meant; what is right, other tests say. Everything goes through public doors, so that
+a move of modules needs no change here.
+
+Regularisation is 1e-3 in place of 1e-6: an element at rest, or one that slides along itself, makes a balance as badly
+conditioned as 1 / regularisation, and the last digits would be the solver's path, not the solution's. For the same
+reason balances are solved to the smallest tolerance there is: solved along another path all come out within 6e-13. Only
+error estimates contain the residual, which is rounding.
+"""
+
+import contextlib
+import io
+import itertools
+import json
+import pathlib
+import sys
+import tempfile
+
+import numpy as np
+from registry import BODIES, EFFECTS, MEDIA
+from scipy.io import netcdf_file
+
+import rft
+from geomech import cli, scenes
+from geomech.gaits import Ellipse
+
+FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
+TOLERANCE, OF_ESTIMATES = 1e-12, 1e-8  # relative, of the largest number of an entry
+SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
+COARSE = {"regularisation": 1e-3, "tolerance": 1e-13, "grid": 7, "phases": 32, "curves": 6, "harmonics": 5, "cycles": 2}
+SCENE = """[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8
+[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\nlength = 0.3\nframe = "link-1"
+[gait]\nkind = "ellipse"\nsemi_axes = [1.0, 0.6]\ntilt = 0.4\ncentre = [0.3, -0.2]
+[numerics]\nregularisation = 1e-3\ntolerance = 1e-13\nphases = 32\ngrid = 6\nextent = 2.0
+"""
+
+
+def shapes(joints: int) -> tuple[np.ndarray, np.ndarray]:
+    """alpha, alphadot (4, joints): a generic pose, a straight body with one joint moving, a curled one whose joints move
+    alike (links stick), and a zigzag with joints of very different speed."""
+    k = np.arange(joints)
+    alpha = 0.8 * np.cos(1.7 * k + 0.4), 0.0 * k, np.full(joints, 1.5), 2.0 * (-1.0) ** k
+    alphadot = np.sin(2.3 * k + 0.9), k == 0, np.full(joints, 0.3), 10.0 ** (-2.0 * (k % 3))
+    return np.stack(alpha), np.stack(alphadot).astype(float)
+
+
+def velocities():
+    for (medium, law), (name, body) in itertools.product(MEDIA.items(), BODIES.items()):
+        alpha, alphadot = shapes(body.joints)
+        xi = rft.body_velocity(law, body, alpha, alphadot, **SOLVED).checked().xi
+        yield f"velocity, {medium}, {name}", xi
+        done = rft.work(law, body, alpha[:1], alphadot[:1], xi[:1], regularisation=SOLVED["regularisation"])
+        yield f"work, {medium}, {name}", [*done.power, *done.slip, *done.moment[0]]
+
+
+def tiers():
+    for name in scenes.builtin_names():
+        scene = scenes.load(name).with_numerics(**COARSE)
+        amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
+        for tier in scene.tiers:
+            yield f"tier, {name}, {tier}", scene.displacement(tier, None, amplitudes)
+
+
+def marches():
+    """Every effect, and every two that differ in kind, strong enough to matter."""
+    body, gait = rft.Chain((1, 1.4, 0.8), frame="link-2"), Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
+    kind = lambda name: name.partition(",")[0]
+    pairs = [(a, b) for a, b in itertools.combinations(EFFECTS, 2) if kind(a) != kind(b)]
+    for names in [(name,) for name in EFFECTS] + pairs:
+        effects = [EFFECTS[name][0](0.05) for name in names]
+        found = rft.march(
+            MEDIA["glass-0.3mm-loose"], body, *gait.cycle(8), effects=effects, cycles=2, with_work=True, **SOLVED
+        )
+        moments = found.work.moment[[2, 6]].ravel()
+        yield f"march, {' + '.join(names)}", [*found.displacement, *found.xi[3], *found.work.power[[2, 6]], *moments]
+
+
+def command(*args: str) -> str:
+    """What a command of geomech prints; it must end well."""
+    out, before = io.StringIO(), sys.argv
+    sys.argv = ["geomech", *args]
+    try:
+        with contextlib.redirect_stdout(out):
+            cli.main()
+    except SystemExit as end:
+        if end.code:
+            raise RuntimeError(f"geomech {' '.join(args)} ended with {end.code}") from None
+    finally:
+        sys.argv = before
+    return out.getvalue()
+
+
+def read(file: pathlib.Path) -> dict[str, np.ndarray]:
+    with netcdf_file(file, mmap=False) as data:
+        return {name: variable[:].copy() for name, variable in data.variables.items()}
+
+
+def commands():
+    with tempfile.TemporaryDirectory() as folder:
+        here = pathlib.Path(folder)
+        (here / "scene.toml").write_text(SCENE)
+        scene, file = str(here / "scene.toml"), str(here / "out.nc")
+        command("connection", scene, "-o", file)
+        for name, values in read(here / "out.nc").items():
+            if values.dtype.kind == "f":
+                yield f"connection, {name}", values
+        command("sweep", scene, "--over", "gait.amplitude=0.5,1.0", "--over", "medium.C=1,3", "-o", file)
+        found = read(here / "out.nc")
+        yield "sweep", found["displacement"]
+        yield "sweep, estimate", found["estimate"]
+        told = json.loads(command("velocity", scene, "--alpha", "0.4,-0.9", "--alphadot", "1,0.5", "--json"))
+        yield "command, velocity", told["xi"]
+        told = json.loads(command("displacement", scene, "--amplitudes", "0.5,1.0", "--json"))
+        for tier, errors in told["estimate"].items():
+            yield f"command, displacement, {tier}", told[tier]
+            yield f"command, displacement, {tier}, estimate", errors
+
+
+def compute() -> dict[str, list[float]]:
+    """Every entry's numbers as the code gives them now."""
+    every = itertools.chain(velocities(), tiers(), marches(), commands())
+    return {name: [float(f"{x:.15g}") for x in np.ravel(values)] for name, values in every}
+
+
+def kept() -> dict[str, list[float]]:
+    return json.loads(FILE.read_text()) if FILE.exists() else {}
+
+
+def change(old: list[float] | None, new: list[float] | None) -> float:
+    """Largest difference over the largest number; infinite where an entry is missing or has another size."""
+    if old is None or new is None or len(old) != len(new):
+        return np.inf
+    off, size = np.abs(np.subtract(old, new)).max(initial=0.0), np.abs([*old, *new]).max(initial=0.0)
+    return off / size if size else 0.0
+
+
+def changed(old: dict, new: dict) -> dict[str, float]:
+    """Entries that are not what they were, and by how much."""
+    every = {name: change(old.get(name), new.get(name)) for name in sorted({*old, *new})}
+    return {k: x for k, x in every.items() if not x <= (OF_ESTIMATES if k.endswith("estimate") else TOLERANCE)}
+
+
+def table(old: dict, new: dict) -> str:
+    """A line for every entry that changed: its number that moved most, old and new, and the relative change."""
+    lines = [f"{'entry':64} {'old':>22} {'new':>22} {'change':>9}"]
+    for name, x in changed(old, new).items():
+        was, now = old.get(name), new.get(name)
+        if was is None or now is None or len(was) != len(now):
+            said = [f"{len(v)} numbers" if v is not None else "none" for v in (was, now)]
+        else:
+            most = np.abs(np.subtract(was, now)).argmax()
+            said = [f"{v[most]:.15g}" for v in (was, now)]
+        lines.append(f"{name:64} {said[0]:>22} {said[1]:>22} {x:9.1e}")
+    return "\n".join(lines) if len(lines) > 1 else f"all {len(new)} entries as recorded, to {TOLERANCE:g}"
+
+
+def write(old: dict, new: dict) -> None:
+    """One entry a line, sorted; what did not change keeps its digits."""
+    moved = changed(old, new)
+    lines = [f"{json.dumps(name)}: {json.dumps(new[name] if name in moved else old[name])}" for name in sorted(new)]
+    FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+
+
+if __name__ == "__main__":
+    old, new = kept(), compute()
+    print(table(old, new))
+    if "--write" in sys.argv[1:]:
+        write(old, new)
+        print(f"recorded in {FILE}")
+    elif changed(old, new):
+        sys.exit("not as recorded; if that is meant: python tests/golden.py --write")
