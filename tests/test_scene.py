@@ -31,12 +31,20 @@ grid = 21
 """
 
 
-@pytest.mark.parametrize("name", scenes.builtin_names())
-def test_builtin_scenes_move(name):
+@pytest.mark.parametrize("name", ["three-link-glass", "three-link-viscous", "shovel-nosed-snake"])
+def test_a_study_has_every_tier_its_errors_and_times(name):
+    """Numbers of the scenes are pinned in test_builtin_scenes.py; a study's are those of `displacement`, tier by tier."""
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
-    table = loaded.study([0.8], loaded.methods)
-    assert all(np.isfinite(table[m]).all() and abs(table[m][0][0]) > 1e-3 for m in loaded.methods)
-    assert set(table["seconds"]) >= set(loaded.methods)
+    amplitudes = [0.1, 0.3]
+    table = loaded.study(amplitudes, loaded.methods)
+    assert [*table] == ["amplitude", *loaded.methods, "estimate", "seconds"]
+    assert table["amplitude"] == amplitudes
+    for method in loaded.methods:
+        np.testing.assert_allclose(table[method], loaded.displacement(method, None, amplitudes), atol=1e-9)
+        assert len(table["estimate"][method]) == 2
+        assert min(table["estimate"][method]) > 0
+    with_field = {"field"} if any(map(loaded.needs_field, loaded.methods)) else set()
+    assert set(table["seconds"]) == {*loaded.methods} | with_field
     assert all(v >= 0 for v in table["seconds"].values())
 
 
