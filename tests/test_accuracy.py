@@ -110,6 +110,33 @@ def test_table_and_sentences(glass):
     assert json.loads(json.dumps(glass)) == glass
 
 
+def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
+    """Of lines made up here: not the most accurate, not the slowest, and none that is against the knob's own limit."""
+
+    def made(tier, knob, against, *settings):
+        value, error, seconds = zip(*settings)
+        return {"tier": tier, "knob": knob, "against": against, "value": value, "error": error, "seconds": seconds}
+
+    lines = [
+        made("direct", "phases", "truth", (16, 3e-2, 1.0), (32, 2e-3, 2.0), (64, 5e-5, 4.0)),
+        made("adapted", "curves", "truth", (6, 4e-3, 3.0), (12, 8e-4, 2.5)),
+        made("direct", "segments", "limit", (4, 1e-9, 0.1)),
+    ]
+    best = {c["tolerance"]: c for c in (accuracy._cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5))}
+    assert {tol: (c["tier"], c.get("value"), c.get("seconds")) for tol, c in best.items()} == {
+        0.1: ("direct", 16, 1.0),
+        3e-2: ("direct", 16, 1.0),
+        1e-2: ("direct", 32, 2.0),
+        1e-3: ("adapted", 12, 2.5),
+        1e-4: ("direct", 64, 4.0),
+        1e-5: (None, None, None),
+    }
+    assert (best[1e-3]["knob"], best[1e-3]["error"]) == ("curves", 8e-4)
+    text = accuracy.table({"cheapest": list(best.values())})
+    assert "adapted, curves = 12" in text
+    assert text.splitlines()[-1].split() == ["1e-05", "none", "of", "those", "tried"]
+
+
 def test_a_linear_medium_has_no_dry_knobs(viscous):
     labels = {x["label"] for x in viscous["lines"]}
     assert "direct: phases" in labels

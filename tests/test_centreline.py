@@ -204,6 +204,17 @@ def test_equal_if_the_file_is(tmp_path):
     np.testing.assert_array_equal(first.shape(T), second.shape(T))  # a gait that has been read keeps what it has read
 
 
+@pytest.mark.parametrize("share", [0.24, 0.26])
+def test_a_quarter_of_the_period_without_a_frame_is_too_much(share, tmp_path):
+    phases = [*np.linspace(0, 1 - share, 20)]
+    path = write(tmp_path, "curvature", phases=phases)
+    if share < 0.25:
+        assert np.isfinite(gait(path, period=1.0).shape(T)).all()
+    else:
+        with pytest.raises(ValueError, match="after t = 0.74 there is no frame for 0.26 of the period, more than 0.25"):
+            gait(path, period=1.0)
+
+
 SCENE = """
 [medium]
 name = "glass-0.3mm-loose"

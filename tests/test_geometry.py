@@ -139,6 +139,13 @@ def test_leaving_the_field_is_an_error_that_names_the_angle():
     ):
         with pytest.raises(ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"):
             tier()
+    for sign, joint in ((1, 0), (-1, 0), (1, 1), (-1, 1)):
+        edge = np.array([0.3, 0.3])
+        edge[joint] = sign * (1 + 1e-12)  # rounding
+        assert np.isfinite(fitted(edge)).all()
+        edge[joint] = sign * (1 + 1e-5)
+        with pytest.raises(ValueError, match=f"alpha_{joint + 1} = .*lies outside"):
+            fitted(edge)
 
 
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
@@ -177,11 +184,11 @@ def test_a_reversed_gait_undoes_the_gait(name):
     np.testing.assert_allclose(se2.compose(g, h), 0, atol=1e-12)
 
 
-def stepwise(velocity, gait, steps):
-    """Displacement by many short exponentials, midpoint rule: order 2."""
+def stepwise(velocity, gait, steps, end=2 * np.pi):
+    """Displacement from phase 0 to ``end`` by many short exponentials, midpoint rule: order 2."""
     g = np.zeros(3)
-    for t in (np.arange(steps) + 0.5) / steps * 2 * np.pi:
-        g = se2.compose(g, se2.exp(velocity(gait.shape(t), gait.rate(t)) * 2 * np.pi / steps))
+    for t in (np.arange(steps) + 0.5) / steps * end:
+        g = se2.compose(g, se2.exp(velocity(gait.shape(t), gait.rate(t)) * end / steps))
     return g
 
 
@@ -194,13 +201,26 @@ def test_spectral_integration_against_short_steps():
 
 def test_trajectory_ends_where_the_displacement_says():
     gait = Circle(centre=(0.5, 0.2))
+    steps = stepwise(MIDDLE, gait, 800, end=np.pi), stepwise(MIDDLE, gait, 400, end=np.pi)
     for phases in (50, 51, 200):
         xi = MIDDLE(*gait.cycle(phases))
         path = simulate.trajectory(xi, [0.0, np.pi, 2 * np.pi])
         np.testing.assert_allclose(path[0], 0, atol=1e-15)
+        np.testing.assert_allclose(path[1], (4 * steps[0] - steps[1]) / 3, atol=1e-9)
         np.testing.assert_allclose(path[2], simulate.displacement(xi), atol=1e-13)
-    half = stepwise(MIDDLE, Fourier(cos=((0.5, 0.0),) * 2, sin=((0.0, 0.0),) * 2), 4)
-    assert np.isfinite(half).all()
+
+
+@pytest.mark.parametrize("phases", [8, 9])
+def test_a_trajectory_has_the_velocity_it_was_made_from(phases):
+    """At every phase of any samples, the highest wave of an even number of them included."""
+    xi, h = np.random.default_rng(5).normal(size=(2, phases, 3)), 1e-5
+    t = 2 * np.pi * np.arange(phases) / phases
+    before, at, after = (simulate.trajectory(xi, t + k * h) for k in (-1, 0, 1))
+    rate = (after - before) / (2 * h)
+    x, y = se2.rotated(-at[..., 2], rate[..., 0], rate[..., 1])
+    np.testing.assert_allclose(np.stack([x, y, rate[..., 2]], -1), xi, atol=1e-8)
+    theta = at[..., 2] - t * xi[..., 2].mean(1)[:, None]
+    np.testing.assert_allclose(simulate.turning(xi), theta - theta.mean(1)[:, None], atol=1e-13)
 
 
 def test_full_turns_are_integrated_too():

@@ -1,10 +1,12 @@
 """Scenes: built-in ones run, bad ones are refused with one line that names the place and the cure."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+import rft
 from geomech import scenes
 from geomech.problem import SceneError
 from rft import Chain, Granular, Viscous
@@ -115,6 +117,32 @@ def test_unknown_names_and_files():
         scenes.load("three-link-glas")
     with pytest.raises(SceneError, match="cannot read scene 'nowhere.toml': No such file"):
         scenes.load("nowhere.toml")
+
+
+def test_numerics_reach_the_solver_and_the_work():
+    """Loads and regularisation are the scene's, in body velocities, marches and what the body does."""
+    n = {"loads": "midpoint:3", "regularisation": 1e-2}
+    scene = scenes.load("three-link-glass-close").with_numerics(phases=16, tolerance=1e-13, **n)
+    alpha, alphadot = scene.gait.cycle(16, 1.3)
+    given = scene.medium, scene.body, alpha, alphadot
+    wanted = rft.body_velocity(*given, tolerance=1e-13, **n)
+    found = scene.solve(alpha, alphadot)
+    np.testing.assert_allclose(found.xi, wanted.xi, atol=1e-13)
+    default = scenes.load("three-link-glass-close").velocity(alpha, alphadot)
+    assert np.abs(default - wanted.xi).max() > 1e-3
+    moments = rft.work(*given, wanted.xi, **n)
+    for got, want in zip(scene.work(alpha, alphadot, wanted.xi), moments):
+        np.testing.assert_allclose(got, want, rtol=1e-12)
+    for other in ({"loads": n["loads"]}, {"regularisation": n["regularisation"]}):
+        assert np.abs(rft.work(*given, wanted.xi, **other).moment - moments.moment).max() > 1e-4
+    cycle = scene.cycle(amplitudes=1.3, work=True)
+    np.testing.assert_allclose(cycle.work.moment, moments.moment, atol=1e-12)
+    heavy = dataclasses.replace(scene, effects=(rft.BodyInertia(0.7, 0.5, 1.0, 1.3),)).with_numerics(cycles=2)
+    marched = rft.march(*given, effects=heavy.effects, cycles=2, tolerance=1e-13, with_work=True, **n)
+    cycle = heavy.cycle(amplitudes=1.3, work=True)
+    np.testing.assert_allclose(cycle.xi, marched.xi, atol=1e-12)
+    np.testing.assert_allclose(cycle.net, marched.displacement, atol=1e-12)
+    np.testing.assert_allclose(cycle.work.moment, marched.work.moment, atol=1e-12)
 
 
 def test_the_path_of_a_linear_medium_needs_no_field():

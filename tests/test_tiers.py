@@ -115,6 +115,10 @@ def test_limits_of_the_tables():
         family.fit(GLASS.velocity, Circle(), 0.0)
     with pytest.raises(ValueError, match="harmonics must be odd and below the number of directions"):
         harmonics.fit(GLASS.velocity, connection.grid(2, 5), 4, 24)
+    for highest, count in ((5, 5), (7, 5)):
+        with pytest.raises(ValueError, match="below the number of directions"):
+            harmonics.fit(GLASS.velocity, connection.grid(2, 5), highest=highest, count=count)
+    assert harmonics.fit(GLASS.velocity, connection.grid(2, 5), highest=5, count=6).highest == 5
 
 
 def random_scene(rng):
@@ -185,6 +189,24 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():
     few, many = (estimate.cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3)["tier"] for n in (3, 400))
     assert (few, many) == ("direct", "adapted")
+
+
+def test_what_the_solver_left_counts_in_the_estimate():
+    """A residual, in units of the axial drag, is a velocity of the body for 2 pi of phase: where it is what is left, the
+    estimate says it, in body lengths whatever the size."""
+    a = np.array([0.6, 1.4])
+    for length in (1.0, 0.3):
+        sized = dataclasses.replace(GLASS, body=dataclasses.replace(GLASS.body, length=length))
+        lazy, run = sized.with_numerics(tolerance=0.5), None
+        run = lazy.cycle(lazy.gait, a, 64)
+        left = 2 * np.pi * run.residual * run.speed
+        _, tight = estimate.direct(sized, sized.gait, a, 64)
+        poses, error = estimate.direct(lazy, lazy.gait, a, 64)
+        assert left.min() > 10 * tight.max()
+        assert (error >= left).all()
+        off = estimate.distance(poses, sized.displacement("direct", None, a)) / length
+        assert (error >= off).all()
+        np.testing.assert_allclose(error, left, rtol=0.9)
 
 
 def test_impossible_tolerances_are_refused():
