@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import cli, scenes
+from geomech import accuracy, cli, curvature, plots, scenes
 
 SMALL = ["--grid", "9"]
 
@@ -72,6 +72,9 @@ def test_connection_is_a_self_describing_file(tmp_path):
         assert all("units" in data[v].attrs for v in ("A", "ccf", "fit_residual", "alpha_1"))
         again = scenes.parse(data.attrs["scene"]).with_numerics(grid=9, extent=2.0).fitted
         np.testing.assert_array_equal(data.A, again.A)
+        np.testing.assert_array_equal(data.fit_residual, again.residual)
+        np.testing.assert_allclose(data.ccf, curvature.ccf(again).values, rtol=1e-13)
+        assert np.abs(data.ccf).max() > 0.05
     assert plot.read_text().lstrip().startswith("<?xml")
     assert {p.name for p in tmp_path.iterdir()} == {"a.nc", "a.svg"}
 
@@ -113,7 +116,16 @@ def test_accuracy_leaves_its_study(tmp_path):
     files = {p.name for p in (tmp_path / "out").iterdir()}
     assert files == {"accuracy.json", "accuracy.txt", "accuracy.png", "accuracy.pdf"}
     assert "direct: phases 16 to 512" in out
-    assert json.loads((tmp_path / "out" / "accuracy.json").read_text())["scene"] == "s.toml"
+    found = json.loads((tmp_path / "out" / "accuracy.json").read_text())
+    assert found["scene"] == "s.toml"
+    assert found["amplitudes"] == pytest.approx([0.4, 0.55, 0.7, 0.85, 1.0])
+    assert {x["label"] for x in found["lines"]} == {
+        *(f"direct: {knob}" for knob in ("phases", "segments", "nodes")), "adapted: curves", "area: grid"
+    }  # fmt: skip
+    assert all(len(x["value"]) == len(x["error"]) == len(x["seconds"]) for x in found["lines"])
+    written = (tmp_path / "out" / "accuracy.txt").read_text()
+    assert written == "\n".join([accuracy.table(found), "", *accuracy.sentences(found), ""])
+    assert out.startswith(written)
 
 
 def test_ccf_draws(tmp_path):
@@ -135,6 +147,13 @@ def test_run_leaves_everything(tmp_path):
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["dir"]
     tables = json.loads((tmp_path / "deep" / "dir" / "displacement.json").read_text())
     assert set(tables) == {"circle", "butterfly"}
+    glass = scenes.load("three-link-glass")
+    for gait, table in tables.items():
+        run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[gait]
+        wanted = glass.displacement("direct", run, np.array(table["amplitude"]))
+        np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
+        assert f"{plots.net(wanted)[-1]:.6f}" in out
+    assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
 
 def test_scenes_are_listed():

@@ -9,12 +9,13 @@ from registry import EFFECTS
 
 from geomech import scenes
 from geomech.explain import explain
-from geomech.gaits import Sine
+from geomech.gaits import Ellipse, Sine
 from geomech.problem import SceneError
 from rft import (
     CATALOGUE,
     Backbone,
     BodyInertia,
+    Chain,
     DepthProfile,
     DisturbedGround,
     EndCaps,
@@ -24,7 +25,7 @@ from rft import (
     body_velocity,
     march,
 )
-from rft.effects import ENGINES, KINDS, PREMISES, engine
+from rft.effects import KINDS, PREMISES, engine, together
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
@@ -34,16 +35,71 @@ def test_the_registry_has_every_effect():
     assert {name.partition(",")[0] for name in EFFECTS} == set(KINDS)
 
 
+def holds(limit, effect):
+    """Whether an effect is at the limit it declares: "x = 0", "x = y = z" or "x all 1", joined by "and"."""
+    for clause in limit.split(" and "):
+        name, every, value = clause.partition(" all ")
+        if every:
+            equal = [*getattr(effect, name), float(value)]
+        else:
+            equal = [getattr(effect, word) if hasattr(effect, word) else float(word) for word in clause.split(" = ")]
+        if len(set(equal)) > 1:
+            return False
+    return True
+
+
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_say_what_they_are(name):
-    effect = EFFECTS[name][0](0.01)
+    make, order = EFFECTS[name]
+    effect, kind = make(0.01), KINDS[name.partition(",")[0]]
+    assert isinstance(effect, kind)
     assert effect.breaks <= set(PREMISES)
-    assert effect.limit
+    assert not holds(effect.limit, effect)
     if "," not in name:  # the limit it declares, not one more
-        assert EFFECTS[name][1] == effect.order
-    assert effect.cost
-    assert engine((effect,)) in ENGINES
-    assert set(effect.batched) <= {f.name for f in dataclasses.fields(effect)}
+        assert order == effect.order
+        assert holds(effect.limit, make(0.0))
+    told = explain(dataclasses.replace(SANDFISH, effects=(effect,)))
+    assert f"; costs {effect.cost}; gone at {effect.limit}, order {effect.order}" in told
+    assert f"breaks {', '.join(sorted(effect.breaks)) or 'nothing'};" in told
+    assert len(effect.cost) > 10
+
+
+@pytest.mark.parametrize("name", [name for name in EFFECTS if "," not in name])
+def test_parameters_that_may_differ_within_a_batch(name):
+    """Those an effect names, each side by side, and no other."""
+    effect = EFFECTS[name][0](0.01)
+    for field in dataclasses.fields(effect):
+        value = getattr(effect, field.name)
+        changed = (*value[:-1], 2 * value[-1]) if isinstance(value, tuple) else value * 1.5 + 0.001
+        other = dataclasses.replace(effect, **{field.name: changed})
+        if field.name in effect.batched:
+            joined = together([effect, other], [2, 1])
+            assert getattr(joined, field.name).tolist() == [value, value, changed]
+            assert all(
+                getattr(joined, f.name) == getattr(effect, f.name) for f in dataclasses.fields(effect) if f != field
+            )
+        else:
+            with pytest.raises(ValueError, match=f"{type(effect).__name__}: {field.name} cannot differ within a batch"):
+                together([effect, other], [2, 1])
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_effects_are_the_same_on_a_body_of_any_size(name):
+    """Lengths of an effect are of the body or its own: body lengths in, body lengths out."""
+    effect = EFFECTS[name][0](0.3)
+    alpha, alphadot = Ellipse(semi_axes=(1.1, 0.7), tilt=0.4, centre=(0.3, -0.2)).cycle(12)
+    one, small = (
+        march(
+            GLASS, Chain((1, 1.4, 0.8), length=length, frame="link-1"), alpha, alphadot, effects=(effect,), cycles=2,
+            tolerance=1e-13, with_work=True,
+        )
+        for length in (1.0, 0.3)
+    )  # fmt: skip
+    np.testing.assert_allclose(small.xi, one.xi * [0.3, 0.3, 1.0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(small.pose, one.pose * [0.3, 0.3, 1.0], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(small.work.power, 0.3 * one.work.power, rtol=1e-12)
+    np.testing.assert_allclose(small.work.moment, one.work.moment, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(small.drift, one.drift, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -17,7 +17,6 @@ from rft import (
     ConstantCurvature,
     Coulomb,
     EndCaps,
-    Granular,
     Serpenoid,
     SkinFriction,
     Viscous,
@@ -260,10 +259,10 @@ def test_a_sweep_is_one_batch_of_everything():
     assert calls == [(3, 100, 99)]
 
 
-def test_granular_only_when_asked():
-    assert isinstance(GLASS, Granular)
-    with pytest.raises(ValueError, match="sine wave"):
-        swimmers.performance(scenes.load("three-link-glass"), [0.1])
+@pytest.mark.parametrize(("name", "kind"), [("three-link-glass", "circle"), ("butterfly-glass", "butterfly")])
+def test_performance_is_refused_without_a_wave(name, kind):
+    with pytest.raises(ValueError, match=f"^performance is that of a sine wave, got a {kind}$"):
+        swimmers.performance(scenes.load(name), [0.1])
 
 
 def waving(waves, elements=50, phases=64, effects=(), **gait):
