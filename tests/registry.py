@@ -60,7 +60,7 @@ EFFECTS = {
     "depth-profile": (lambda x: DepthProfile(along=(1, 1 + x)), 1),
     "depth-profile, slope": (lambda x: DepthProfile(slope=x, towards=1.0), 1),
     "grain-inertia": (lambda x: GrainInertia(frequency=x, length=0.7, depth=0.07, strength=1.5), 2),
-    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.2, length=0.08, depth=0.1, strength=x), 1),
+    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=x), 1),
     "body-inertia": (lambda x: BodyInertia(mass=x, frequency=0.6, length=0.8, drag=1.3), 1),
     "body-inertia, frequency": (lambda x: BodyInertia(mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3), 2),
     "transient": (lambda x: Transient(travel=2 * x), 1),
