@@ -1,0 +1,150 @@
+"""Every command and how it may end: 0 with its answer, 2 with one line, 130 or 143 when told to stop; no half-written files."""
+
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+import rft
+from geomech import cli
+
+SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
+[gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 5\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
+
+# What each command takes beside its scene. A new one needs its row.
+COMMANDS = {
+    "run": ["-o", "out"],
+    "velocity": ["--alpha", "0.5,0.3", "--alphadot", "1,0"],
+    "connection": ["-o", "out.nc", "--plot", "out.svg"],
+    "ccf": ["--plot", "out.svg"],
+    "displacement": ["--amplitudes", "0.5,1.0", "--plot", "out.svg"],
+    "accuracy": ["-o", "out"],
+    "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
+    "explain": [],
+    "scenes": [],
+}
+SOLVING = [name for name in COMMANDS if name not in ("explain", "scenes")]
+SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
+
+
+def arguments(name):
+    return [name, *([] if name == "scenes" else ["small.toml"]), *COMMANDS[name]]
+
+
+@pytest.fixture
+def ended(tmp_path, monkeypatch, capsys):
+    """Runs a command in a folder with a small scene: (exit code, standard output, standard error, files left)."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(SMALL)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+
+    def run(*args):
+        monkeypatch.setattr(sys, "argv", ["geomech", *args])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err, {p.name for p in tmp_path.iterdir()} - {"small.toml"}
+
+    yield run
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_every_command_has_its_row():
+    assert {command.name or command.callback.__name__ for command in cli.app.registered_commands} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in SLOW])
+def test_what_goes_well_ends_with_0(name, ended):
+    code, out, err, files = ended(*arguments(name))
+    assert (code, err) == (0, "")
+    assert bool(out) == (name not in ("connection", "ccf"))
+    assert files == {word for word in COMMANDS[name] if word.startswith("out")}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_ends_with_0(name, ended):
+    code, out, err, files = ended(name, "--help")
+    assert (code, err, files) == (0, "", set())
+    assert name in out
+
+
+def refused(told, said):
+    code, out, err, files = told
+    assert (code, out, files) == (2, "", set())
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert said in err
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_the_user_can_mend_ends_with_2(name, ended):
+    refused(ended(*arguments(name), "--fast"), "No such option: --fast")
+    if name == "scenes":
+        refused(ended("scenes", "--show", "three-link-glas"), "did you mean 'three-link-glass'")
+        return
+    refused(ended(name, "nothing", *COMMANDS[name]), "scene: 'nothing' is unknown")
+    for k in range(0, len(COMMANDS[name]), 2):
+        option = COMMANDS[name][k]
+        if option in ("-o", "--plot") and name in ("run", "accuracy", "connection", "displacement"):
+            continue  # may be left out, or has a second option beside it
+        if option == "--over":
+            refused(ended(name, "small.toml", "-o", "out.nc"), "Missing option '--over'")
+            continue
+        rest = COMMANDS[name][:k] + COMMANDS[name][k + 2 :]
+        refused(ended(name, "small.toml", *rest), "Missing option '-o' / '--output'" if option == "-o" else option)
+
+
+def failing(monkeypatch, how):
+    """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the third,
+    when there is something in its folder."""
+    solve, calls = rft.body_velocity, []
+
+    def fails(*args, **kwargs):
+        calls.append(1)
+        if how == "unconverged":
+            found = solve(*args, **kwargs)
+            return found._replace(status=np.full(found.status.shape, "unconverged"))
+        if len(calls) == (3 if "run" in sys.argv and how is interrupt else 1):
+            how()
+        return solve(*args, **kwargs)
+
+    monkeypatch.setattr(rft, "body_velocity", fails)
+    return calls
+
+
+@pytest.mark.parametrize("name", SOLVING)
+def test_what_does_not_converge_ends_with_2(name, ended, monkeypatch):
+    assert failing(monkeypatch, "unconverged") == []
+    refused(ended(*arguments(name)), "did not converge")
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def no_memory():
+    raise MemoryError
+
+
+@pytest.mark.parametrize(
+    ("how", "ends", "said"),
+    [(interrupt, 130, ""), (no_memory, 2, "not enough memory"), (lambda: signal.raise_signal(signal.SIGTERM), 143, "")],
+    ids=["interrupt", "memory", "terminate"],
+)
+@pytest.mark.parametrize("name", SOLVING)
+def test_what_is_stopped_leaves_nothing_half_written(name, how, ends, said, ended, monkeypatch):
+    calls = failing(monkeypatch, how)
+    code, out, err, files = ended(*arguments(name))
+    assert calls
+    assert (code, out) == (ends, "")
+    assert files == set()
+    assert said in err
+    assert err == "" or err.startswith("error: ")
+
+
+def test_a_fault_of_the_program_is_not_passed_off_as_the_users(ended, monkeypatch):
+    failing(monkeypatch, lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        ended(*arguments("displacement"))
