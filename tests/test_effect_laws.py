@@ -15,6 +15,7 @@ from rft import (
     DepthProfile,
     DisturbedGround,
     EndCaps,
+    SkinFriction,
     Viscous,
     body_velocity,
     march,
@@ -37,6 +38,17 @@ def test_end_caps_are_the_written_formula():
     axial = e * np.pi * 0.08**2 * GLASS.C * np.sin(np.arctan(np.cos(psi) / np.tan(GLASS.gamma0))) / unit
     np.testing.assert_allclose(along, axial, rtol=1e-12)
     np.testing.assert_allclose(across, e * np.pi * 0.08**2 * np.sin(psi) / unit, rtol=1e-12)
+
+
+def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():
+    """Forward over reference where an element slides towards its head, backward towards its tail; the drag across stays."""
+    a, m, w = np.random.default_rng(6).normal(size=(3, 3, 40))
+    a += 0.01 * np.sign(a)
+    eps, plain = np.full(40, 1e-3), element_load(GLASS)
+    skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25).load(plain, GLASS, Chain())
+    found, without = skin(a, m, w, eps), plain(a, m, w, eps)
+    np.testing.assert_allclose(found[0], without[0] * np.where(a > 0, 0.12, 0.31) / 0.25, rtol=1e-14)
+    np.testing.assert_array_equal(found[1:], without[1:])
 
 
 def test_squared_speed_is_integrated_exactly():

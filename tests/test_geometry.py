@@ -84,6 +84,25 @@ def test_ccf_agrees_with_sympy_everywhere():
     np.testing.assert_allclose(curvature.ccf(fitted).values, np.broadcast_arrays(*exact(a1, a2)), atol=2e-6)
 
 
+@pytest.mark.parametrize(("i", "j"), [(0, 1), (0, 2), (1, 2), (2, 1), (2, 0), (1, 0)])
+def test_small_loops_follow_the_ccf_of_their_joints(i, j):
+    """Every component, about a bent shape of four unlike links, in the plane of every two joints and either way round."""
+    body, centre = Chain((1, 1.6, 0.7, 1.2), length=0.6, frame="link-2"), np.array([0.5, -0.8, 0.3])
+    solve = lambda a, d: body_velocity(Viscous(3.0), body, a, d).xi
+    fitted = connection.fit(solve, around(centre, 0.1, 7), 16, degree=5)
+    density = curvature.ccf(fitted, i, j).values[:, 3, 3, 3]
+    waves = np.zeros((2, 3, 1))
+    waves[0, i], waves[1, j] = 1.0, 0.7
+    size = 1e-3
+    loop = Fourier(amplitude=size, centre=tuple(centre), cos=waves[0], sin=waves[1])
+    moved = predict.direct(solve, loop, phases=64)
+    # From the loop's start, a displacement of order 1 in its size away from where the density is taken.
+    start = fitted(centre)[:, i] * size
+    moved = se2.compose(se2.compose(se2.exp(start), moved), se2.inverse(se2.exp(start)))
+    np.testing.assert_allclose(moved / (0.7 * np.pi * size**2), density, atol=2e-4 * np.abs(density).max())
+    assert np.abs(density).min() > 1e-4
+
+
 def test_small_circles_follow_the_ccf():
     """|displacement| -> 5 (r - 1) / 243 times the area."""
     for ratio in (2.0, 4.0):

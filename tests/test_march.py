@@ -34,8 +34,9 @@ SANDFISH = scenes.load("sandfish-loose")
 
 
 def heavy(inertia):
-    """Body inertia of mass x length x (rad/s)^2 / drag = inertia."""
-    return BodyInertia(mass=inertia, frequency=1 / (2 * np.pi), length=1.0, drag=1.0)
+    """Body inertia of mass x length x (rad/s)^2 / drag = inertia, none of them 1."""
+    mass = inertia * 2.5 / (0.4 * (2 * np.pi * 0.7) ** 2) * (1 - 1e-15)
+    return BodyInertia(mass=mass, frequency=0.7, length=0.4, drag=2.5)
 
 
 @pytest.mark.parametrize("medium", MEDIA)
