@@ -10,7 +10,7 @@ import rft
 from geomech import cli
 
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
-[gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 5\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
+[gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
 
 # What each command takes beside its scene. A new one needs its row.
 COMMANDS = {
