@@ -9,15 +9,16 @@ from geomech.scenes import load
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
-    """The CCF on its grid (a Field with values (3, N, N)) and the gaits."""
+    """The CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
     loaded = load(scene).with_numerics(**numerics)
-    return {"ccf": loaded.curvature, "gaits": [loaded.gait, Butterfly()], "unit": loaded.unit}
+    fields = {"ccf": loaded.curvature, "error": loaded.curvature_error}
+    return {**fields, "gaits": [loaded.gait, Butterfly()], "unit": loaded.unit}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(4.2, 3.4)
-    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], numbers["unit"], axes[0, 0])
+    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], numbers["unit"], axes[0, 0], numbers["error"])
     return fig
 
 

@@ -6,6 +6,8 @@ Left: the fraction of directions of alphadot for which some link stands still. M
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from figures import main
@@ -19,7 +21,8 @@ def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 4
     axes = connection.grid(2, grid, loaded.numerics.extent)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
     solution = loaded.solve(alpha, connection.directions(2, directions)).checked()
-    left = {k: harmonics.fit(loaded.velocity, axes, k, directions, mirror=True).residual[2] for k in (1, 15)}
+    fit = functools.partial(harmonics.fit, loaded.velocity, axes, directions, mirror=True)
+    left = {k: fit(highest=k).residual[2] for k in (1, 15)}
     return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "left": left}
 
 

@@ -101,7 +101,7 @@ def ccf(
     from geomech import plots
 
     scene = _field_scene(name, grid, extent, plot, plot, maps=True)
-    plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit), plot)
+    plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit, scene.curvature_error), plot)
 
 
 @app.command()

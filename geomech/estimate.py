@@ -2,7 +2,7 @@
 
 Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the phases
 and, on the quarter, with the regularisation ten times smaller and exact link integrals; every other tier against the
-direct tier. Errors are distances between net positions, in body lengths.
+direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net headings, in rad.
 """
 
 from __future__ import annotations
@@ -34,8 +34,14 @@ def distance(a, b) -> np.ndarray:
     return np.hypot(a[..., 0] - b[..., 0], a[..., 1] - b[..., 1])
 
 
+def apart(a, b, length: float) -> np.ndarray:
+    """(..., 2): between the positions of poses (..., 3), over ``length``, and between their headings, rad."""
+    return np.stack([distance(a, b) / length, np.abs(a[..., 2] - b[..., 2])], -1)
+
+
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
-    """(poses (B, 3), errors (B,) in body lengths) of the direct tier; phases is rounded up to a multiple of 8, >= 32."""
+    """(poses (B, 3), errors (B, 2), body lengths and rad) of the direct tier; phases is rounded up to a multiple of 8,
+    >= 32."""
     phases = max(32, 8 * -(-phases // 8))
     marching = scene.engine != "algebraic"
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if marching else phases, amplitudes)
@@ -46,17 +52,17 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     else:
         eighth, coarse, half, full = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2, 1))
     error = _left(
-        *(distance(*pair) for pair in ((coarse, eighth), (half, coarse), (full, half))),
+        *(apart(*pair, scene.body.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
         marching or scene.medium.dry != (),
     )
-    error += 2 * np.pi * scene.body.length * run.residual * run.speed
+    error += 2 * np.pi * (run.residual * run.speed)[:, None]
     if finer := finer_model(scene):
-        error += 1.2 * distance(finer.run(*every[1]).net, coarse)
-    return full, error / scene.body.length + settling(scene)
+        error += 1.2 * apart(finer.run(*every[1]).net, coarse, scene.body.length)
+    return full, error + settling(scene)
 
 
 def settling(scene: Scene) -> float:
-    """Change of displacement between cycles, body lengths, at which a march of the scene ends; 0 where none is needed."""
+    """Change of displacement between cycles, body lengths and rad, at which a march of the scene ends; 0 without one."""
     return 0.0 if scene.engine == "algebraic" else max(e.settles for e in scene.effects)
 
 
@@ -82,14 +88,14 @@ def finer_model(scene: Scene) -> Scene | None:
 
 
 def against_direct(scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None) -> np.ndarray:
-    """Errors (B,) in body lengths of poses (B, 3) by any other tier. reference: (poses, errors) of the direct tier at
+    """Errors (B, 2), as in `direct`, of poses (B, 3) by any other tier. reference: (poses, errors) of the direct tier at
     the same amplitudes; computed at some of them if not given."""
     if reference is None:
         some = np.unique(np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int))
         reference = direct(scene, gait, amplitudes[some], max(REFERENCE_PHASES, 8 * gait.harmonics))
     else:
         some = np.arange(len(amplitudes))
-    at_some = distance(poses[some], reference[0]) / scene.body.length + reference[1]
+    at_some = apart(poses[some], reference[0], scene.body.length) + reference[1]
     left = np.searchsorted(some, np.arange(len(amplitudes)), side="right") - 1
     right = np.minimum(left + (some[left] < np.arange(len(amplitudes))), len(some) - 1)
     return np.maximum(at_some[left], at_some[right])
@@ -109,8 +115,9 @@ def solves(scene: Scene, method: str, count: int, phases: int) -> int:
 
 
 def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None) -> dict:
-    """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "tier", "settings", "seconds"}: the cheapest tier,
-    and for the direct tier the fewest phases, with every estimated error at most ``tol`` body lengths.
+    """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "estimate_heading": [...], "tier", "settings",
+    "seconds"}: the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
+    most ``tol`` body lengths.
 
     Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. SceneError if no
     tier gets there.
@@ -131,28 +138,28 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
             checked = scene.displacement(method, gait, amplitudes[some])
         except ValueError:  # the gait leaves the field or the family: this tier cannot say
             continue
-        if (distance(checked, pilot[0]) / scene.body.length + pilot[1]).max() <= tol:
+        if (apart(checked, pilot[0], scene.body.length) + pilot[1])[:, 0].max() <= tol:
             poses = scene.displacement(method, gait, amplitudes)
             error = against_direct(scene, poses, gait, amplitudes)
-            if error.max() <= tol:
+            if error[:, 0].max() <= tol:
                 return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
     (poses, error), phases = _refined(scene, gait, amplitudes, tol, phases)
-    if error.max() > tol:
+    if error[:, 0].max() > tol:
         raise SceneError(
-            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error.max():.1e} at {phases} phases): "
+            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} at {phases} phases): "
             "raise --tol, or lower [numerics] regularisation and tolerance"
         )
     return _answer("direct", amplitudes, poses, error, {"phases": phases}, start)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int):
-    """The direct tier at twice the phases again and again, for the amplitudes that need it, until all errors are
+    """The direct tier at twice the phases again and again, for the amplitudes that need it, until all positions are
     within ``tol`` or doubling stops helping."""
     (poses, error), open_ = direct(scene, gait, amplitudes, phases), np.arange(len(amplitudes))
-    while (worse := open_[error[open_] > tol]).size and 2 * phases <= MOST_PHASES:
+    while (worse := open_[error[open_, 0] > tol]).size and 2 * phases <= MOST_PHASES:
         phases *= 2
         finer, now = direct(scene, gait, amplitudes[worse], phases)
-        stalled = (now > 0.9 * error[worse]).all() and phases > 1024
+        stalled = (now > 0.9 * error[worse])[:, 0].all() and phases > 1024
         poses[worse], error[worse], open_ = finer, now, worse
         if stalled:
             break
@@ -163,7 +170,8 @@ def _answer(method, amplitudes, poses, error, settings, start) -> dict:
     return {
         "amplitude": amplitudes.tolist(),
         method: poses.tolist(),
-        "estimate": error.tolist(),
+        "estimate": error[:, 0].tolist(),
+        "estimate_heading": error[:, 1].tolist(),
         "tier": method,
         "settings": settings,
         "seconds": {method: time.perf_counter() - start},

@@ -57,13 +57,15 @@ def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
 def fit(
     velocity: Velocity,
     axes,
-    highest: int = 9,
     count: int = 24,
     degree: int = 3,
     progress: Callable | None = None,
     mirror: bool = False,
+    *,
+    highest: int = 9,
 ) -> Harmonics:
-    """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; arguments as `connection.fit`.
+    """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their order,
+    as in `connection.fit`.
 
     The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
     it (k onto 2 count - k); so keep ``highest`` well below. ValueError if it is even or not below ``count``.

@@ -13,14 +13,15 @@ COMPONENTS = ("x", "y", "theta")
 
 
 def save_connection(path: str | Path, scene: Scene) -> None:
-    """Write A (component, joint, alpha_1, ...), its fit residual and, for two joints, the CCF, with units and the
-    scene's text. The file appears whole or not at all."""
+    """Write A (component, joint, alpha_1, ...), its fit residual and, for two joints, the CCF and its estimated error,
+    with units, conventions (`about`) and the scene's text. The file appears whole or not at all."""
     from scipy.io import netcdf_file
 
     fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
         file.title = f"Local connection and curvature constraint function of the scene {scene.name}".encode()
-        file.Conventions = "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops"
+        for key, value in about(scene).items():
+            setattr(file, key, value)
         file.scene = (scene.text or repr(scene)).encode()
         file.numerics = repr(scene.numerics)
         _coordinates(file, fitted)
@@ -31,8 +32,32 @@ def save_connection(path: str | Path, scene: Scene) -> None:
         _variable(file, "fit_residual", fitted.residual, ("component", *angles), units, name)
         if len(angles) == 2:
             units = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
-            name = "curvature constraint function"
+            name = "curvature constraint function of joints 1 and 2"
             _variable(file, "ccf", scene.curvature.values, ("component", *angles), units, name)
+            name = (
+                "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
+            )
+            _variable(file, "ccf_error", scene.curvature_error.values, ("component", *angles), units, name)
+
+
+def about(scene: Scene) -> dict:
+    """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
+    body, numerics = scene.body, scene.numerics
+    mean = "centre of mass, length-weighted mean heading"
+    return {
+        "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
+        "frame": body.frame,
+        "frame_meaning": f"body frame: {mean if body.frame == 'mean' else 'centre and heading of that link, 1 the tail'}",
+        "body_length": float(body.length),
+        "length_unit": "body length" if scene.unit == "BL" else "m",
+        "loads": numerics.loads,
+        "regularisation": float(numerics.regularisation),
+        "regularisation_unit": "body length rad-1",
+        "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
+        "sign_of_A": "xi = + A alphadot",
+        "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
+        "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
+    }
 
 
 def _coordinates(file, fitted) -> None:

@@ -23,6 +23,7 @@ STYLE = {
     "axes.spines.right": False,
     "savefig.dpi": 200,
     "svg.fonttype": "none",
+    "hatch.linewidth": 0.35,
     "lines.markersize": 3,
 }
 COMPONENTS = ("x", "y", r"\theta")
@@ -95,14 +96,25 @@ def vector_field(connection: Connection, component: int = 0, unit: str = "BL", a
 
 
 @styled
-def ccf_map(field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None):
-    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)); the colours are centred on zero."""
+def ccf_map(
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None
+):
+    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)); the colours are centred on zero.
+
+    error: of the field (`curvature.error`). Hatched where it exceeds the value, so that not even the sign is known; there
+    the line of zeros keeps only what parts two signs that are known (`certain`)."""
     from cmcrameri import cm
 
     ax = _axes(ax)
     values = field.values[component]
     top = float(np.abs(values).max()) or 1.0
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
+    if error is not None:
+        unsure = error.values[component] - np.abs(values)
+        upright = "||||||"  # the maps' own lines of symmetry are diagonal
+        ax.contourf(*field.axes, unsure.T, levels=[0.0, np.inf], colors="none", hatches=[upright])
+        ax.set_title("hatched: error above value", loc="left", fontsize=8)
+        values = certain(values, error.values[component])
     ax.contour(*field.axes, values.T, levels=[0.0], colors="0.35", linewidths=0.6)
     for gait in gaits:
         draw_gait(gait, ax)
@@ -110,6 +122,21 @@ def ccf_map(field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: 
     colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85)
     colorbar.set_label(rf"CCF$_{{{COMPONENTS[component]}}}$ ({per}/rad$^2$)")
     return shape_space(ax, field.axes)
+
+
+def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """values (N_1, N_2) for a line of zeros that follows no noise: where |value| <= error averaged with their neighbours,
+    and of the other sign wherever a patch of one sign has no point that is known."""
+    from scipy.ndimage import gaussian_filter, label
+
+    known = np.abs(values) > error
+    beyond = np.pad(values, 3, "reflect", reflect_type="odd")  # so that a slope is kept up to the edge
+    values = np.where(known, values, gaussian_filter(beyond, 1.0, radius=3)[3:-3, 3:-3])
+    for sign in (1, -1):
+        patches, count = label(sign * values > 0)
+        noise = np.setdiff1d(np.arange(1, count + 1), patches[known])
+        values[np.isin(patches, noise)] *= -1
+    return values
 
 
 @styled
@@ -153,11 +180,11 @@ def connection_figure(connection: Connection, unit: str = "BL"):
 
 
 @styled
-def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL"):
+def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None):
     """All three components of the CCF side by side, with gaits drawn on them."""
     fig, axes = figure(10.8, 3.0, 3)
     for component, ax in enumerate(axes[0]):
-        ccf_map(field, component, gaits, unit, ax)
+        ccf_map(field, component, gaits, unit, ax, error)
     return fig
 
 

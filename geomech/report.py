@@ -54,7 +54,7 @@ def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
         scene.compute_field(progress)
         save_connection(folder / "connection.nc", scene)
         _save(plots.connection_figure(scene.fitted, scene.unit), folder / "connection")
-        _save(plots.ccf_figure(scene.curvature, gaits, scene.unit), folder / "ccf")
+        _save(plots.ccf_figure(scene.curvature, gaits, scene.unit, scene.curvature_error), folder / "ccf")
     tables = {type(g).__name__.lower(): scene.study(reachable(scene, g), scene.methods, g) for g in gaits}
     fig, axes = plots.figure(3.6 * len(gaits), 3.7, len(gaits))
     for ax, gait, table in zip(axes[0], gaits, tables.values()):
@@ -86,13 +86,22 @@ def _save(fig, stem: Path) -> None:
 
 
 def text_table(title: str, table: dict, scene: Scene) -> str:
-    """Amplitude against net displacement (`plots.net`) and its error by tier, as plain text."""
+    """Amplitude against net displacement (`plots.net`) and heading with their errors by tier, as plain text."""
     methods = [m for m in table if m in plots.METHOD_STYLE]
-    lines = [f"{title}: displacement per cycle ({scene.unit}) +- estimated error (BL)"]
-    lines.append("amplitude" + "".join(f"{m:>21}" for m in methods))
-    errors = table["estimate"] if isinstance(table["estimate"], dict) else {methods[0]: table["estimate"]}
-    columns = [zip(plots.net(table[m]), errors[m]) for m in methods]
-    for amplitude, *row in zip(table["amplitude"], *columns):
-        lines.append(f"{amplitude:9.4g}" + "".join(f"{x:12.6f} +-{e:7.1e}" for x, e in row))
+    lines = []
+    for what, key, shown in (
+        (f"displacement per cycle ({scene.unit}) +- estimated error (BL)", "estimate", plots.net),
+        ("heading gained (rad) +- estimated error (rad)", "estimate_heading", _heading),
+    ):
+        lines += [f"{title}: {what}", "amplitude" + "".join(f"{m:>21}" for m in methods)]
+        errors = table[key] if isinstance(table[key], dict) else {methods[0]: table[key]}
+        columns = [zip(shown(table[m]), errors[m]) for m in methods]
+        for amplitude, *row in zip(table["amplitude"], *columns):
+            lines.append(f"{amplitude:9.4g}" + "".join(f"{x:12.6f} +-{e:7.1e}" for x, e in row))
     seconds = ", ".join(f"{k} {v:.3g}" for k, v in table["seconds"].items())
     return "\n".join([*lines, f"seconds: {seconds}", ""])
+
+
+def _heading(poses) -> np.ndarray:
+    """theta (B,) of poses (B, 3), without the sign of a rounded zero."""
+    return np.round(np.array(poses)[:, 2], 9) + 0.0

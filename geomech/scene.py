@@ -17,6 +17,7 @@ from geomech import estimate, predict
 from geomech import family as fam
 from geomech import harmonics as harm
 from geomech.curvature import ccf
+from geomech.curvature import error as ccf_error
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.problem import SceneError, choose
@@ -255,17 +256,16 @@ class Scene:
         return ccf(self.fitted)
 
     @cached_property
+    def curvature_error(self) -> Field:
+        """The estimated error of `curvature`."""
+        return ccf_error(self.fitted)
+
+    @cached_property
     def harmonics(self) -> harm.Harmonics:
         """The odd harmonics of the velocity on the scene's grid, computed once."""
-        n = self.numerics
-        return harm.fit(
-            self.velocity,
-            self._axes(),
-            n.harmonics,
-            self.harmonic_directions,
-            n.interpolation,
-            mirror=self.medium.mirror,
-        )
+        n, mirror = self.numerics, self.medium.mirror
+        count = self.harmonic_directions
+        return harm.fit(self.velocity, self._axes(), count, n.interpolation, mirror=mirror, highest=n.harmonics)
 
     def family(self, gait: Gait, largest: float) -> fam.Family:
         """The connection adapted to the scaled copies of ``gait`` up to an amplitude; computed once for each."""
@@ -325,9 +325,11 @@ class Scene:
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
     ) -> dict:
-        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "seconds": {...}}.
+        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "estimate_heading":
+        {method: [...]}, "seconds": {...}}.
 
-        estimate: error of each number in body lengths (`geomech.estimate`). Fields are timed on their own.
+        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.estimate`). Fields
+        are timed on their own.
         """
         gait, amplitudes = gait or self.gait, np.array(amplitudes, float)
         for method in methods:
@@ -347,8 +349,11 @@ class Scene:
                 errors[method] = estimate.against_direct(self, poses, gait, amplitudes, reference)
             out[method] = poses.tolist()
         ordered = {m: out[m] for m in methods}
-        errors = {m: errors[m].tolist() for m in methods}
-        return {"amplitude": out["amplitude"], **ordered, "estimate": errors, "seconds": seconds}
+        estimates = {
+            key: {m: errors[m][:, k].tolist() for m in methods}
+            for k, key in enumerate(("estimate", "estimate_heading"))
+        }
+        return {"amplitude": out["amplitude"], **ordered, **estimates, "seconds": seconds}
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed; None keeps a value."""

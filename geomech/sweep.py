@@ -53,7 +53,8 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
 def sweep(
     scene: Scene, over: Mapping[str, list[float]], kept: Path | None = None, progress: Callable | None = None
 ) -> dict:
-    """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...)} by the direct tier.
+    """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}
+    by the direct tier; estimates as in `estimate.direct`.
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
     solver together. kept: a file that holds what is done and is taken up again when the
@@ -93,10 +94,11 @@ def sweep(
         raise
     if kept:
         kept.unlink(missing_ok=True)
-    flat = np.array(rows).reshape(*shape, 4)
+    flat = np.array(rows).reshape(*shape, 5)
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
-    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], "estimate": flat[..., 3]}
+    errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
+    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
 
 
 def _same(a: Scene, b: Scene) -> bool:
@@ -123,7 +125,8 @@ def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
-    """[[[x, y, theta, error], ...], ...] for all amplitudes of every scene, those that fit into one batch together."""
+    """[[[x, y, theta, error, error of theta], ...], ...] for all amplitudes of every scene, those that fit into one batch
+    together."""
     groups: dict = {}
     for k, scene in enumerate(scenes):
         groups.setdefault(_kind(scene), []).append(k)
@@ -213,6 +216,7 @@ def save(path: Path, scene: Scene, results: dict) -> None:
         for name, dims, units in (
             ("displacement", (*names, "component"), f"{unit} (x, y), rad (theta)"),
             ("estimate", tuple(names), "body length"),
+            ("estimate_heading", tuple(names), "rad"),
         ):
             variable = file.createVariable(name, "f8", dims)
             variable[:] = results[name]

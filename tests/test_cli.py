@@ -91,6 +91,7 @@ def test_displacement_by_every_tier(tmp_path):
         ("area", "path", "direct"), (2, 3)
     )
     assert math.hypot(*table["direct"][1][:2]) == pytest.approx(0.0638, rel=0.01)
+    assert {m: len(e) for m, e in table["estimate_heading"].items()} == dict.fromkeys(table["estimate"], 2)
     assert plot.stat().st_size > 10_000
     code, out, _ = geomech("displacement", "three-link-glass", "--amplitudes", "3.0", "--methods", "direct")
     assert code == 0
@@ -103,7 +104,7 @@ def test_displacement_to_a_tolerance():
     assert (code, err) == (0, "")
     answer = json.loads(out)
     assert max(answer["estimate"]) <= 1e-3
-    assert len(answer["estimate"]) == len(answer[answer["tier"]]) == 2
+    assert len(answer["estimate"]) == len(answer["estimate_heading"]) == len(answer[answer["tier"]]) == 2
     code, out, _ = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9")
     assert code == 0
     assert "direct" in out

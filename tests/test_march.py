@@ -310,7 +310,7 @@ def test_estimates_of_marches_cover_the_truth(truths):
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
-        off = estimate.distance(found, truth)
+        off = estimate.apart(found, truth, scene.body.length)
         assert (off <= error).all(), type(effect)
         assert (error <= 100 * off + 1e-4).all(), type(effect)
 

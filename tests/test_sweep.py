@@ -19,7 +19,8 @@ def test_every_point_is_the_scene_there():
     alone = scenes.parse(GLASS.text.replace("length = 1.0 ", "length = 2.0 ")).with_numerics(phases=32)
     poses, error = estimate.direct(alone, alone.gait, np.array([1.5]), alone.numerics.phases)
     np.testing.assert_allclose(results["displacement"][2, 1], poses[0], atol=1e-12)
-    np.testing.assert_allclose(results["estimate"][2, 1], error[0], rtol=1e-6)
+    np.testing.assert_allclose(results["estimate"][2, 1], error[0, 0], rtol=1e-6)
+    np.testing.assert_allclose(results["estimate_heading"][2, 1], error[0, 1], rtol=1e-6)
     np.testing.assert_allclose(results["displacement"][:, 1, 0], 2 * results["displacement"][:, 0, 0], rtol=1e-9)
 
 
@@ -147,6 +148,9 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
         assert data.displacement.dims == ("gait_amplitude", "medium_ratio", "component")
         found = data.displacement.sel(gait_amplitude=1.0, medium_ratio=2.0)
         assert float(np.hypot(*found[:2])) == pytest.approx(0.0512808243, abs=1e-9)
+        units = {name: data[name].attrs["units"] for name in data.data_vars}
+    assert units["displacement"] == "body length (x, y), rad (theta)"
+    assert (units["estimate"], units["estimate_heading"]) == ("body length", "rad")
 
 
 @pytest.mark.parametrize(

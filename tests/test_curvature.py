@@ -1,0 +1,111 @@
+"""The CCF of any pair of joints, its estimated error near kinks, and what a file says of both."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import sympy as sp
+import xarray
+
+from geomech import connection, curvature, netcdf, scenes, se2, symbolic
+
+GLASS = scenes.load("three-link-glass")
+
+
+def local(scene, shapes, h=2e-4):
+    """The CCF (..., 3) of the scene's own fit at shapes (..., 2), by differences over 2 h of A solved there."""
+    unit = connection.directions(2, scene.direction_count)
+
+    def A(alpha):
+        return np.einsum("jc,...ci->...ij", np.linalg.pinv(unit), scene.velocity(alpha[..., None, :], unit))
+
+    d1, d2 = ((A(shapes + step) - A(shapes - step)) / (2 * h) for step in h * np.eye(2))
+    here = A(shapes)
+    return d1[..., 1] - d2[..., 0] + se2.bracket(here[..., 0], here[..., 1])
+
+
+def test_every_pair_of_three_joints():
+    """Against SymPy, for a connection of three joints in which no two columns are alike; pairs are antisymmetric."""
+    a, b, c = alpha = sp.symbols("alpha_1:4", real=True)
+    A = sp.Matrix([[sp.cos(a + b), b * c, 1 + a], [sp.sin(c), a - c, b * b], [1 + a * b, 2 + c, sp.cos(a) - b]])
+    fitted = connection.fit(symbolic.velocity(A, alpha), (np.linspace(-0.5, 0.6, 13),) * 3, 16, degree=5)
+    shapes = np.meshgrid(*fitted.axes, indexing="ij")
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        exact = np.broadcast_arrays(*sp.lambdify(alpha, list(symbolic.ccf(A, alpha, i, j)), "numpy")(*shapes))
+        found = curvature.ccf(fitted, i, j).values
+        np.testing.assert_allclose(found, exact, atol=1e-6)
+        np.testing.assert_allclose(curvature.ccf(fitted, j, i).values, -found, atol=1e-14)
+        error = curvature.error(fitted, i, j).values
+        assert error.shape == found.shape
+        assert (np.abs(found - exact) <= error + 1e-12).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "numerics", "least", "most"),
+    [
+        ("three-link-glass", {}, 0.9, 20),
+        ("three-link-glass-close", {"grid": 22}, 0.9, 20),
+        ("three-link-coulomb", {"grid": 15, "interpolation": 1}, 0.9, 20),
+        ("three-link-viscous", {"grid": 20}, 0.99, 100),
+    ],
+)
+def test_the_error_of_the_ccf_covers_the_truth(name, numerics, least, most):
+    """At random grid points, each component, in a share of ``least``; and in the median by no more than ``most`` errors."""
+    scene, rng = scenes.load(name).with_numerics(**numerics), np.random.default_rng(4)
+    i, j = rng.integers(0, scene.numerics.grid, (2, 300))
+    axes = scene.fitted.axes
+    truth = local(scene, np.stack([axes[0][i], axes[1][j]], -1)).T
+    estimate = scene.curvature_error.values[:, i, j]
+    error = np.abs(scene.curvature.values[:, i, j] - truth)
+    assert ((error <= estimate + 1e-12).mean(1) >= least).all()
+    assert (np.median(estimate / np.maximum(error, 1e-16), 1) <= most).all()
+
+
+def test_wrong_signs_near_kinks_are_known_to_be_unknown():
+    """Where the default grid gives the turn a sign that the local derivative does not have, the error says so; likewise at
+    (-1, -5/6), beside a kink, where the sign is right."""
+    assert GLASS.numerics.grid == 31
+    shapes = np.stack(np.meshgrid(*GLASS.fitted.axes, indexing="ij"), -1)[1:-1, 1:-1]
+    truth = np.moveaxis(local(GLASS, shapes), -1, 0)
+    field, error = (x.values[:, 1:-1, 1:-1] for x in (GLASS.curvature, GLASS.curvature_error))
+    wrong = (field * truth < 0) & (np.minimum(np.abs(field), np.abs(truth)) > 0.003)
+    assert wrong[2].sum() >= 8
+    assert (error > np.abs(field))[wrong].all()
+    beside = 8, 9  # without the edges
+    assert shapes[beside] == pytest.approx([-1, -5 / 6])
+    assert (np.abs(field - truth)[:, *beside] <= error[:, *beside]).all()
+
+
+def test_the_smallest_grid_has_an_error_too():
+    small = GLASS.with_numerics(grid=4)
+    assert np.isfinite(small.curvature_error.values).all()
+    assert small.curvature_error.values.max() > 0.01
+
+
+@pytest.mark.parametrize(("length", "unit"), [(1.0, "body length"), (0.4, "m")])
+def test_files_have_values_units_and_conventions(tmp_path, length, unit):
+    """All of the file against the objects: an uneven body in a frame of its own, off the defaults."""
+    body = dataclasses.replace(GLASS.body, lengths=(1, 2, 3), length=length, frame="link-2")
+    scene = dataclasses.replace(GLASS, body=body).with_numerics(grid=7, extent=2.0, regularisation=1e-5)
+    netcdf.save_connection(tmp_path / "a.nc", scene)
+    per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
+    per2 = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
+    with xarray.open_dataset(tmp_path / "a.nc") as data:
+        for name, values, units in (
+            ("A", scene.fitted.A, per),
+            ("fit_residual", scene.fitted.residual, per),
+            ("ccf", scene.curvature.values, per2),
+            ("ccf_error", scene.curvature_error.values, per2),
+            ("alpha_2", scene.fitted.axes[1], "rad"),
+        ):
+            np.testing.assert_array_equal(data[name], values)
+            assert data[name].attrs["units"] == units
+        assert data.ccf_error.dims == data.ccf.dims == ("component", "alpha_1", "alpha_2")
+        assert data.component.values.tolist() == ["x", "y", "theta"]
+        said = data.attrs
+    assert (said["frame"], said["length_unit"], said["body_length"]) == ("link-2", unit, length)
+    assert (said["loads"], said["regularisation"]) == ("exact", 1e-5)
+    assert said["sign_of_A"] == "xi = + A alphadot"
+    assert said["pair_of_ccf"].startswith("CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2")
+    assert "counter-clockwise" in said["sign_of_ccf"]
+    assert "x, y, theta" in said["components"]
