@@ -3,13 +3,14 @@
 The uniform least-squares connection spreads its misfit over all directions of alphadot. A family uses one direction at
 each shape, so there a connection can be exact: in the coordinates (a, t) of the family A_t(a, t) is the velocity
 itself, and A_a, across the curves, is free, since no gait of the family ever moves that way. The freedom is spent on
-the frame: turn the body frame back by the heading the body gains along each curve, less its mean, and choose A_a = 0.
-In that frame nothing is left to commute, so
+the frame: turn the body frame back by all the heading the body gains along each curve, and choose A_a = 0. In that frame
+nothing turns, so nothing is left to commute, and
 
-    CCF = dA_t / da    per unit of a and t,
+    CCF = dA_t / da    per unit of a and t;
 
-its integral over 0 .. a and one cycle is the displacement, to any order in a where the body does not turn on the
-whole (where it does, to first order in the net turn). The one approximation left is the table.
+its integral over 0 .. a and one cycle is the displacement, to any order in a. Where the body turns on the whole the frame
+does not close: it is cut at phase 0, and the turn is laid out evenly along the curve. The one approximation left is the
+table.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from geomech import se2
 from geomech.connection import Velocity, evaluate
 from geomech.gaits import Gait
-from geomech.simulate import turning
+from geomech.simulate import displacement, turning
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,18 @@ class Family:
     xi: np.ndarray
 
     @cached_property
+    def phases(self) -> np.ndarray:
+        """(N,): of the velocities, rad."""
+        return 2 * np.pi * np.arange(self.xi.shape[1]) / self.xi.shape[1]
+
+    @cached_property
     def heading(self) -> np.ndarray:
-        """(M, N): of the body in the family's frame, rad; of zero mean over each curve."""
-        return turning(self.xi)
+        """(M, N): of the body in the family's frame, rad; of zero mean over each curve from phase 0 to 2 pi."""
+        return turning(self.xi) + self.xi[..., 2].mean(-1, keepdims=True) * (self.phases - np.pi)
 
     @cached_property
     def A(self) -> np.ndarray:
-        """A_t in the family's frame, (M, N, 3): the turning rate is the same all along a curve."""
+        """A_t in the family's frame, (M, N, 3), with the net turn spread evenly along each curve."""
         x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
         return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
 
@@ -54,7 +60,7 @@ class Family:
     def ccf(self) -> tuple[np.ndarray, np.ndarray]:
         """(alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
         fold; for maps. Its sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
-        t = 2 * np.pi * np.arange(self.xi.shape[1]) / self.xi.shape[1]
+        t = self.phases
         unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
         jacobian = self.amplitudes[:, None] * (unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0])
         density = self._spline(self.A).derivative()(self.amplitudes)
@@ -63,16 +69,12 @@ class Family:
         return self.gait.shape(t, self.amplitudes), values
 
     def area(self, amplitudes) -> np.ndarray:
-        """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: exp of the CCF's integral.
-        ValueError for amplitudes off the table."""
+        """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of which the
+        table has the exact value at each of its curves. ValueError for amplitudes off the table."""
         a = np.asarray(amplitudes, float)
         if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
             raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
-        density = self._spline(2 * np.pi * self.A.mean(1)).derivative()  # over one cycle, per unit of a
-        total = density.antiderivative()(a) - density.antiderivative()(0.0)
-        start = np.zeros((*a.shape, 3))
-        start[..., 2] = self._spline(self.heading[:, 0])(a)
-        return se2.compose(se2.compose(se2.inverse(start), se2.exp(total)), start)
+        return self._spline(displacement(self.xi))(a)
 
 
 def fit(
