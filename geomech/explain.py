@@ -17,6 +17,8 @@ def explain(scene: Scene) -> str:
             f"on:  {kinds[type(effect)]}: {effect}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}, "
             f"order {effect.order}"
         )
+        if assumed := effect.assumes(scene.medium):
+            lines.append(f"     assumes {assumed}")
     off = [name for name in KINDS if name not in on]
     lines.append("off, not evaluated: " + (", ".join(off) or "none"))
     lines.append(f"engine: {scene.engine} ({ENGINES[scene.engine]}): {_why(scene, kinds)}")

@@ -222,6 +222,34 @@ def test_grain_inertia_needs_grains():
         scenes.parse(scenes.load("three-link-viscous").text + effect)
 
 
+def test_grain_inertia_takes_the_grains_own_pressure():
+    """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose glass, 5.1 in close, one's own where
+    one is given, and 2.5 where nobody says, which is said."""
+    plain = {"frequency": 2.0, "length": 0.3, "depth": 0.05, "strength": 1.5}
+    m = np.array([[0.7]])
+    zero = 0 * m
+
+    def added(effect, medium):
+        """Normal load of an element that goes across at 0.7 body lengths per rad, over what the medium itself gives."""
+        nothing = lambda *_: np.zeros((3, 4, 1, 1))
+        return float(effect.load(nothing, medium, Backbone(3))(zero, m, zero, 0.0)[1, 0, 0, 0])
+
+    speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s
+    unit = 1.5 * speed**2 / (9.81 * 0.05)
+    own = GrainInertia(**plain, k=4.0)
+    for name, k in (("loose", 2.5), ("close", 5900 / (0.62 * 2500 * 9.81 * 0.0762)), ("surface", 2.5)):
+        medium = CATALOGUE[f"glass-0.3mm-{name}"].medium
+        assert added(GrainInertia(**plain), medium) == pytest.approx(unit / k, rel=1e-12)
+        assert added(own, medium) == pytest.approx(unit / 4.0, rel=1e-12)
+        assert GrainInertia(**plain).assumes(medium) == ("k = 2.5, that of loose glass" if name == "surface" else "")
+        assert own.assumes(medium) == ""
+    old = INERTIAL.format(f=1.0)
+    assert "assumes" not in explain(scenes.parse(old))
+    assert "assumes k = 2.5" in explain(scenes.parse(old.replace("0.3mm-loose", "0.3mm-surface")))
+    with pytest.raises(SceneError, match="k must lie from"):
+        scenes.parse(old + "\nk = 0")
+
+
 def test_end_caps_need_grains():
     with pytest.raises(SceneError, match="end caps take a granular medium, got Viscous"):
         scenes.parse(scenes.load("three-link-viscous").text + '[[effects]]\nkind = "end-caps"\nradius = 0.1')

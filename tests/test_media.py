@@ -52,7 +52,7 @@ def test_derivatives_are_the_slopes_of_traction(name):
 
 def test_catalogue_agrees_with_its_sources():
     loose, fitted = CATALOGUE["glass-0.3mm-loose"].medium, CATALOGUE["glass-0.3mm-loose-fitted"].medium
-    assert loose == Granular(1.8, math.radians(13.8))
+    assert loose == Granular(1.8, math.radians(13.8), k=2.5)
     assert fitted.C == pytest.approx(1.844, abs=5e-4)
     psi = np.linspace(0, np.pi / 2, 50)
     form = np.sin(psi) + (0.5108 / 0.2770) * np.sin(np.arctan(4.0587 * np.sin(psi)))
@@ -60,6 +60,11 @@ def test_catalogue_agrees_with_its_sources():
     np.testing.assert_allclose(loose.traction(np.cos(psi), np.sin(psi))[1], form, rtol=0.03, atol=1e-14)
     # The paper's k = 2.5 gives the fitted axial stress at the fitted depth: k rho g |z|, glass at 2500 kg/m^3.
     assert CATALOGUE["glass-0.3mm-loose"].axial_stress == pytest.approx(2.5 * 0.58 * 2500 * 9.81 * 0.0762, rel=0.03)
+    for name, k, packed in (("loose-fitted", 2.56, 0.58), ("close", 5.09, 0.62)):
+        entry = CATALOGUE[f"glass-0.3mm-{name}"]
+        assert entry.medium.k == pytest.approx(k, abs=0.005)
+        assert entry.medium.k * packed * 2500 * 9.81 * 0.0762 == pytest.approx(entry.axial_stress)
+    assert CATALOGUE["glass-0.3mm-surface"].medium.k is None
     assert all(entry.source for entry in CATALOGUE.values())
 
 
@@ -77,6 +82,7 @@ def test_limits():
         (lambda: Granular(1, 0.0), "gamma0 must"),
         (lambda: Granular(1, 2.0), "114.592 degrees"),
         (lambda: Granular(1e14, 0.2), "C must"),
+        (lambda: Granular(1, 0.2, k=0.0), "k must"),
         (lambda: Viscous(0.0), "ratio must"),
         (lambda: Viscous(1e200), "ratio must"),
     ],

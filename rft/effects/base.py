@@ -64,6 +64,10 @@ class Effect:
         """The load law (`rft.loads`) of the body's elements with this effect; the same one by default."""
         return load
 
+    def assumes(self, medium) -> str:
+        """What the effect takes for granted because neither it nor the medium says; nothing by default."""
+        return ""
+
     def body(self, body: Body) -> Body:
         """The body with this effect; the same one by default."""
         return body

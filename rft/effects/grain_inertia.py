@@ -10,9 +10,9 @@ from rft.bodies.base import halves
 from rft.effects.base import Effect
 from rft.loads import ALONE
 from rft.media.base import require
+from rft.media.catalogue import GRAVITY
 
-GRAVITY = 9.81  # m/s^2
-PRESSURE_FACTOR = 2.5  # k of Eq. 2, loosely packed 0.3 mm glass (Zhang and Goldman 2014)
+ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed of grains of unknown k
 
 
 @dataclass(frozen=True)
@@ -22,20 +22,22 @@ class GrainInertia(Effect):
 
     In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
     frequency: cycles per second, alphadot being per radian of phase. length: of the body, m. depth: |z|, m.
-    strength: lambda, no unit; 1 is assumed.
+    strength: lambda, no unit; 1 is assumed. k: of Eq. 2, in place of the medium's own (2.5 for loose glass, 5.1 for
+    close); where neither gives one, that of loose glass is assumed.
     """
 
     frequency: float
     length: float
     depth: float
     strength: float = 1.0
+    k: float | None = None
 
     breaks = frozenset({"rate independence"})
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
     cost = "a dozen operations an element"
     rank = 5  # the flux of grains does not know the ground's pressure
-    batched = ("frequency", "length", "depth", "strength")
+    batched = ("frequency", "length", "depth", "strength", "k")
 
     def __post_init__(self):
         for name, low, high in (
@@ -46,11 +48,19 @@ class GrainInertia(Effect):
         ):
             value = getattr(self, name)
             require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
+        require(self.k is None or 1e-3 <= self.k <= 1e3, f"k must lie from 0.001 to 1000, got {self.k!r}")
+
+    def _known_k(self, medium):
+        return getattr(medium, "k", None) if self.k is None else self.k
+
+    def assumes(self, medium) -> str:
+        return f"k = {ASSUMED_K:g}, that of loose glass" if self._known_k(medium) is None else ""
 
     def load(self, load, medium, body):
         require(medium.dry != (), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
         speed_per_rad = 2 * np.pi * self.frequency * self.length
-        beta = self.strength * speed_per_rad**2 / (PRESSURE_FACTOR * GRAVITY * self.depth)
+        k = self._known_k(medium)
+        beta = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
 
         pieces = slice(np.count_nonzero(halves(body)))  # an end cap sweeps up grains that its neighbour has counted
 

@@ -16,7 +16,7 @@ class Medium(Protocol):
 
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the
     closed-form link integrals of `rft.loads`. A law of another form sets both to None, supplies
-    `traction` alone and is integrated by quadrature.
+    `traction` alone and is integrated by quadrature. ``k``, where a medium has one, is that of Eq. 2 (`Granular`).
     """
 
     dry: tuple[tuple[float, float, float], ...] | None

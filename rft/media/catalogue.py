@@ -20,6 +20,17 @@ class Entry:
     axial_stress: float | None = None
 
 
+GRAVITY = 9.81  # m/s^2
+DEPTH = 0.0762  # m, of the rods whose drag gave the axial stresses
+GLASS = 2500.0  # kg/m^3, soda-lime glass, assumed
+PACKED = {"loose": 0.58, "close": 0.62}  # volume fractions, Zhang and Goldman (2014), caption of Fig. 9
+
+
+def pressure_factor(axial_stress: float, packed: str) -> float:
+    """k of Eq. 2 from an axial stress in Pa at DEPTH: over rho g |z|, rho that of glass times the volume fraction."""
+    return axial_stress / (GLASS * PACKED[packed] * GRAVITY * DEPTH)
+
+
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"
 FITTED = (
     "f_n = C_S sin(atan(cot g0 sin psi)) + C_F sin psi, f_t = C_F cos psi fitted to rod drag at 7.62 cm depth, "
@@ -28,15 +39,17 @@ FITTED = (
 
 CATALOGUE = {
     "glass-0.3mm-loose": Entry(
-        Granular(C=1.8, gamma0=math.radians(13.8)), f"{ZHANG_GOLDMAN}, Eq. 3: C = 1.8, gamma0 = 13.8 degrees", 2770.0
+        Granular(C=1.8, gamma0=math.radians(13.8), k=2.5),
+        f"{ZHANG_GOLDMAN}, Eqs. 2 and 3: C = 1.8, gamma0 = 13.8 degrees, k = 2.5",
+        2770.0,
     ),
     "glass-0.3mm-loose-fitted": Entry(
-        Granular(C=0.5108 / 0.2770, gamma0=math.atan(1 / 4.0587)),
+        Granular(C=0.5108 / 0.2770, gamma0=math.atan(1 / 4.0587), k=pressure_factor(2770.0, "loose")),
         FITTED + "C_S = 0.5108, C_F = 0.2770 (1e4 Pa), cot g0 = 4.0587; agrees with glass-0.3mm-loose",
         2770.0,
     ),
     "glass-0.3mm-close": Entry(
-        Granular(C=0.77 / 0.59, gamma0=math.radians(12.21)),
+        Granular(C=0.77 / 0.59, gamma0=math.radians(12.21), k=pressure_factor(5900.0, "close")),
         FITTED + "C_S = 0.77, C_F = 0.59 (1e4 Pa), g0 = 12.21 degrees; that it is the close packing is an inference",
         5900.0,
     ),

@@ -18,11 +18,13 @@ class Granular(TermLaw):
     Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
 
     C: the extra normal force (no unit), 0 to 1e6. gamma0: the angle at which it saturates, in radians,
-    strictly between 0 and pi/2.
+    strictly between 0 and pi/2. k: pressure across over the weight of the grains above, 1e-3 to 1e3, None if unknown; it
+    is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
     """
 
     C: float
     gamma0: float
+    k: float | None = None
     angles = ("gamma0",)
 
     def __post_init__(self):
@@ -31,6 +33,7 @@ class Granular(TermLaw):
             math.isfinite(self.gamma0) and 0 < self.gamma0 < math.pi / 2,
             f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees",
         )
+        require(self.k is None or 1e-3 <= self.k <= 1e3, f"k must be a number from 0.001 to 1000, got {self.k!r}")
 
     @property
     def dry(self):
