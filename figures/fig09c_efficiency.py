@@ -3,8 +3,13 @@
 Rows: progress per cycle over the arc length of a wave; undulation efficiency, progress over the wavelength; slip;
 mechanical cost of transport. Left against the mean relative curvature, right against A / lambda, which are one to one.
 Dots mark the best wave where there is one: efficiency and slip go on improving with the amplitude. Solid: the whole
-body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave, without and with the
-sandfish's head drag. Last row: the sandfish's body velocity through a cycle of its own wave (dash-dotted above).
+body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave that slides along its curve,
+without and with the sandfish's head drag; dash-dot-dotted: one whose points move only sideways. Last row: the sandfish's
+body velocity through a cycle of its own wave (dash-dotted above).
+
+The paper's text and caption define the efficiency by the wavelength and show its optimum near the animal, A / lambda =
+0.22. In this model that quantity has no optimum. What has one is progress over arc length, for the whole sandfish at 0.295
+(loose) and 0.343 (close), which is not where the animal is; the endless wave's, at 0.21 in loose glass, is.
 """
 
 from __future__ import annotations
@@ -20,11 +25,15 @@ from geomech.scene import Scene
 from geomech.scenes import load
 
 SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
+ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
+    "endless": (False, "sliding", "--", "endless wave, sliding"),
+    "endless_head": (True, "sliding", ":", "the same, head drag"),
+    "endless_sideways": (False, "sideways", (0, (4, 1, 1, 1, 1, 1)), "endless wave, sideways"),
+}
 AMPLITUDES = np.tan(np.linspace(0.7, 5.2, 46) / 4) / (2 * np.pi)  # equal steps of relative curvature
-SANDFISH = load("sandfish-loose").gait.amplitude  # A / lambda of the animal; the snake's is assumed and not marked
 MEASURES = {  # what is best: the largest (1) or the least (-1)
     "arc_efficiency": (1, "progress per cycle\n" r"over $\lambda_s$"),
-    "efficiency": (1, "undulation efficiency,\n" r"progress over $\lambda$"),
+    "efficiency": (1, "undulation efficiency,\n" r"progress over $\lambda$"),  # the paper's, which has no optimum here
     "slip": (-1, "mean slip angle\n(degrees)"),
     "cost_of_transport": (-1, "cost of transport, work\nover drag x distance"),
 }
@@ -33,7 +42,8 @@ MEASURES = {  # what is best: the largest (1) or the least (-1)
 def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
     """For each scene, with ``finer`` times its elements, its `swimmers.performance` over amplitudes A / lambda (B,), and
     "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the amplitudes. For the
-    sandfish "endless" and "endless_head", efficiencies (B,), and "cycle" (N, 3), body velocity at the animal's amplitude.
+    sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is assumed, and not marked), and
+    "cycle" (N, 3), body velocity at that amplitude.
 
     finer: a snake's tight bends take some 120 elements a wave; with a third of them its efficiency seems to have an
     optimum near A / lambda = 0.4, which is none.
@@ -45,8 +55,11 @@ def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
         best = {k: optimum(amplitudes, found[k], sign) for k, (sign, _) in {"progress": (1, ""), **MEASURES}.items()}
         found["best"] = {k: v for k, v in best.items() if v is not None}
         if name.startswith("sandfish"):
-            for key, cap in (("endless", None), ("endless_head", scene.effects[0])):
-                found[key] = np.array([swimmers.endless_sine(scene.medium, a, cap) for a in amplitudes])
+            for key, (capped, kinematics, _, _) in ENDLESS.items():
+                cap = scene.effects[0] if capped else None
+                waves = [swimmers.endless_sine(scene.medium, a, cap, kinematics=kinematics) for a in amplitudes]
+                found[key] = np.array(waves)
+            found["animal"] = scene.gait.amplitude
             found["cycle"] = swimmers.performance(scene, [scene.gait.amplitude])["velocity"][0]
         out[name] = found
     return out
@@ -78,6 +91,8 @@ def draw(numbers: dict):
             ax.set_ylim(0, 8 if key == "cost_of_transport" else 90 if key == "slip" else None)
             ax.tick_params(labelbottom=key == "cost_of_transport")
         row[0].set_ylabel(MEASURES[key][1])
+    note = "no optimum here;\nthe paper's is\nnear the animal"
+    axes[1, 1].text(0.98, 0.05, note, transform=axes[1, 1].transAxes, ha="right", fontsize=7)
     axes[-2, 0].set_xlabel(r"mean relative curvature $\overline{|\kappa|}\,\lambda_s$ (rad)")
     axes[-2, 1].set_xlabel(r"$A/\lambda$")
     for ax, name in zip(axes[-1], ("sandfish-loose", "sandfish-close")):
@@ -85,7 +100,7 @@ def draw(numbers: dict):
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.6)
     axes[-1, 0].set_ylabel("body velocity")
     fig.align_ylabels(axes[:, 0])
-    legend(fig, axes[0, 0])
+    legend(fig, axes[0, 0], numbers["sandfish-loose"]["animal"])
     return fig
 
 
@@ -99,13 +114,13 @@ def draw_measure(ax, numbers: dict, key: str, against: str):
             a, top = found["best"][key]
             ax.plot(place(a), shown(top), "o", color=colour, ms=5)
         unit = {"efficiency": 1.0, "arc_efficiency": Sine().wavelength(found["amplitude"])}.get(key)
-        for endless, dashes in (("endless", "--"), ("endless_head", ":")):
+        for endless, (_, _, dashes, _) in ENDLESS.items():
             if unit is not None and endless in found:
                 values = found[endless] * unit
                 ax.plot(x, values, color=colour, ls=dashes, lw=1.0)
                 if best := optimum(found["amplitude"], values, 1):
                     ax.plot(place(best[0]), best[1], "o", mfc="white", color=colour, ms=4, mew=1.0)
-    ax.axvline(place(SANDFISH), color="0.6", ls="-.", lw=0.8, zorder=0)
+    ax.axvline(place(numbers["sandfish-loose"]["animal"]), color="0.6", ls="-.", lw=0.8, zorder=0)
     ax.set_xlim(0, place(0.6))
 
 
@@ -121,16 +136,15 @@ def draw_cycle(ax, velocity: np.ndarray, name: str):
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
 
 
-def legend(fig, ax):
+def legend(fig, ax, animal: float):
     """Of all panels but the last two, above them."""
     from matplotlib.lines import Line2D
 
     handles, labels = ax.get_legend_handles_labels()
     for style, label in (
-        ({"color": "0.3", "ls": "--", "lw": 1.0}, "endless wave"),
-        ({"color": "0.3", "ls": ":", "lw": 1.0}, "endless wave, head drag"),
+        *(({"color": "0.3", "ls": dashes, "lw": 1.0}, label) for _, _, dashes, label in ENDLESS.values()),
         ({"color": "0.3", "ls": "", "marker": "o", "ms": 5}, "optimum (open: endless)"),
-        ({"color": "0.6", "ls": "-.", "lw": 0.8}, rf"sandfish, $A/\lambda = {SANDFISH:g}$"),
+        ({"color": "0.6", "ls": "-.", "lw": 0.8}, rf"sandfish, $A/\lambda = {animal:g}$"),
     ):
         handles.append(Line2D([], [], **style))
         labels.append(label)

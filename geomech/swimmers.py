@@ -18,8 +18,9 @@ MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: 
 def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     """Over a cycle of the scene's sine wave, for amplitudes A / lambda (B,), each (B,) but the velocity:
 
-    progress: net distance, body lengths. efficiency: that over the wavelength; arc_efficiency: over the arc length of a
-    wave, lambda_s (the caption of Fig. 9(c) leaves open which). wavelength: body lengths. relative_curvature: mean
+    progress: net distance, body lengths. efficiency: that over the wavelength. Sec. III B and the caption of Fig. 9(c)
+    define it so and show an optimum near the animal; here it has none, it grows with the amplitude. arc_efficiency:
+    progress over the arc length of a wave, lambda_s, which has one. wavelength: body lengths. relative_curvature: mean
     |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole body's axial drag x distance), the
     drag being the plain medium's, without skin or ends. slip: mean angle between body and velocity, rad. velocity:
     (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per rad.
@@ -54,35 +55,53 @@ def _sine(scene: Scene, what: str) -> Sine:
     return scene.gait
 
 
-def endless_efficiency(medium, headings: np.ndarray, cap=None) -> float:
-    """Efficiency of an endless wave by the balance of force along it alone: no yaw.
+KINEMATICS = ("sliding", "sideways")
 
-    cap: an `rft.EndCaps` whose ends' drag, averaged over the cycle, joins the balance of a body of these headings.
 
-    headings: (N,) of pieces of equal arc length over one wave, rad. In the wave's frame the body slides along the curve
-    at speed 1; that frame slips back at (1 - efficiency) times the wave's own speed, the mean cosine of the headings.
+def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str = "sliding") -> float:
+    """Efficiency, progress over wavelength, of an endless wave by the balance of force along it alone: no yaw.
+
+    headings: (N,) of pieces of equal arc length over one wave, rad. cap: an `rft.EndCaps` whose ends' drag, averaged over
+    the cycle, joins the balance of a body of these headings. kinematics, of the points of the body in a frame that goes
+    with the swimmer, the wave passing backwards at the mean cosine of the headings:
+
+    sliding   an inextensible body that slides along its own curve at speed 1, as in a tube; the animal's, and `Sine`'s
+    sideways  points that move across the way only, at the curve's slope times the speed of the wave: the textbook model
+              of small waves, in which a body of finite waves is stretched and pressed together
+
+    ValueError for other kinematics.
     """
     from scipy.optimize import brentq
 
+    if kinematics not in KINEMATICS:
+        raise ValueError(f"kinematics must be one of {', '.join(KINEMATICS)}, got {kinematics!r}")
+    sliding = kinematics == "sliding"
     c, s = np.cos(headings), np.sin(headings)
-    speed = c.mean()
+    speed = c.mean()  # of the wave
+    passing = 1.0 if sliding else c / speed  # share of the cycle that an end of the body spends at each heading
 
     def along(efficiency):
-        v_x, v_y = c - (1 - efficiency) * speed, s
+        v_x, v_y = (c - (1 - efficiency) * speed, s) if sliding else (efficiency * speed, speed * s / c)
         v_t, v_n = v_x * c + v_y * s, v_y * c - v_x * s
         f_t, f_n = medium.traction(v_t, v_n, 1e-12)
         if cap is not None:
             end_t, end_n = cap.traction(medium, v_t, v_n, 1e-12)
-            f_t, f_n = f_t + end_t, f_n + end_n
+            f_t, f_n = f_t + passing * end_t, f_n + passing * end_n
         return np.mean(f_t * c - f_n * s)
 
     return float(brentq(along, -1.0, 1.0, xtol=1e-14))
 
 
-def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000) -> float:
-    """`endless_efficiency` of a sine of that A / lambda, of one wave on the body where ends count."""
+def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000, kinematics: str = "sliding") -> float:
+    """`endless_efficiency` of a sine of that A / lambda, of one wave on the body where ends count. Sliding, that is the
+    endless limit of the gait `Sine`.
+
+    Progress over the wavelength has no optimum in either kinematics. Progress over the arc length of a wave, this times
+    `Sine.wavelength`, is largest at A / lambda = 0.211 (0.530) in loose glass and 0.243 (0.476) in close; sideways at
+    0.212 (0.515) and 0.245 (0.460).
+    """
     gait = Sine(amplitude=amplitude, waves=1.0, elements=elements)
-    return endless_efficiency(medium, gait.headings(0.0), cap)
+    return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
 
 def best(x, y) -> tuple[float, float]:
