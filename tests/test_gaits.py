@@ -39,6 +39,9 @@ def test_orientation_start_and_reversal():
     np.testing.assert_allclose(Circle(amplitude=2.0).shape([0, np.pi / 2]), [[2, 0], [0, 2]], atol=1e-15)
     np.testing.assert_allclose(Circle(reverse=True).shape(T), Circle().shape(-T), atol=1e-15)
     np.testing.assert_allclose(Ellipse(semi_axes=(2, 1), tilt=np.pi / 2).shape(0.0), [0, 2], atol=1e-15)
+    a, b, tilt = 1.3, 0.4, 0.7
+    quarter = Ellipse(semi_axes=(a, b), tilt=tilt).shape(np.pi / 2)
+    np.testing.assert_allclose(quarter, [-b * np.sin(tilt), b * np.cos(tilt)], atol=1e-15)
 
 
 def test_points_are_passed_through_in_order():
@@ -48,6 +51,13 @@ def test_points_are_passed_through_in_order():
     assert max(np.linalg.norm(curve - p, axis=1).min() for p in points) < 1e-3
     assert nearest == sorted(nearest)
     assert Points(points=(*points, points[0])) == GAITS["points"]
+
+
+def test_points_are_reached_as_their_chords_are_run():
+    """Steps of 3, 4 and 5 rad: phase runs with chord length, not from point to point."""
+    points = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])
+    found = Points(points=points.tolist()).shape(2 * np.pi * np.array([0, 3, 7]) / 12)
+    np.testing.assert_allclose(found, points, atol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from registry import GAITS, MEDIA
 from geomech import connection, coordinates, curvature, predict, se2, simulate, symbolic
 from geomech.field import Field
 from geomech.gaits import Circle, Ellipse, Fourier
-from rft import Chain, Viscous, body_velocity
+from rft import Chain, Serpenoid, Viscous, body_velocity
 from rft.symbolic import viscous_chain
 
 A_MIDDLE, ALPHA = viscous_chain((1, 1, 1), 2, link=2)
@@ -41,6 +41,14 @@ def test_fit_takes_any_number_of_joints(joints):
     fitted = connection.fit(swimmer, connection.grid(joints, 9, 1.0), 16)
     assert fitted.A.shape == (3, joints, *(9,) * joints)
     np.testing.assert_allclose(fitted(np.zeros(joints)), M, atol=1e-12)
+
+
+@pytest.mark.parametrize(("joints", "count"), [(1, 1), (2, 7), (3, 13), (5, 40)])
+def test_directions_are_unit_vectors_that_span(joints, count):
+    unit = connection.directions(joints, count)
+    np.testing.assert_allclose(np.linalg.norm(unit, axis=-1), 1, atol=1e-15)
+    assert unit.shape == (count, joints)
+    assert np.linalg.svd(unit)[1].min() > 0.5
 
 
 @pytest.mark.parametrize("points", [6, 7])
@@ -168,8 +176,10 @@ def test_leaving_the_field_is_an_error_that_names_the_angle():
 
 
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
-def test_changing_frame_is_solving_in_that_frame(medium):
-    mean, rng = Chain((1, 2, 1), length=0.4), np.random.default_rng(2)
+@pytest.mark.parametrize("mean", [Chain((1, 2, 1), length=0.4), Serpenoid(elements=9, length=0.4, waves=0.8)])
+def test_changing_frame_is_solving_in_that_frame(medium, mean):
+    """Links' headings and rates, through the modes of a backbone too."""
+    rng = np.random.default_rng(2)
     alpha, alphadot = rng.uniform(-2, 2, (30, 2)), rng.normal(size=(30, 2))
     solve = lambda body, a, d: body_velocity(MEDIA[medium], body, a, d).xi
     for frame in ("link-1", "link-2", "link-3"):

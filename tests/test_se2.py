@@ -30,6 +30,13 @@ def test_exp_and_log_in_fifty_digits(angle, sign):
     np.testing.assert_allclose(se2.log([0.7, -1.3, sign * angle]), truth, rtol=1e-15, atol=4e-16)
 
 
+@pytest.mark.parametrize(("turn", "short"), [(2 * np.pi + 0.3, 0.3), (-2 * np.pi - 0.3, -0.3), (3.5, 3.5 - 2 * np.pi)])
+def test_log_turns_the_short_way(turn, short):
+    np.testing.assert_allclose(se2.log([0.0, 0.0, turn]), [0, 0, short], atol=1e-15)
+    g = np.array([0.4, -0.2, turn])
+    np.testing.assert_allclose(se2.exp(se2.log(g)), [0.4, -0.2, short], atol=1e-15)
+
+
 @given(poses, poses, poses)
 def test_group_axioms(f, g, h):
     np.testing.assert_allclose(se2.compose(se2.compose(f, g), h), se2.compose(f, se2.compose(g, h)), atol=1e-13)
