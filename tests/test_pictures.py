@@ -1,14 +1,12 @@
 """What is drawn is what was computed: the data in the artists, not the look."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.quiver import Quiver
 
 from figures import fig05c_force_law, fig10_neuromechanics
-from geomech import connection, plots, scenes, sweep
+from geomech import plots, scenes, sweep
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Ellipse
@@ -84,13 +82,14 @@ def test_the_line_of_zeros_leaves_noise_alone():
     """Specks of one sign without a known value are not outlined, nor pulled out of the sea they lie in; known ones are."""
     values = np.full((20, 20), 1.0)
     values[10:] = -1.0
-    values[3, 3], values[4, 15], values[15, 5] = -0.4, -0.4, 0.4
+    small, large, sure = (3, 3), (slice(14, 17), slice(4, 9)), (4, 15)
+    values[small], values[large], values[sure] = -0.4, 0.9, -0.4
     error = np.full((20, 20), 0.1)
-    error[3, 3] = error[15, 5] = 0.5
+    error[small] = error[large] = 1.0
     kept = plots.certain(values, error)
-    assert kept[3, 3] > 0
-    assert kept[15, 5] < 0
-    assert kept[4, 15] < 0
+    assert kept[small] > 0
+    assert (kept[large] < 0).all()
+    assert kept[sure] < 0
     np.testing.assert_array_equal(np.sign(kept[9:11]), [[1.0] * 20, [-1.0] * 20])
     known = error == 0.1
     np.testing.assert_array_equal(kept[known], values[known])
@@ -172,10 +171,13 @@ def test_fig10_traces_the_place_it_names():
     np.testing.assert_allclose(across[4], np.stack([one["s"], one["offset"]], -1))
 
 
-def test_frames_of_an_uneven_connection_are_not_taken_for_another():
-    """The three panels of a figure are x, y and theta, in that order."""
-    glass = dataclasses.replace(scenes.load("three-link-glass"), body=scenes.load("three-link-glass").body)
-    fitted = connection.fit(glass.velocity, connection.grid(2, 5))
-    panels = plots.connection_figure(fitted).axes[:3]
-    for component, ax in enumerate(panels):
-        np.testing.assert_allclose(only(ax, Quiver).U, fitted.A[component, 0].ravel(), atol=1e-15)
+def test_panels_are_x_y_and_theta():
+    A = np.random.default_rng(1).normal(size=(3, 2, 11, 9))
+    fitted = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]))
+    for component, ax in enumerate(plots.connection_figure(fitted).axes[:3]):
+        np.testing.assert_allclose(only(ax, Quiver).V, A[component, 1].ravel())
+    field = Field(AXES, A[:, 0])
+    error = Field(AXES, np.abs(A[:, 1]))
+    for component, ax in enumerate(plots.ccf_figure(field, error=error).axes[:3]):
+        np.testing.assert_allclose(mesh(ax)[2], A[component, 0].T)
+        assert ax.get_title("left")
