@@ -74,7 +74,10 @@ class Family:
         a = np.asarray(amplitudes, float)
         if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
             raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
-        return self._spline(displacement(self.xi))(a)
+        moved, start = displacement(self.xi), self.heading[:, 0]
+        integral = self._spline(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1))(a)
+        x, y, turn, start = np.moveaxis(integral, -1, 0)
+        return np.stack([*se2.rotated(-start, x, y), turn], -1)
 
 
 def fit(

@@ -312,7 +312,8 @@ def test_estimates_of_marches_cover_the_truth(truths):
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
         off = estimate.apart(found, truth, scene.body.length)
         assert (off <= error).all(), type(effect)
-        assert (error <= 100 * off + 1e-4).all(), type(effect)
+        assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
+        assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(effect)  # one heading may be right by chance
 
 
 def test_halves_are_the_whole_body():
