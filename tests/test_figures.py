@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -81,3 +83,15 @@ def test_kinks(tmp_path):
     assert numbers["stuck"].mean() < 0.1
     assert np.sqrt((numbers["left"][15] ** 2).mean()) < 0.2 * np.sqrt((numbers["left"][1] ** 2).mean())
     assert drawn(kinks, numbers, tmp_path)
+
+
+def test_figures_load_nothing_when_imported():
+    """A figure reads and computes when it is asked to."""
+    code = (
+        "import importlib, pathlib, figures, rft, geomech.scenes as s\n"
+        "def refuse(*args, **kwargs): raise AssertionError('loaded on import')\n"
+        "s.load = s.parse = rft.body_velocity = refuse\n"
+        "[importlib.import_module(f'figures.{p.stem}') for p in pathlib.Path(figures.__file__).parent.glob('*.py')]"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

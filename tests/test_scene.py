@@ -39,7 +39,7 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
     amplitudes = [0.1, 0.3]
     table = loaded.study(amplitudes, loaded.methods)
-    assert [*table] == ["amplitude", *loaded.methods, "estimate", "seconds"]
+    assert [*table] == ["amplitude", *loaded.methods, "estimate", "estimate_heading", "seconds"]
     assert table["amplitude"] == amplitudes
     for method in loaded.methods:
         np.testing.assert_allclose(table[method], loaded.displacement(method, None, amplitudes), atol=1e-9)
