@@ -57,6 +57,7 @@ def test_every_key_arrives():
     assert read.gait.tilt == pytest.approx(math.pi / 4)
     assert (read.numerics.grid, read.name, read.unit) == (21, "good", "m")
     assert scenes.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).medium.gamma0 == 0.24
+    assert scenes.parse(GOOD.replace("C = 1.8", "C = 1.8\nk = 3")).medium.k == 3.0
     assert scenes.parse(GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")).gait.centre[0] == pytest.approx(
         math.pi / 2
     )
