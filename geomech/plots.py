@@ -111,7 +111,7 @@ def ccf_map(
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
     if error is not None:
         unsure = error.values[component] - np.abs(values)
-        upright = "||||||"  # the maps' own lines of symmetry are diagonal
+        upright = "||||||"  # lines of symmetry of chains are diagonal
         ax.contourf(*field.axes, unsure.T, levels=[0.0, np.inf], colors="none", hatches=[upright])
         ax.set_title("hatched: error above value", loc="left", fontsize=8)
         values = certain(values, error.values[component])
