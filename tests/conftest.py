@@ -8,6 +8,7 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")  # before NumPy loads: the processes share the cores already
 
 TRUTHS = pytest.StashKey()
+BY_HAND = {"soak", "benchmark"}
 
 
 def pytest_addoption(parser):
@@ -24,6 +25,12 @@ def pytest_sessionfinish(session):
     truths = session.config.stash[TRUTHS]
     if truths.renew:
         truths.write()
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if BY_HAND & {mark.name for mark in item.iter_markers()} and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(4 * 3600))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -36,13 +36,13 @@ BATCHES = {
     "friction": (PAST + '"skin-friction"', {"effects.skin-friction.forward": [0.05, 0.1, 0.2]}),
     "frequency": (
         PAST + '"body-inertia"\nmass = 0.02\nfrequency = 1.0\nlength = 0.1\ndrag = 1.0',
-        {"effects.body-inertia.frequency": [0.0, 2.0, 5.0], "gait.amplitude": [0.1, 0.2]},
+        {"effects.body-inertia.frequency": [0.0, 5.0], "gait.amplitude": [0.1, 0.2]},
     ),
     "frequency of grains": (
         PAST + '"grain-inertia"\nfrequency = 1.0\nlength = 0.1\ndepth = 0.05',
         {"effects.grain-inertia.frequency": [0.0, 2.0, 5.0]},
     ),
-    "travel": (PAST + '"transient"\ntravel = 0.1', {"effects.transient.travel": [0.0, 0.02, 0.1]}),
+    "travel": (PAST + '"transient"\ntravel = 0.1', {"effects.transient.travel": [0.0, 0.1]}),
     "ground": (
         PAST + '"disturbed-ground"\nradius = 0.05\nweakening = 0.0',
         {"effects.disturbed-ground.weakening": [0.0, 0.1]},
@@ -73,8 +73,9 @@ def test_a_level_ground_is_no_gentle_slope():
     """Without a slope a march settles, with one it is one cycle: they do not share a batch."""
     text = scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 16")
     effects = PAST + '"transient"\ntravel = 0.1' + PAST + '"depth-profile"\nslope = 0.0'
-    found = sweep.sweep(scenes.parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
-    level = scenes.parse(text + PAST + '"transient"\ntravel = 0.1').displacement("direct")
+    parse = lambda text: scenes.parse(text).with_numerics(phases=64)
+    found = sweep.sweep(parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
+    level = parse(text + PAST + '"transient"\ntravel = 0.1').displacement("direct")
     np.testing.assert_allclose(found["displacement"][0], level, atol=2e-6)
 
 
@@ -90,8 +91,9 @@ def test_one_frequency_for_all_effects():
     both = scenes.load("sandfish-heavy").text.replace("elements = 100", "elements = 12") + (
         PAST + '"grain-inertia"\nfrequency = 3.0\nlength = 0.1\ndepth = 0.05'
     )
-    found = sweep.sweep(scenes.parse(both), {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
-    np.testing.assert_allclose(found[1], scenes.parse(both).displacement("direct"), atol=1e-9)
+    swimmer = scenes.parse(both).with_numerics(phases=64)
+    found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
+    np.testing.assert_allclose(found[1], swimmer.displacement("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(SceneError, match="BodyInertia gives frequency = 3.0 and GrainInertia 2.0: it is one swimmer"):
         sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})
