@@ -14,7 +14,9 @@ from functools import partial
 
 import numpy as np
 
+from geomech import cost as foretold
 from geomech import estimate
+from geomech.cost import Cost
 from geomech.scene import Scene
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
@@ -78,12 +80,10 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     runs: each setting is timed so often, and the quickest counts; a march once, it is long enough for that to tell."""
     amplitudes = scene.gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
-    phases = TRUTH_PHASES if scene.engine == "algebraic" else TRUTH_STEPS
-    truth = finest.with_numerics(phases=phases).displacement("direct", None, amplitudes)
-    knobs = [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
-    lines = []
+    truth = finest.with_numerics(phases=_truth_phases(scene)).displacement("direct", None, amplitudes)
+    knobs, lines = _knobs(scene), []
     for done, knob in enumerate(knobs):
-        lines.append(_sweep(scene, knob, amplitudes, truth, runs if scene.engine == "algebraic" else 1))
+        lines.append(_sweep(scene, knob, amplitudes, truth, _runs(scene, runs)))
         if progress:
             progress((done + 1) / len(knobs))
     return {
@@ -94,13 +94,37 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     }
 
 
+def cost(scene: Scene, runs: int = 2) -> Cost:
+    """Of `study`."""
+    jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
+    for knob in _knobs(scene):
+        jobs += [job for value in knob.values for job in _runs(scene, runs) * _jobs(knob, knob.turned(scene, value))]
+        jobs += _jobs(knob, _limit(scene, knob)) if knob.against == "limit" else []
+    return foretold.price(jobs)
+
+
+def _jobs(knob: Knob, scene: Scene) -> list[foretold.Job]:
+    """Those of a displacement by the knob's tier."""
+    if knob.tier != "direct":
+        return [foretold.built(scene, knob.tier)]
+    return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
+
+
+def _truth_phases(scene: Scene) -> int:
+    return TRUTH_PHASES if scene.engine == "algebraic" else TRUTH_STEPS
+
+
+def _knobs(scene: Scene) -> list[Knob]:
+    return [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
+
+
+def _runs(scene: Scene, runs: int) -> int:
+    return runs if scene.engine == "algebraic" else 1
+
+
 def _sweep(scene: Scene, knob: Knob, amplitudes, truth, runs: int) -> dict:
-    at_limit = {"loads": {"loads": "exact"}, "regularisation": {"regularisation": 1e-9}}.get(knob.setting)
     if knob.against == "limit":
-        limit = scene.with_numerics(**(at_limit or {knob.setting: 192 if knob.setting == "directions" else 5}))
-        if knob.setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
-            limit = limit.with_numerics(grid=4 * scene.numerics.grid - 3)
-        truth = limit.displacement(knob.tier, None, amplitudes)
+        truth = _limit(scene, knob).displacement(knob.tier, None, amplitudes)
     errors, seconds = [], []
     for value in knob.values:
         poses, took = _timed(partial(_fresh, knob, scene, value, amplitudes), runs)
@@ -109,6 +133,15 @@ def _sweep(scene: Scene, knob: Knob, amplitudes, truth, runs: int) -> dict:
     entry = {"label": knob.label, "tier": knob.tier, "knob": knob.name, "order": knob.order, "against": knob.against}
     slope = _slope(knob, errors)
     return {**entry, "buys": knob.buys, "value": list(knob.values), "error": errors, "seconds": seconds, "slope": slope}
+
+
+def _limit(scene: Scene, knob: Knob) -> Scene:
+    """The scene with a knob as far as it goes."""
+    if knob.setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
+        return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
+    return scene.with_numerics(
+        **{knob.setting: {"loads": "exact", "regularisation": 1e-9, "directions": 192}[knob.setting]}
+    )
 
 
 def _fresh(knob: Knob, scene: Scene, value, amplitudes):

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import math
+import os
 import re
 import signal
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -28,6 +32,8 @@ GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per jo
 ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
+YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
+PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
 @app.command()
@@ -36,6 +42,7 @@ def run(
     out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
         "results"
     ),
+    yes: YesOption = False,
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech import report
@@ -43,6 +50,7 @@ def run(
 
     scene = load(name)
     with report.whole_folder(out) as folder, progress(f"field of {scene.name}") as bar:
+        allow(scene, report.cost(scene), yes)
         tables = report.write(scene, folder, bar)
     for title, table in tables.items():
         print(report.text_table(title, table, scene))
@@ -78,13 +86,14 @@ def connection(
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
+    yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF."""
     from geomech import plots
     from geomech.netcdf import save_connection
 
     _is_netcdf(out)
-    scene = _field_scene(name, grid, extent, out, plot, maps=plot is not None)
+    scene = _field_scene(name, grid, extent, out, plot, plot is not None, yes)
     save_connection(out, scene)
     if plot:
         plots.save(plots.connection_figure(scene.fitted, scene.unit), plot)
@@ -96,11 +105,12 @@ def ccf(
     plot: Annotated[Path, typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")],
     grid: GridOption = None,
     extent: ExtentOption = None,
+    yes: YesOption = False,
 ):
     """The CCF map with the scene's gait drawn on it."""
     from geomech import plots
 
-    scene = _field_scene(name, grid, extent, plot, plot, maps=True)
+    scene = _field_scene(name, grid, extent, plot, plot, True, yes)
     plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit, scene.curvature_error), plot)
 
 
@@ -114,9 +124,10 @@ def displacement(
     tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
     as_json: JsonOption = False,
     plot: PlotOption = None,
+    yes: YesOption = False,
 ):
     """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
-    from geomech import plots, report
+    from geomech import cost, plots, report
     from geomech.estimate import cheapest
     from geomech.scene import METHODS
 
@@ -126,11 +137,13 @@ def displacement(
     _check_outputs(plot, plot)
     with progress(f"displacement of {scene.name}") as bar:
         if tol is None:
+            allow(scene, scene.cost(values, chosen or scene.methods), yes)
             table = scene.study(values, chosen or scene.methods, progress=bar)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
         else:
-            table = cheapest(scene, values, tol)
+            ask = lambda jobs: allow(scene, cost.price(jobs), yes)
+            table = cheapest(scene, values, tol, ask=ask)
     if plot:
         fig, axes = plots.figure(3.6, 3.4)
         plots.displacement(table, scene.unit, axes[0, 0], gait=scene.gait, marker="o")
@@ -145,6 +158,7 @@ def accuracy(
         "accuracy"
     ),
     as_json: JsonOption = False,
+    yes: YesOption = False,
 ):
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
     from geomech import accuracy as study
@@ -152,6 +166,7 @@ def accuracy(
 
     scene = _loaded(name, None, None)
     with report.whole_folder(out) as folder, progress(f"accuracy of {scene.name}") as bar:
+        allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)
         text = "\n".join([study.table(results), "", *study.sentences(results)])
         (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
@@ -168,6 +183,7 @@ def sweep(
     over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
     out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
     plot: PlotOption = None,
+    yes: YesOption = False,
 ):
     """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
     from geomech import plots
@@ -185,6 +201,7 @@ def sweep(
     scene = _loaded(name, None, None)
     _check_outputs(out, plot)
     with progress(f"sweep of {scene.name}") as bar:
+        allow(scene, sweeping.cost(scene, axes), yes)
         results = sweeping.sweep(scene, axes, out.with_name(f".{out.name}.partial"), bar)
     sweeping.save(out, scene, results)
     if plot:
@@ -217,6 +234,13 @@ def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="pri
         print(f"{medium_name:24} {entry.source}")
 
 
+def allow(scene, cost, yes: bool) -> None:
+    """Say what is to come if it takes long; SceneError if it takes too long to be begun without --yes."""
+    cost.check(scene.name, yes)
+    if not cost.small:
+        _tell(f"{scene.name}: {cost}")
+
+
 @contextlib.contextmanager
 def progress(title: str):
     """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
@@ -237,8 +261,10 @@ def _loaded(name: str, grid: int | None, extent: float | None):
     return load(name).with_numerics(grid=grid, extent=extent)
 
 
-def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool):
+def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
     """The scene with its field computed, once its outputs are known to be writable. maps: they show shape space."""
+    from geomech.cost import built, price
+
     scene = _loaded(name, grid, extent)
     scene.require_connection()
     if maps and scene.body.joints != 2:
@@ -246,6 +272,7 @@ def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool
             f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
         )
     _check_outputs(output, plot)
+    allow(scene, price([built(scene, "path")]), yes)
     with progress(f"field of {scene.name}") as bar:
         scene.compute_field(bar)
     return scene
@@ -297,21 +324,104 @@ def _sweep(option: str, text: str) -> list[float]:
     return values
 
 
-def main() -> None:
-    """Entry point: one line on standard error and exit code 2 for what the user can mend."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing half-written stays behind
+class Stopped(BaseException):
+    """A signal asked to stop."""
+
+    def __init__(self, number: int):
+        self.name, self.code = signal.Signals(number).name, 128 + number
+
+
+@contextlib.contextmanager
+def stoppable():
+    """INT, TERM and HUP raise `Stopped`, so that nothing half-written stays behind. Those that are ignored, as HUP is under
+    nohup, stay so."""
+    heard = [-math.inf]
+
+    def stop(number, frame):
+        if time.monotonic() > heard[0] + PATIENCE:
+            heard[0] = time.monotonic()
+            raise Stopped(number)
+
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {n: signal.getsignal(n) for n in numbers if threading.current_thread() is threading.main_thread()}
+    before = {n: handler for n, handler in before.items() if handler not in (signal.SIG_IGN, None)}
+    for n in before:
+        signal.signal(n, stop)
     try:
-        code = app(standalone_mode=False)
-    except (KeyboardInterrupt, typer.Abort):
-        print("error: interrupted", file=sys.stderr)
-        code = 130
+        yield
+    finally:
+        for n, handler in before.items():
+            signal.signal(n, handler)
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Entry point: one line on standard error and exit code 2 for what the user can mend, 128 + its number for a signal."""
+    with stoppable():
+        _any_letters()
+        code = _run(argv)
+    sys.exit(code)
+
+
+def _run(argv: list[str] | None) -> int:
+    try:
+        code = app(args=argv, standalone_mode=False)
+        if code == 130:  # an interrupt that typer caught
+            raise KeyboardInterrupt
+        if sys.stdout:
+            sys.stdout.flush()
+        return code or 0
+    except SystemExit as ended:  # what typer makes of a closed pipe
+        return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
+    except (Stopped, KeyboardInterrupt, typer.Abort) as stopped:
+        return _stopped(stopped)
     except MemoryError:
-        print("error: not enough memory: lower the grid, the phases or the number of amplitudes", file=sys.stderr)
-        code = 2
+        _tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
+    except BrokenPipeError:
+        return _unheard()
     except Exception as error:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
-        print("error: " + " ".join(text.split()), file=sys.stderr)
-        code = 2
-    sys.exit(code or 0)
+        _tell("error: " + " ".join([text, *getattr(error, "__notes__", ())]))
+        if isinstance(error, OSError):
+            _deaf(sys.stdout)
+    return 2
+
+
+def _stopped(by: BaseException) -> int:
+    kept = " ".join(getattr(by, "__notes__", ())) or "nothing is kept"
+    _tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {kept}")
+    return getattr(by, "code", 130)
+
+
+def _unheard() -> int:
+    """What we said was not wanted to the end: `geomech scenes | head -1`. Files are written by then: no failure."""
+    _deaf(sys.stdout)
+    return 0
+
+
+def _tell(text: str) -> None:
+    """One line on standard error, if anybody listens."""
+    try:
+        print(" ".join(text.split()), file=sys.stderr, flush=True)
+    except OSError:
+        _deaf(sys.stderr)
+
+
+def _deaf(stream) -> None:
+    """Lead a stream that cannot be written to nowhere, so that Python does not complain of it at the end."""
+    with contextlib.suppress(AttributeError, OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _any_letters() -> None:
+    """What a terminal has no letters for is escaped, and matplotlib keeps its folders to itself: nothing fails for the sake
+    of what is said beside the results."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="backslashreplace")
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    try:
+        Path.home()
+    except RuntimeError:  # nowhere: matplotlib then takes a temporary folder if it is told of one that cannot be
+        os.environ.setdefault("MPLCONFIGDIR", os.devnull)

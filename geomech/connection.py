@@ -84,27 +84,43 @@ def directions(joints: int, count: int) -> np.ndarray:
 
 
 def sampled(
-    velocity: Velocity, axes, count: int, degree: int = 3, progress: Callable | None = None, mirror: bool = False
-) -> tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
-    """(axes, directions (C, d), xi (S, C, 3)): the velocity at every shape of a grid, in C order, for unit alphadot."""
-    axes = tuple(np.asarray(a, float) for a in axes)
+    velocity: Velocity,
+    axes,
+    unit,
+    keep: Callable,
+    degree: int = 3,
+    progress: Callable | None = None,
+    mirror: bool = False,
+) -> list[np.ndarray]:
+    """What ``keep`` keeps of the velocity at every shape of a grid for the directions ``unit`` (C, d) of alphadot: keep takes
+    xi (s, C, 3) at some shapes and gives arrays (..., s), here (..., N_1, ..., N_d). Velocities themselves are not kept:
+    of 2,000,000 shapes and 1,000 directions they would fill 48 GB."""
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
-    unit = directions(len(axes), count)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
-    xi = np.empty((len(alpha), len(unit), 3))
     mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
     todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
     step = max(1, SAMPLES_TOGETHER // len(unit))
+    fields: list[np.ndarray] = []
     for k in range(0, todo, step):
         here = slice(k, min(k + step, todo))
-        xi[here] = evaluate(velocity, alpha[here], unit)
+        xi = evaluate(velocity, alpha[here], unit)
+        kept = keep(xi)
+        fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in kept]
+        _put(fields, here, kept)
+        # In C order alpha -> -alpha is the grid read backwards; there xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
+        if twins := min(here.stop, len(alpha) - todo) - k:
+            there = slice(len(alpha) - k - twins, len(alpha) - k)
+            _put(fields, there, keep([-1.0, 1.0, 1.0] * xi[:twins][::-1]))
         if progress:
             progress(here.stop / todo)
-    # In C order alpha -> -alpha is the grid read backwards; there xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
-    xi[todo:] = [-1.0, 1.0, 1.0] * xi[: len(alpha) - todo][::-1]
-    return axes, unit, xi
+    return [x.reshape(*x.shape[:-1], *map(len, axes)) for x in fields]
+
+
+def _put(fields: list[np.ndarray], where: slice, values) -> None:
+    for field, x in zip(fields, values):
+        field[..., where] = x
 
 
 def fit(
@@ -116,9 +132,13 @@ def fit(
     xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half.
     Raises what ``velocity`` raises.
     """
-    axes, unit, xi = sampled(velocity, axes, count, degree, progress, mirror)
-    A = np.einsum("jc,sci->ijs", np.linalg.pinv(unit), xi)
-    residual = np.sqrt(((xi - np.einsum("ijs,cj->sci", A, unit)) ** 2).mean(1)).T
-    speed = np.sqrt((xi**2).mean(1)).T
-    shape = tuple(len(a) for a in axes)
-    return Connection(axes, *(x.reshape(*x.shape[:-1], *shape) for x in (A, residual, speed)), degree)
+    axes = tuple(np.asarray(a, float) for a in axes)
+    unit = directions(len(axes), count)
+    inverse = np.linalg.pinv(unit)
+
+    def keep(xi):
+        A = np.einsum("jc,sci->ijs", inverse, xi)
+        residual = np.sqrt(((xi - np.einsum("ijs,cj->sci", A, unit)) ** 2).mean(1)).T
+        return A, residual, np.sqrt((xi**2).mean(1)).T
+
+    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror), degree)

@@ -8,7 +8,7 @@ direct tier. Errors come in pairs: the distance between net positions, in body l
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,7 +41,16 @@ def apart(a, b, length: float) -> np.ndarray:
 
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
     """(poses (B, 3), errors (B, 2), body lengths and rad) of the direct tier; phases is rounded up to a multiple of 8,
-    >= 32."""
+    >= 32. Many
+    amplitudes go in groups, so that memory is bounded."""
+    if amplitudes is None:
+        return _direct(scene, gait, None, phases)
+    size = scene.at_once(phases)
+    groups = [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
+    return tuple(np.concatenate(x) for x in zip(*(_direct(scene, gait, some, phases) for some in groups)))
+
+
+def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, np.ndarray]:
     phases = max(32, 8 * -(-phases // 8))
     marching = scene.engine != "algebraic"
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if marching else phases, amplitudes)
@@ -114,14 +123,18 @@ def solves(scene: Scene, method: str, count: int, phases: int) -> int:
     }[method]
 
 
-def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None) -> dict:
+def cheapest(
+    scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
+) -> dict:
     """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "estimate_heading": [...], "tier", "settings",
     "seconds"}: the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
     most ``tol`` body lengths.
 
-    Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. SceneError if no
-    tier gets there.
+    Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
+    come (`geomech.cost`) before each is done. SceneError if no tier gets there.
     """
+    from geomech import cost
+
     if not (np.isfinite(tol) and tol > 0):
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {tol!r}")
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
@@ -130,10 +143,11 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(32 if scene.engine == "algebraic" else FEWEST_STEPS, 8 * gait.harmonics)
     if scene.lookups:
-        pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, phases)
+        pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
     for method in sorted(scene.lookups, key=lambda m: solves(scene, m, len(amplitudes), phases)):
         if solves(scene, method, len(amplitudes), phases) >= solves(scene, "direct", len(amplitudes), phases):
             break
+        ask([cost.built(scene, method, gait)])
         try:
             checked = scene.displacement(method, gait, amplitudes[some])
         except ValueError:  # the gait leaves the field or the family: this tier cannot say
@@ -143,7 +157,7 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
             error = against_direct(scene, poses, gait, amplitudes)
             if error[:, 0].max() <= tol:
                 return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
-    (poses, error), phases = _refined(scene, gait, amplitudes, tol, phases)
+    (poses, error), phases = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         raise SceneError(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} at {phases} phases): "
@@ -152,12 +166,16 @@ def cheapest(scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait |
     return _answer("direct", amplitudes, poses, error, {"phases": phases}, start)
 
 
-def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int):
+def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
     """The direct tier at twice the phases again and again, for the amplitudes that need it, until all positions are
     within ``tol`` or doubling stops helping."""
+    from geomech import cost
+
+    ask(cost.direct(scene, gait, len(amplitudes), phases))
     (poses, error), open_ = direct(scene, gait, amplitudes, phases), np.arange(len(amplitudes))
     while (worse := open_[error[open_, 0] > tol]).size and 2 * phases <= MOST_PHASES:
         phases *= 2
+        ask(cost.direct(scene, gait, len(worse), phases))
         finer, now = direct(scene, gait, amplitudes[worse], phases)
         stalled = (now > 0.9 * error[worse])[:, 0].all() and phases > 1024
         poses[worse], error[worse], open_ = finer, now, worse

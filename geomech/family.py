@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from geomech import se2
-from geomech.connection import Velocity, evaluate
+from geomech.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.gaits import Gait
 from geomech.simulate import displacement, turning
 
@@ -93,7 +93,9 @@ def fit(
         raise ValueError(f"a family needs at least 4 curves, got {count!r}")
     amplitudes = largest * np.arange(count + 1) / count
     xi = np.zeros((count + 1, phases, 3))
-    xi[1:] = evaluate(velocity, *gait.cycle(phases, amplitudes[1:]))
-    if progress:
-        progress(1.0)
+    step = max(1, SAMPLES_TOGETHER // phases)
+    for k in range(1, count + 1, step):
+        xi[k : k + step] = evaluate(velocity, *gait.cycle(phases, amplitudes[k : k + step]))
+        if progress:
+            progress(min(1.0, (k + step - 1) / count))
     return Family(gait, amplitudes, xi)

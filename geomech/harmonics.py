@@ -17,8 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.connection import Velocity, sampled
+from geomech.connection import Velocity, directions, sampled
 from geomech.field import Field
+
+VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,13 @@ class Harmonics:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) at alpha, alphadot (..., 2); ValueError outside the grid."""
-        alphadot = np.asarray(alphadot, float)
+        alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), np.asarray(alphadot, float))
+        points = [x.reshape(-1, 2) for x in (alpha, alphadot)]
+        step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
+        parts = [self._at(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
+        return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
+
+    def _at(self, alpha, alphadot) -> np.ndarray:
         beta = np.arctan2(alphadot[..., 1], alphadot[..., 0])
         speed = np.hypot(alphadot[..., 0], alphadot[..., 1])
         return np.einsum("...ij,...j->...i", self.field(alpha), _basis(beta, self.highest)) * speed[..., None]
@@ -72,11 +80,14 @@ def fit(
     """
     if highest % 2 == 0 or not 1 <= highest < count:
         raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {highest!r}")
-    axes, unit, xi = sampled(velocity, axes, count, degree, progress, mirror)
+    axes = tuple(np.asarray(a, float) for a in axes)
     if len(axes) != 2:
         raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
+    unit = directions(2, count)
     basis = _basis(np.arctan2(unit[:, 1], unit[:, 0]), highest)
-    coefficients = np.einsum("cj,sci->ijs", basis * (2.0 / count), xi)
-    residual = np.sqrt(((xi - np.einsum("cj,ijs->sci", basis, coefficients)) ** 2).mean(1)).T
-    shape = tuple(len(a) for a in axes)
-    return Harmonics(axes, coefficients.reshape(3, -1, *shape), residual.reshape(3, *shape), degree)
+
+    def keep(xi):
+        coefficients = np.einsum("cj,sci->ijs", basis * (2.0 / count), xi)
+        return coefficients, np.sqrt(((xi - np.einsum("cj,ijs->sci", basis, coefficients)) ** 2).mean(1)).T
+
+    return Harmonics(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror), degree)

@@ -27,6 +27,7 @@ STYLE = {
     "lines.markersize": 3,
 }
 COMPONENTS = ("x", "y", r"\theta")
+FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and in print by their dashes
     "area": {"color": "#D55E00", "linestyle": "--"},
     "adapted": {"color": "#CC79A7", "linestyle": (0, (5, 1))},
@@ -95,6 +96,13 @@ def vector_field(connection: Connection, component: int = 0, unit: str = "BL", a
     return shape_space(ax, connection.axes)
 
 
+def drawable(field: Field) -> Field:
+    """The field on at most FINEST points an axis: a finer mesh shows no more and fills gigabytes."""
+    picks = [np.unique(np.linspace(0, len(a) - 1, min(len(a), FINEST)).round().astype(int)) for a in field.axes]
+    axes = tuple(a[p] for a, p in zip(field.axes, picks))
+    return Field(axes, field.values[(..., *np.ix_(*picks))], field.degree)
+
+
 @styled
 def ccf_map(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None
@@ -106,6 +114,7 @@ def ccf_map(
     from cmcrameri import cm
 
     ax = _axes(ax)
+    field, error = drawable(field), error and drawable(error)
     values = field.values[component]
     top = float(np.abs(values).max()) or 1.0
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)

@@ -9,6 +9,8 @@ All give the net pose (..., 3) over a cycle from phase t = 0, in the frame at th
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from geomech import se2
@@ -26,9 +28,13 @@ def area(ccf: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarr
     """
     if ccf.joints != 2 or gait.joints != 2:
         raise ValueError(f"the area tier needs two joints, got a field of {ccf.joints} and a gait of {gait.joints}")
-    alpha, alphadot = gait.cycle(phases, amplitudes)
-    P = ccf.antiderivative(0)(ccf.inside(alpha))
-    return se2.exp((P * alphadot[..., 1:]).mean(-2) * 2 * np.pi)
+    potential = ccf.antiderivative(0)
+
+    def enclosed(some):
+        alpha, alphadot = gait.cycle(phases, some)
+        return se2.exp((potential(ccf.inside(alpha)) * alphadot[..., 1:]).mean(-2) * 2 * np.pi)
+
+    return in_groups(enclosed, gait.amplitude if amplitudes is None else amplitudes, SAMPLES_TOGETHER // phases)
 
 
 def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -39,12 +45,20 @@ def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases:
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
     """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
-    amplitudes = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
-    flat = amplitudes.reshape(-1)
-    step = max(1, SAMPLES_TOGETHER // phases)
-    poses = [_cycle(velocity, gait, flat[k : k + step], phases) for k in range(0, flat.size, step)]
-    return np.concatenate(poses).reshape(*amplitudes.shape, 3) if poses else np.zeros((*amplitudes.shape, 3))
+    amplitudes = gait.amplitude if amplitudes is None else amplitudes
+    step = SAMPLES_TOGETHER // phases
+    return in_groups(lambda some: _cycle(velocity, gait, some, phases), amplitudes, step)
 
 
 def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarray:
-    return displacement(evaluate(velocity, *gait.cycle(phases, amplitudes)))
+    alpha, alphadot = gait.cycle(phases, amplitudes)
+    parts = (slice(k, k + SAMPLES_TOGETHER) for k in range(0, phases, SAMPLES_TOGETHER))
+    return displacement(np.concatenate([evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2))
+
+
+def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
+    """f(some) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded: (..., ...)."""
+    amplitudes = np.asarray(amplitudes, float)
+    flat, size = amplitudes.reshape(-1), max(1, size)
+    found = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
+    return np.concatenate(found).reshape(*amplitudes.shape, -1) if found else np.zeros((*amplitudes.shape, 3))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech import plots
+from geomech.cost import Cost, price, study
 from geomech.gaits import Butterfly, Circle, Gait
 from geomech.netcdf import save_connection
 from geomech.problem import SceneError
@@ -47,9 +48,7 @@ def whole_folder(path: str | Path):
 
 def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
     """Compute everything and write it; returns the displacement tables by gait."""
-    gaits = [scene.gait]
-    if scene.three_link:  # the two gaits of Fig. 11(e) beside the scene's own
-        gaits += [g for g in (Circle(reverse=True), Butterfly()) if type(g) is not type(scene.gait)]
+    gaits = _gaits(scene)
     if "area" in scene.methods:
         scene.compute_field(progress)
         save_connection(folder / "connection.nc", scene)
@@ -63,6 +62,18 @@ def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
     (folder / "displacement.json").write_text(json.dumps(tables, indent=1) + "\n")
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
     return tables
+
+
+def cost(scene: Scene) -> Cost:
+    """Of `write`."""
+    gaits = _gaits(scene)
+    return price([job for g in gaits for job in study(scene, scene.methods, AMPLITUDES, g, tables=g is gaits[0])])
+
+
+def _gaits(scene: Scene) -> list[Gait]:
+    """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it."""
+    more = (Circle(reverse=True), Butterfly()) if scene.three_link else ()
+    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,12 +23,19 @@ from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.problem import SceneError, choose
 from geomech.simulate import displacement
+from rft.bodies.base import halves
 from rft.effects import KINDS as EFFECTS
 from rft.loads import element_load
 from rft.media import is_linear
 
+if TYPE_CHECKING:
+    from geomech.cost import Cost
+
 METHODS = ("area", "adapted", "path", "harmonic", "direct")  # cheapest look-up first
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+VALUES_TOGETHER = (
+    1 << 22
+)  # of a gait run side by side, angles and velocities: some 500 MB with all that is made of them
 ALGEBRAIC = {"symmetry", "no memory", "no inertia"}  # premises of a body velocity that follows from shape alone
 
 
@@ -180,6 +188,23 @@ class Scene:
         return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles)
 
     @property
+    def elements(self) -> int:
+        """Straight elements of the body, as its effects cut it."""
+        body = self.body
+        for effect in self.effects:
+            body = effect.body(body)
+        return len(halves(body))
+
+    def at_once(self, phases: int) -> int:
+        """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
+        batched = [getattr(e, name) for e in self.effects for name in e.batched]
+        if any(map(np.ndim, batched)):
+            return sys.maxsize  # a parameter for each amplitude: they belong together
+        # A march has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
+        marched = 0 if self.engine == "algebraic" else 4 * self.elements + sum(e.held for e in self.effects) // 8
+        return max(1, VALUES_TOGETHER // max(phases * (self.body.joints + 6), marched))
+
+    @property
     def linear(self) -> bool:
         """Whether xi = A alphadot holds exactly, so that path and direct tier are one."""
         return is_linear(self.medium) and not self.effects
@@ -225,7 +250,8 @@ class Scene:
         """Directions behind the harmonics: enough above the highest for folding to stay small."""
         return max(24, (8 * self.numerics.harmonics) // 5)
 
-    def _axes(self):
+    def axes(self) -> tuple[np.ndarray, ...]:
+        """Of the scene's field; SceneError if it has none, or one too large."""
         self.require_connection()
         n, joints = self.numerics, self.body.joints
         if n.grid**joints > LARGEST_GRID:
@@ -238,7 +264,7 @@ class Scene:
     def connection(self, progress: Callable | None = None) -> conn.Connection:
         """The least-squares connection on the scene's grid."""
         degree, mirror = self.numerics.interpolation, self.medium.mirror
-        return conn.fit(self.velocity, self._axes(), self.direction_count, degree, progress, mirror)
+        return conn.fit(self.velocity, self.axes(), self.direction_count, degree, progress, mirror)
 
     @cached_property
     def fitted(self) -> conn.Connection:
@@ -265,7 +291,7 @@ class Scene:
         """The odd harmonics of the velocity on the scene's grid, computed once."""
         n, mirror = self.numerics, self.medium.mirror
         count = self.harmonic_directions
-        return harm.fit(self.velocity, self._axes(), count, n.interpolation, mirror=mirror, highest=n.harmonics)
+        return harm.fit(self.velocity, self.axes(), count, n.interpolation, mirror=mirror, highest=n.harmonics)
 
     def family(self, gait: Gait, largest: float) -> fam.Family:
         """The connection adapted to the scaled copies of ``gait`` up to an amplitude; computed once for each."""
@@ -291,7 +317,9 @@ class Scene:
         if method == "harmonic" and not self.linear:
             return predict.path(self.harmonics.velocity, gait, amplitudes, phases)
         if self.engine != "algebraic":
-            return self.cycle(gait, amplitudes).net
+            if amplitudes is None:
+                return self.cycle(gait).net
+            return predict.in_groups(lambda some: self.cycle(gait, some).net, amplitudes, self.at_once(phases))
         # In a linear medium xi = A alphadot holds exactly: path and harmonics need no field, and are the direct tier.
         return predict.direct(self.velocity, gait, amplitudes, phases)
 
@@ -354,6 +382,12 @@ class Scene:
             for k, key in enumerate(("estimate", "estimate_heading"))
         }
         return {"amplitude": out["amplitude"], **ordered, **estimates, "seconds": seconds}
+
+    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> Cost:
+        """What `study` would take: force balances, seconds on this machine and memory; see `geomech.cost`."""
+        from geomech import cost
+
+        return cost.price(cost.study(self, methods, len(amplitudes), gait))
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed; None keeps a value."""

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech import estimate
+from geomech.cost import Cost, direct, price
 from geomech.gaits import Gait
 from geomech.netcdf import COMPONENTS
 from geomech.problem import SceneError, whole_file
@@ -22,7 +23,7 @@ from geomech.scenes import from_tables
 from rft.effects import broken, together
 
 LARGEST = 1_000_000  # points
-SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to show progress and lose little
+SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
 SAVE_EVERY = 2.0  # seconds between savings of what there is
 
@@ -60,6 +61,51 @@ def sweep(
     solver together. kept: a file that holds what is done and is taken up again when the
     same sweep is asked for; removed at the end. SceneError if a point of the grid makes no scene.
     """
+    tables, names, values, points = _grid(scene, over)
+    shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
+    width, total = len(amplitudes or [0]), int(np.prod(shape))
+    rows = _taken_up(kept, scene, values)
+    saved = _now()
+    try:
+        while len(rows) < total:
+            k, done = divmod(len(rows), width)
+            first = _scene_at(tables, scene, names, points[k])
+            most = min(SAMPLES_TOGETHER, first.at_once(first.numerics.phases))
+            beyond = points[k + 1 : k + max(1, most // width)] if done == 0 else []
+            batch = [first, *(_scene_at(tables, scene, names, p) for p in beyond)]
+            rows += _rows(batch, amplitudes[done : done + most] if amplitudes else None)
+            if progress:
+                progress(len(rows) / total)
+            if kept and _now() - saved > SAVE_EVERY:
+                _keep(kept, scene, values, rows)
+                saved = _now()
+    except BaseException as error:
+        if kept and rows:
+            _keep(kept, scene, values, rows)
+            error.add_note(f"{len(rows)} of {total} points are kept in {kept}: the same command goes on from there")
+        raise
+    if kept:
+        kept.unlink(missing_ok=True)
+    flat = np.array(rows).reshape(*shape, 5)
+    back = [names.index(k) for k in over]
+    flat = np.transpose(flat, (*back, len(shape)))
+    errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
+    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
+
+
+def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
+    """Of `sweep`, by some of its points; SceneError as there."""
+    tables, names, values, points = _grid(scene, over)
+    total = len(points) * len(values.get(AMPLITUDE, [0]))
+    some = [_scene_at(tables, scene, names, points[k]) for k in {0, len(points) // 2, len(points) - 1}]
+    each = [price(direct(s, s.gait, total, s.numerics.phases, SAMPLES_TOGETHER)) for s in some]
+    balances, seconds, memory = np.array(each).T
+    return Cost(round(balances.mean()), float(seconds.mean()), float(memory.max()))
+
+
+def _grid(scene: Scene, over: Mapping[str, list[float]]):
+    """(tables of the scene, names of the parameters, their values, points of those other than the amplitude), the
+    amplitude last; SceneError if they make no sweep."""
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
     values = {k: [float(x) for x in over[k]] for k in names}
     shape = tuple(len(v) for v in values.values())
@@ -74,31 +120,9 @@ def sweep(
         raise SceneError(
             f"{scene.name}: a sweep takes a scene as its TOML text has it: change that, or sweep the change"
         )
-    points = list(itertools.product(*outer))
     for corner in _corners(outer):
         _scene_at(tables, scene, names, corner)  # refuse before computing
-    rows = _taken_up(kept, scene, values)
-    saved = _now()
-    try:
-        at_once = max(1, SAMPLES_TOGETHER // len(values.get(AMPLITUDE, [0])))
-        for k in range(len(rows), len(points), at_once):
-            rows += _rows([_scene_at(tables, scene, names, p) for p in points[k : k + at_once]], values.get(AMPLITUDE))
-            if progress:
-                progress(len(rows) / len(points))
-            if kept and _now() - saved > SAVE_EVERY:
-                _keep(kept, scene, values, rows)
-                saved = _now()
-    except BaseException:
-        if kept and rows:
-            _keep(kept, scene, values, rows)
-        raise
-    if kept:
-        kept.unlink(missing_ok=True)
-    flat = np.array(rows).reshape(*shape, 5)
-    back = [names.index(k) for k in over]
-    flat = np.transpose(flat, (*back, len(shape)))
-    errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
-    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
+    return tables, names, values, list(itertools.product(*outer))
 
 
 def _same(a: Scene, b: Scene) -> bool:
@@ -125,7 +149,7 @@ def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
-    """[[[x, y, theta, error, error of theta], ...], ...] for all amplitudes of every scene, those that fit into one batch
+    """[[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, those that fit into one batch
     together."""
     groups: dict = {}
     for k, scene in enumerate(scenes):
@@ -136,7 +160,7 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
         found = np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
         for k, part in zip(members, np.split(found, len(members))):
             rows[k] = part.tolist()
-    return rows
+    return list(itertools.chain(*rows))
 
 
 def _kind(scene: Scene) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
@@ -162,11 +163,11 @@ class Balance:
     def _attempt(self, todo, descent: Descent, out: Solved, threads) -> None:
         """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
         elements = self.motion(todo[:1]).half.shape[0] * self.nodes
-        batch = max(16, ELEMENTS_TOGETHER // elements)
+        batch = max(1, ELEMENTS_TOGETHER // elements)
 
-        def work(share):
+        def work(share, stop):
             queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
-            while queue or state is not None:
+            while (queue or state is not None) and not stop.is_set():
                 while queue and (state is None or state.index.size <= batch // 2):
                     index = queue.pop()
                     fresh = self._start(descent, index, self.motion(index))
@@ -259,12 +260,17 @@ def _workers(threads: int | None, useful: int) -> int:
 
 
 def _map(f: Callable, shares: list) -> None:
-    """f of each share, side by side: NumPy lets go of the interpreter inside its loops."""
+    """f(share, stop) of each share, side by side: NumPy lets go of the interpreter inside its loops. What is raised here, by
+    a signal among others, sets ``stop``, so that no share goes on for more than a step."""
+    stop = threading.Event()
     if len(shares) == 1:
-        f(shares[0])
-    else:
-        with ThreadPoolExecutor(len(shares)) as pool:
-            list(pool.map(f, shares))
+        return f(shares[0], stop)
+    with ThreadPoolExecutor(len(shares)) as pool:
+        try:
+            list(pool.map(lambda share: f(share, stop), shares))
+        except BaseException:
+            stop.set()
+            raise
 
 
 def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

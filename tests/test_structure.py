@@ -4,7 +4,7 @@ import ast
 import pathlib
 
 ROOT = pathlib.Path(__file__).parents[1]
-SCENE_AND_ABOVE = {"scene.py", "scenes/__init__.py", "cli.py", "explain.py", "sweep.py"}
+SCENE_AND_ABOVE = {"scene.py", "scenes/__init__.py", "cli.py", "cost.py", "explain.py", "sweep.py"}
 
 
 def imports(path):

@@ -48,7 +48,8 @@ class Effect:
 
     rank: effects act in this order, whatever the scene's. batched: parameters that may be arrays (B,), one for each
     sample of a batch. inertia: mass of the body x length x (rad/s of phase)^2 over its axial drag. settles: change of
-    displacement from cycle to cycle, body lengths, below which a march with this effect has settled.
+    displacement from cycle to cycle, body lengths, below which a march with this effect has settled. held: numbers that a
+    march remembers for each sample, beside some for each element.
     """
 
     breaks = frozenset()
@@ -59,6 +60,7 @@ class Effect:
     batched = ()
     inertia = 0.0
     settles = 1e-6
+    held = 0
 
     def load(self, load, medium, body: Body):
         """The load law (`rft.loads`) of the body's elements with this effect; the same one by default."""

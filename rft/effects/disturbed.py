@@ -41,6 +41,10 @@ class DisturbedGround(Effect):
         require(0.01 <= self.radius <= 0.25, f"radius must lie from 0.01 to 0.25 body lengths, got {self.radius!r}")
         require(0 <= self.weakening <= 1, f"weakening must lie from 0 to 1, got {self.weakening!r}")
 
+    @property
+    def held(self) -> int:
+        return 2 * _cells(self.radius / CELLS) ** 2
+
     def body(self, body):
         return cut(body)
 
@@ -81,12 +85,17 @@ class _Now(Effect):
         return weakened(load, lambda m, known: ((known.of(self.left), known.of(self.right)), (0.0, 0.0)))
 
 
+def _cells(cell: float) -> int:
+    """Along a side of the square that is remembered."""
+    return int(np.ceil(PATCH / cell))
+
+
 class Ground:
     """Disturbance on a square grid that wraps round: a cell knows which patch of the plane it holds, and a new one starts
     untouched."""
 
     def __init__(self, cell: float, samples: int):
-        self.cell, self.size = cell, int(np.ceil(PATCH / cell))
+        self.cell, self.size = cell, _cells(cell)
         self.value = np.zeros((self.size * self.size, samples))
         self.owner = np.full((self.size * self.size, samples), -1, np.int64)
         self.sample = np.arange(samples)

@@ -1,0 +1,222 @@
+"""What a request costs, foretold: force balances, seconds and memory, from a pilot of the very scene on this machine.
+
+A request is a list of jobs, counted as the tiers ask for them (`geomech.estimate`); `price` solves a few balances of each
+kind, then more, until it can tell what one takes. Jobs too small to matter are not piloted. Seconds are of computing, so
+that other work on the machine does not count. From Python nothing is refused: ask `Scene.cost`, and decide.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+import rft
+from geomech import estimate
+from geomech.field import Field
+from geomech.gaits import Gait
+from geomech.harmonics import Harmonics
+from geomech.problem import SceneError
+from rft.loads import parse
+from rft.newton import ELEMENTS_TOGETHER
+
+if TYPE_CHECKING:
+    from geomech.scene import Scene
+
+LONGEST = 60.0  # s of computing that a command takes up without being told to
+LARGEST = 2e9  # bytes of memory, likewise
+WORTH_SAYING = 5.0  # s
+PILOT = 0.15  # s after which a pilot has seen enough
+FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a step of a march STEP besides
+SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
+CYCLES = 3  # of a march that settles
+BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
+COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
+TABLES = 4  # of a table while it is built, interpolated and written
+ROW = 800  # bytes of an amplitude's results by all tiers, as lists and as text
+
+
+class Cost(NamedTuple):
+    """balances: of force. seconds: of computing. memory: bytes at the peak."""
+
+    balances: int
+    seconds: float
+    memory: float
+
+    def __str__(self) -> str:
+        balances = f"{self.balances:,} force balances"
+        return f"{balances}, about {_duration(self.seconds)} of computing and {_size(self.memory)} of memory"
+
+    @property
+    def small(self) -> bool:
+        """Not worth saying."""
+        return self.seconds < WORTH_SAYING and self.memory < LARGEST
+
+    def check(self, place: str, yes: bool) -> None:
+        """SceneError where it goes beyond the limits and ``yes`` does not allow that."""
+        if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
+            limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
+            raise SceneError(f"{place}: {self}: to compute for more than {limits} say --yes, or ask for less")
+
+
+class Job(NamedTuple):
+    """Part of a request. what: "balances" solved side by side, "steps" of one cycle of a march of ``group`` samples, or
+    "look-ups" in a tier's table. gait: whose shapes, None for those all over the field. memory: bytes at the peak."""
+
+    what: str
+    scene: Scene
+    gait: Gait | None
+    count: float
+    group: int = 1
+    tier: str = ""
+    memory: float = BASE
+
+    @property
+    def kind(self) -> str:
+        """The same for jobs whose balances, steps or look-ups take the same time."""
+        s = self.scene
+        terms = s.numerics.harmonics if self.tier == "harmonic" else 0
+        return repr((self.what, s.medium, s.body, s.effects, s.numerics.loads, self.gait, self.group, self.tier, terms))
+
+
+def price(jobs: Sequence[Job]) -> Cost:
+    """Of jobs that are done one after the other."""
+    kinds: dict[str, list[Job]] = {}
+    for job in jobs:
+        kinds.setdefault(job.kind, []).append(job)
+    balances = seconds = 0.0
+    for same in kinds.values():
+        job, count = same[0], sum(j.count for j in same)
+        each, cycles = _per_step(job, count) if job.what == "steps" else (_per_sample(job, count), 1)
+        seconds += count * cycles * each
+        balances += count * cycles * job.group if job.what != "look-ups" else 0
+    return Cost(math.ceil(balances), seconds, max((j.memory for j in jobs), default=BASE))
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}" if seconds < 100 * size else f"{seconds / size:,.0f} {unit}"
+    return f"{max(1.0, seconds):.0f} s"
+
+
+def _size(memory: float) -> str:
+    return f"{memory / 1e9:,.2g} GB" if memory >= 1e9 else f"{memory / 1e6:.0f} MB"
+
+
+def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = None, tables: bool = True) -> list[Job]:
+    """`Scene.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
+    gait, phases = gait or scene.gait, scene.numerics.phases
+    lookups = [m for m in methods if m in scene.lookups]
+    jobs = [built(scene, m, gait) for m in lookups if tables and not (m == "path" and "area" in lookups)]
+    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m != "adapted"]
+    if len(lookups) < len(methods):
+        return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)
+    fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
+    return jobs + len(lookups) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+
+
+def direct(
+    scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True
+) -> list[Job]:
+    """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
+    (`estimate.direct`) or, if not ``checked``, without."""
+    marching = scene.engine != "algebraic"
+    if checked:
+        phases = max(estimate.FEWEST_STEPS if marching else 32, 8 * -(-phases // 8))
+    group = min(max(1, count), together, scene.at_once(phases))
+    solved, held = phases * (_refinements(scene, marching) if checked else 1.0), 0
+    if marching:
+        held = group * (60 * scene.elements + sum(e.held for e in scene.effects))
+    memory = BASE + 8 * (COPIES * group * phases * (scene.body.joints + 6) + held) + count * ROW
+    if marching:
+        return [Job("steps", scene, gait, solved * count / group, group, memory=memory)]
+    return [Job("balances", scene, gait, solved * count, memory=memory)]
+
+
+def _refinements(scene: Scene, marching: bool) -> float:
+    """Balances that `estimate.direct` solves over those of the gait at its phases: a march again at a half, a quarter and
+    an eighth of them, and a quarter with a finer model where there is one."""
+    again = 0.5 + 0.25 + 0.125 if marching else 0.0
+    return 1.0 + again + (0.25 if estimate.finer_model(scene) else 0.0)
+
+
+def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
+    """The table of a tier; that of area and path is the connection with its CCF."""
+    n, joints = scene.numerics, scene.body.joints
+    if tier != "adapted":
+        scene.axes()  # refuses a field that is too large
+    values = {"harmonic": n.harmonics + 2, "adapted": 0}.get(tier, joints + 3) * 3 * n.grid**joints
+    values += n.curves * (n.phases // 2) * 3 if tier == "adapted" else 0
+    place = (gait or scene.gait) if tier == "adapted" else None
+    memory = BASE + 8 * TABLES * values
+    return Job("balances", scene, place, estimate.solves(scene, tier, 1, n.phases), memory=memory)
+
+
+def _per_sample(job: Job, count: float) -> float:
+    """Seconds a force balance, or a look-up, takes."""
+    scene = job.scene
+    if job.what == "look-ups":
+        return 0.0 if count < 1e5 else _grown(_look(scene, job.tier), 64, count)
+    prior = SLOW * scene.elements * parse(scene.numerics.loads)[1]
+    if prior * count < FREE:
+        return prior / 2
+    rng, joints, extent = np.random.default_rng(0), scene.body.joints, scene.numerics.extent
+
+    def solve(samples: int):
+        if job.gait is None:
+            alpha = rng.uniform(-extent, extent, (samples, joints))
+            return scene.solve(alpha, rng.normal(size=(samples, joints)))
+        phases = max(8, 2 * job.gait.harmonics + 2)
+        return scene.solve(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
+
+    return _grown(solve, max(8, 3072 // scene.elements), count)
+
+
+def _look(scene: Scene, tier: str) -> Callable:
+    """Looks n shapes up in a table of zeros, as large as a shape touches."""
+    joints, degree = scene.body.joints, scene.numerics.interpolation
+    axes = (np.linspace(-1.0, 1.0, degree + 3),) * joints
+    size = [len(a) for a in axes]
+    if tier == "harmonic":
+        table = Harmonics(axes, np.zeros((3, scene.numerics.harmonics + 1, *size)), np.zeros((3, *size)), degree)
+        return lambda n: table.velocity(np.zeros((n, joints)), np.ones((n, joints)))
+    field = Field(axes, np.zeros((3, joints if tier == "path" else 1, *size)), degree)
+    return lambda n: field(np.zeros((n, joints)))
+
+
+def _per_step(job: Job, count: float) -> tuple[float, int]:
+    """(seconds a step of a march takes, cycles until it settles)."""
+    scene, gait, n = job.scene, job.gait, job.scene.numerics
+    elements = scene.elements * parse(n.loads)[1]
+    prior, cycles = STEP + SLOW * elements * job.group, n.cycles or CYCLES
+    if prior * count * cycles < FREE:
+        return prior / 2, cycles
+    phases = max(16, 8 * -(-gait.harmonics // 3))
+    some = min(job.group, max(1, ELEMENTS_TOGETHER // elements))
+
+    def march(samples: int, cycles: int | None):
+        start = time.process_time()
+        found = rft.march(
+            scene.medium, scene.body, *gait.cycle(phases, np.full(samples, gait.amplitude)), effects=scene.effects,
+            cycles=cycles, loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
+        )  # fmt: skip
+        return found.cycles, (time.process_time() - start) / (phases * found.cycles)
+
+    return march(some, 1)[1] * job.group / some, n.cycles or march(1, None)[0]
+
+
+def _grown(f: Callable, samples: int, most: float) -> float:
+    """Seconds a sample that f(samples) takes, for as many as it takes to tell."""
+    f(samples)  # loads what the first call loads
+    while True:
+        start = time.process_time()
+        f(samples)
+        took = time.process_time() - start
+        if took > PILOT or samples >= most:
+            return took / samples
+        samples *= 2 if took > PILOT / 4 else 4

@@ -1,0 +1,383 @@
+"""Large requests: foretold, refused without --yes, stopped at once, kept as far as they got, and bounded in memory."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from test_cli import geomech as run
+
+from geomech import accuracy, cli, connection, cost, estimate, harmonics, plots, scenes, sweep
+from geomech.field import Field
+from geomech.problem import SceneError
+from rft.newton import Balance
+
+GLASS = scenes.load("three-link-glass")
+VISCOUS = scenes.load("three-link-viscous")
+SLOPING = scenes.parse(
+    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 8")
+    + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
+)
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Counts the force balances that are solved."""
+    counts, solve = [], Balance.solve
+
+    def counting(self, motion, speed, *args, **kwargs):
+        counts.append(speed.size)
+        return solve(self, motion, speed, *args, **kwargs)
+
+    monkeypatch.setattr(Balance, "solve", counting)
+    return counts
+
+
+@pytest.mark.parametrize(
+    ("scene", "methods"),
+    [
+        (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
+        (GLASS.with_numerics(grid=9, phases=40), ("path",)),
+        (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
+        (VISCOUS, ("area", "path", "harmonic", "direct")),
+        (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
+        (SLOPING.with_numerics(phases=64, cycles=2), ("direct",)),
+    ],
+)
+def test_the_balances_foretold_are_those_solved(scene, methods, solved):
+    foretold = scene.cost([0.1, 0.2, 0.3], methods).balances
+    solved.clear()  # of a pilot
+    scene.study([0.1, 0.2, 0.3], methods)
+    assert foretold == pytest.approx(sum(solved), rel=0.02)  # half of a grid, and its middle
+
+
+@pytest.mark.parametrize("scene", [GLASS, SLOPING.with_numerics(cycles=3)])
+def test_a_pilot_tells_what_a_balance_takes(scene, solved, monkeypatch):
+    """By a clock on which every balance takes a tenth of a millisecond."""
+    monkeypatch.setattr(cost.time, "process_time", lambda: 1e-4 * sum(solved))
+    foretold = cost.price(cost.direct(scene, scene.gait, 3000, 256))
+    assert foretold.balances == 3000 * 256 * (1.25 if scene is GLASS else 3 * 2.125)
+    assert foretold.seconds == pytest.approx(1e-4 * foretold.balances, rel=0.05)
+    assert 0 < sum(solved) < foretold.balances / 50
+    solved.clear()
+    assert cost.price(cost.direct(scene, scene.gait, 1, 32)).seconds < 1.0
+    assert not solved  # too small for a pilot
+
+
+def test_accuracy_and_sweep_say_what_they_cost(solved):
+    scene = VISCOUS.with_numerics(grid=5)
+    foretold = accuracy.cost(scene).balances
+    solved.clear()
+    accuracy.study(scene)
+    assert foretold == pytest.approx(sum(solved), rel=0.02)
+    over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
+    foretold = sweep.cost(VISCOUS, over).balances
+    solved.clear()
+    sweep.sweep(VISCOUS, over)
+    assert foretold == sum(solved)
+
+
+LARGE = {
+    "amplitudes": ["displacement", "three-link-glass", "--amplitudes", "0.1:2:99999"],
+    "amplitudes of a sweep": ["sweep", "three-link-glass", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
+    "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
+    "a map": ["ccf", "three-link-glass", "--grid", "1414", "--plot", "out.png"],
+    "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
+    "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
+    "phases": ["run", "phases.toml", "-o", "out"],
+    "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
+    "a march": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
+    "a tolerance": ["displacement", "three-link-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-4"],
+    "accuracy": ["accuracy", "phases.toml", "-o", "out"],
+}
+
+
+@pytest.fixture
+def large(tmp_path, monkeypatch):
+    """A folder with scenes that ask for much."""
+    for name, value in (("directions", 4096), ("harmonics", 999), ("phases", 1_000_000)):
+        (tmp_path / f"{name}.toml").write_text(f"{GLASS.text}\n[numerics]\n{name} = {value}\n")
+    fish = scenes.load("sandfish-loose").text
+    (tmp_path / "elements.toml").write_text(fish.replace("elements = 100", "elements = 2000"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", [n for n in LARGE if n not in ("accuracy", "phases")])
+def test_large_requests_are_refused_without_yes(name, large):
+    before = sorted(p.name for p in large.iterdir())
+    code, out, err = run(*LARGE[name])
+    assert (code, out) == (2, "")
+    *_, last = err.splitlines()
+    assert " force balances, about " in last
+    assert "of memory: to compute for more than 60 s or 2 GB say --yes" in last
+    assert sorted(p.name for p in large.iterdir()) == before
+
+
+def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
+    monkeypatch.setattr(cost, "LONGEST", 0.0)
+    monkeypatch.setattr(cost, "WORTH_SAYING", 0.0)
+    args = ["displacement", "three-link-viscous", "--amplitudes", "1", "--methods", "direct", "--json"]
+    assert run(*args)[0] == 2
+    code, out, err = run(*args, "--yes")
+    assert code == 0
+    assert err.startswith("three-link-viscous: 256 force balances, about 1 s of computing and 16")
+    assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(0.0512808, abs=1e-6)
+    for args in (["run", "three-link-viscous", "-o", "d"], ["accuracy", "three-link-viscous", "-o", "d"]):
+        assert "say --yes" in run(*args)[2]
+
+
+def test_a_cost_reads_well():
+    assert str(cost.Cost(1_000_000, 90.0, 2.1e9)) == (
+        "1,000,000 force balances, about 1.5 min of computing and 2.1 GB of memory"
+    )
+    assert "about 14 h" in str(cost.Cost(1, 5e4, 0)) and "about 116 days" in str(cost.Cost(1, 1e7, 0))
+    cost.Cost(1, 59.0, 1.9e9).check("here", False)
+    for beyond in (cost.Cost(1, 61.0, 1.0), cost.Cost(1, 1.0, 2.1e9)):
+        beyond.check("here", True)
+        with pytest.raises(SceneError, match="here: 1 force balances"):
+            beyond.check("here", False)
+
+
+def test_pieces_change_no_numbers(monkeypatch):
+    """What is computed in groups is what it is at once."""
+    scene = GLASS.with_numerics(grid=7, phases=48, harmonics=5)
+    amplitudes = np.linspace(0.3, 1.4, 7)
+
+    def everything():
+        fresh = scene.with_numerics(grid=7)
+        tiers = [fresh.displacement(m, None, amplitudes) for m in ("area", "adapted", "path", "harmonic", "direct")]
+        fields = fresh.fitted.A, fresh.fitted.residual, fresh.fitted.speed, fresh.harmonics.residual
+        marched = SLOPING.with_numerics(phases=16, cycles=2).displacement("direct", None, amplitudes / 5)
+        return [*tiers, *fields, marched, *estimate.direct(fresh, fresh.gait, amplitudes, 32)]
+
+    whole = everything()
+    monkeypatch.setattr("geomech.scene.VALUES_TOGETHER", 1)
+    for module in (connection, sys.modules["geomech.predict"], sys.modules["geomech.family"]):
+        monkeypatch.setattr(module, "SAMPLES_TOGETHER", 17)
+    monkeypatch.setattr(harmonics, "VALUES_TOGETHER", 23)
+    for a, b in zip(whole, everything(), strict=True):
+        np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-13)
+
+
+def test_a_large_map_is_drawn_on_fewer_points():
+    axes = np.linspace(-1, 1, 1001), np.linspace(-2, 2, 31)
+    drawn = plots.drawable(Field(axes, np.add.outer(axes[0], 2 * axes[1])[None]))
+    assert [len(a) for a in drawn.axes] == [plots.FINEST, 31]
+    np.testing.assert_array_equal([a[[0, -1]] for a in drawn.axes], [[-1, 1], [-2, 2]])
+    np.testing.assert_allclose(drawn.values[0], np.add.outer(drawn.axes[0], 2 * drawn.axes[1]))
+
+
+def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
+    """Many amplitudes are many batches: a stop keeps those that are done, in the middle of a row too."""
+    over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist()}
+    whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 3)
+    rows, calls = sweep._rows, []
+
+    def stopping(at, amplitudes):
+        calls.append((at[0].medium.ratio, len(amplitudes)))
+        if len(calls) == 5:
+            raise cli.Stopped(signal.SIGTERM)
+        return rows(at, amplitudes)
+
+    monkeypatch.setattr(sweep, "_rows", stopping)
+    with pytest.raises(cli.Stopped) as stopped:
+        sweep.sweep(VISCOUS, over, kept)
+    assert stopped.value.__notes__ == [f"10 of 14 points are kept in {kept}: the same command goes on from there"]
+    again = sweep.sweep(VISCOUS, over, kept)
+    assert calls == [(2.0, 3), (2.0, 3), (2.0, 1), (3.0, 3), (3.0, 3), (3.0, 3), (3.0, 1)]
+    np.testing.assert_allclose(again["displacement"], whole["displacement"], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(again["estimate"], whole["estimate"], rtol=1e-6, atol=1e-14)
+    assert not kept.exists()
+
+
+# Stopping.
+
+
+def started(args, cwd):
+    """A command as a process, with the signals of a terminal whatever those of the tests are."""
+    before = [signal.signal(n, signal.SIG_DFL) for n in (signal.SIGHUP, signal.SIGTERM)]
+    interrupt = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-m", "geomech", *args],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd,
+        )  # fmt: skip
+    finally:
+        for number, handler in zip((signal.SIGHUP, signal.SIGTERM, signal.SIGINT), (*before, interrupt)):
+            signal.signal(number, handler)
+
+
+def stopped(args, cwd, number, when):
+    """(exit code, standard error) of a command that is sent a signal as soon as ``when()`` holds."""
+    process = started(args, cwd)
+    while not when():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    process.send_signal(number)
+    err = process.communicate(timeout=30)[1]
+    return process.returncode, err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_a_sweep_and_keeps_what_is_done(number, large, monkeypatch):
+    (large / "v.toml").write_text(VISCOUS.text + "\n[numerics]\nphases = 32\n")
+    kept = large / ".s.nc.partial"
+    args = ["sweep", "v.toml", "--over", "gait.amplitude=0.1:2:99999", "--yes", "-o", "s.nc"]
+    code, err = stopped(args, large, number, kept.exists)
+    assert code == 128 + number
+    assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: ")
+    assert "of 99999 points are kept in .s.nc.partial: the same command goes on from there" in err
+    rows = np.array(json.loads(kept.read_text())["rows"])
+    assert f" {len(rows)} of 99999" in err
+    scene = scenes.load("v.toml")
+    amplitudes = [0.1 + (2 - 0.1) * k / 99998 for k in range(99999)]
+    some = np.array(amplitudes[: len(rows) : 97])
+    np.testing.assert_allclose(rows[::97, :3], estimate.direct(scene, scene.gait, some, 32)[0], rtol=1e-12, atol=1e-15)
+    assert {p.name for p in large.iterdir()} - {kept.name} == {"v.toml", *(f"{n}.toml" for n in SCENES)}
+
+
+SCENES = ("directions", "harmonics", "phases", "elements")
+
+
+def test_a_signal_stops_the_solvers_threads(large):
+    """One batch of a million balances, solved on both cores: nobody waits for its shares."""
+    code = """if True:
+        import os, signal, sys, threading, numpy as np
+        from geomech import cli
+        from geomech.cli import stoppable
+        from rft import Chain, Granular, body_velocity
+        shapes = np.random.default_rng(0).uniform(-2, 2, (2, 2_000_000, 2))
+        threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        try:
+            with stoppable():
+                body_velocity(Granular(1.8, .24), Chain(), *shapes, threads=2)
+        except cli.Stopped as stopped:
+            print(stopped.code)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "143\n", "")
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt(), cli.Stopped(signal.SIGINT)])
+def test_an_interrupt_is_no_success(raised, monkeypatch):
+    def stop(name):
+        raise raised
+
+    monkeypatch.setattr(scenes, "load", stop)
+    code, out, err = run("explain", "three-link-glass")
+    assert (code, out, err) == (130, "", "error: stopped by SIGINT: nothing is kept\n")
+
+
+def test_what_was_ignored_stays_ignored():
+    """nohup geomech ... outlives its terminal."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with cli.stoppable():
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_second_signal_does_not_disturb_the_keeping():
+    def work():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.01)
+
+    with pytest.raises(cli.Stopped) as stopped, cli.stoppable():
+        work()
+    assert stopped.value.code == 130
+
+
+# Terminals and folders.
+
+
+def geomech(*args, cwd, **env):
+    """(exit code, standard output, standard error) as a process with some of the environment changed, None: taken away."""
+    changed = {k: v for k, v in {**os.environ, **env}.items() if v is not None}
+    done = subprocess.run(
+        [sys.executable, "-m", "geomech", *args], capture_output=True, cwd=cwd, env=changed, timeout=120
+    )
+    return done.returncode, done.stdout.decode("ascii"), done.stderr.decode("ascii")
+
+
+def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
+    (tmp_path / "sch\u00f6n \u2603.toml").write_text(VISCOUS.text + "# \u2603\n", encoding="utf-8")
+    (tmp_path / "file").write_text("")
+    poor = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "HOME": None, "MPLCONFIGDIR": str(tmp_path / "file" / "no")}
+    args = ["ccf", "sch\u00f6n \u2603.toml", "--plot", "\u2603.png", "--grid", "5"]
+    assert geomech(*args, cwd=tmp_path, **poor) == (0, "", "")
+    assert (tmp_path / "\u2603.png").stat().st_size > 10_000
+    args = ["displacement", "sch\u00f6n \u2603.toml", "--amplitudes", "1", "--methods", "direct", "--plot", "d.png"]
+    code, out, err = geomech(*args, cwd=tmp_path, **poor)
+    assert (code, err) == (0, "")
+    assert out.startswith("sch\\xf6n \\u2603.toml: displacement per cycle")
+    code, out, err = geomech("explain", "\u2603.toml", cwd=tmp_path, **poor)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: cannot read scene")
+
+
+def test_nobody_need_listen(tmp_path):
+    """A pipe that is closed, as by head, and no standard output at all, are no failures; a full disk is one."""
+    said = f"{sys.executable} -m geomech velocity three-link-viscous --alpha 0,0 --alphadot 1,0"
+    for line, code, err in (
+        (f"{said} | true; exit ${{PIPESTATUS[0]}}", 0, ""),
+        (f"{said} >&-", 0, ""),
+        (f"{said} 2>&-  >/dev/null", 0, ""),
+        (f"{said} > /dev/full", 2, "error: [Errno 28] No space left on device\n"),
+    ):
+        done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+        assert (done.returncode, done.stderr) == (code, err), line
+
+
+# By hand.
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(
+    "args",
+    [
+        *(LARGE[n] for n in ("a grid", "a map", "phases", "directions")),
+        ["displacement", "three-link-viscous", "--amplitudes", "0.1:2:99999"],
+        ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:20"],
+        ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic"],
+    ],
+    ids=lambda args: " ".join(args[:2]),
+)
+def test_memory_stays_below_what_was_said(args, large):
+    code = "import resource, sys; from geomech.cli import _run; _run(sys.argv[1:]); "
+    code += "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True)
+    used = int(done.stderr.splitlines()[-1])
+    assert done.returncode == 0
+    assert used < cost.LARGEST
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("after", [0.5, 3.0, 9.0, 20.0])
+def test_every_large_request_stops_within_two_seconds(name, after, large):
+    process = started([*LARGE[name], "--yes"], large)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(after)
+    if process.poll() is not None:
+        pytest.skip("it had ended")
+    process.send_signal(signal.SIGTERM)
+    begun = time.monotonic()
+    err = process.communicate(timeout=60)[1]
+    took = time.monotonic() - begun
+    assert process.returncode == (143 if "stopped by" in err else -15)
+    print(f"{name} after {after} s: {took:.2f} s")
+    assert took < 2.0
