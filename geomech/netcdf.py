@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.problem import whole_file
+from geomech.files import whole_file
 from geomech.scene import Scene
 
 COMPONENTS = ("x", "y", "theta")
@@ -19,9 +19,9 @@ def save_connection(path: str | Path, scene: Scene) -> None:
 
     fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = f"Local connection and curvature constraint function of the scene {scene.name}".encode()
+        file.title = attribute(f"Local connection and curvature constraint function of the scene {scene.name}")
         file.Conventions = "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops"
-        file.scene = (scene.text or repr(scene)).encode()
+        file.scene = attribute(scene.text or repr(scene))
         file.numerics = repr(scene.numerics)
         _coordinates(file, fitted)
         angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))
@@ -33,6 +33,11 @@ def save_connection(path: str | Path, scene: Scene) -> None:
             units = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
             name = "curvature constraint function"
             _variable(file, "ccf", scene.curvature.values, ("component", *angles), units, name)
+
+
+def attribute(text: str) -> bytes:
+    """In UTF-8; what is none in a file name is escaped."""
+    return text.encode("utf-8", "backslashreplace")
 
 
 def _coordinates(file, fitted) -> None:

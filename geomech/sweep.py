@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import hashlib
 import itertools
-import json
+import time
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from geomech import estimate
+import rft
+from geomech import __version__, estimate, kept
+from geomech.files import note, whole_file
 from geomech.gaits import Gait
-from geomech.netcdf import COMPONENTS
-from geomech.problem import SceneError, whole_file
+from geomech.netcdf import COMPONENTS, attribute
+from geomech.problem import SceneError
 from geomech.scene import Scene
 from geomech.scenes import from_tables
 from rft.effects import broken, together
@@ -51,20 +51,44 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
 
 
 def sweep(
-    scene: Scene, over: Mapping[str, list[float]], kept: Path | None = None, progress: Callable | None = None
+    scene: Scene, over: Mapping[str, list[float]], partial: Path | None = None, progress: Callable | None = None
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...)} by the direct tier.
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
-    solver together. kept: a file that holds what is done and is taken up again when the
-    same sweep is asked for; removed at the end. SceneError if a point of the grid makes no scene.
+    solver together. partial: a file that keeps what is done (`geomech.kept`) and is taken up again when the same sweep is
+    asked for; it is the caller's to remove, once the results are saved. SceneError if a point of the grid makes no scene.
     """
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
     values = {k: [float(x) for x in over[k]] for k in names}
     shape = tuple(len(v) for v in values.values())
-    if not names or not 0 < np.prod(shape) <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST} points, got {int(np.prod(shape)) if names else 0}")
+    total = int(np.prod(shape)) if names else 0
+    if not 0 < total <= LARGEST:
+        raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
+    tables = _tables(scene)
     outer = [values[k] for k in names if k != AMPLITUDE]
+    for corner in _corners(outer):
+        _scene_at(tables, scene, names, corner)  # refuse before computing
+    with _Rows(partial, question(scene, values), total) as rows:
+        for points, amplitudes in _batches(len(rows), list(itertools.product(*outer)), values.get(AMPLITUDE)):
+            rows.add(_rows([_scene_at(tables, scene, names, p) for p in points], amplitudes))
+            if progress:
+                progress(len(rows) / total)
+    flat = np.array(list(rows)).reshape(*shape, 4)
+    back = [names.index(k) for k in over]
+    flat = np.transpose(flat, (*back, len(shape)))
+    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], "estimate": flat[..., 3]}
+
+
+def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
+    """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
+    parts = {name: repr(getattr(scene, name)) for name in ("medium", "body", "gait", "effects", "numerics")}
+    over = [[name, list(x)] for name, x in values.items()]
+    return {"geomech": __version__, "solver": rft.SOLVER, "scene": scene.text, **parts, "over": over}
+
+
+def _tables(scene: Scene) -> dict:
+    """The scene's TOML with its numerics of now; SceneError if it is not what its text says."""
     if not scene.text:
         raise SceneError(f"{scene.name}: a sweep takes a scene that was read from TOML")
     numerics = {k: v for k, v in dataclasses.asdict(scene.numerics).items() if v is not None}
@@ -73,30 +97,56 @@ def sweep(
         raise SceneError(
             f"{scene.name}: a sweep takes a scene as its TOML text has it: change that, or sweep the change"
         )
-    points = list(itertools.product(*outer))
-    for corner in _corners(outer):
-        _scene_at(tables, scene, names, corner)  # refuse before computing
-    rows = _taken_up(kept, scene, values)
-    saved = _now()
-    try:
-        at_once = max(1, SAMPLES_TOGETHER // len(values.get(AMPLITUDE, [0])))
-        for k in range(len(rows), len(points), at_once):
-            rows += _rows([_scene_at(tables, scene, names, p) for p in points[k : k + at_once]], values.get(AMPLITUDE))
-            if progress:
-                progress(len(rows) / len(points))
-            if kept and _now() - saved > SAVE_EVERY:
-                _keep(kept, scene, values, rows)
-                saved = _now()
-    except BaseException:
-        if kept and rows:
-            _keep(kept, scene, values, rows)
-        raise
-    if kept:
-        kept.unlink(missing_ok=True)
-    flat = np.array(rows).reshape(*shape, 4)
-    back = [names.index(k) for k in over]
-    flat = np.transpose(flat, (*back, len(shape)))
-    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], "estimate": flat[..., 3]}
+    return tables
+
+
+def _batches(done: int, points: list, amplitudes: list[float] | None):
+    """(points, amplitudes) of one call of the engine each, after the ``done`` rows of which amplitudes run fastest."""
+    each = len(amplitudes or [None])
+    k, start = divmod(done, each)
+    while k < len(points):
+        if start or each > SAMPLES_TOGETHER:
+            yield points[k : k + 1], amplitudes[start : start + SAMPLES_TOGETHER]
+            start += SAMPLES_TOGETHER
+            k, start = (k, start) if start < each else (k + 1, 0)
+        else:
+            count = SAMPLES_TOGETHER // each
+            yield points[k : k + count], amplitudes
+            k += count
+
+
+class _Rows(list):
+    """The rows done so far, saved to ``path`` every now and then, and when computing ends for whatever reason."""
+
+    def __init__(self, path: Path | None, question: dict, total: int):
+        super().__init__(kept.taken_up(path, question, total))
+        self.path, self.question, self.saved, self.told = path, question, len(self), False
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def add(self, rows: list) -> None:
+        self += rows
+        if time.monotonic() > self.due:
+            self._save()
+
+    def _save(self) -> None:
+        """A disk that is full now is no reason to lose what is computed."""
+        start = time.monotonic()
+        if self.path and len(self) > self.saved:
+            try:
+                kept.keep(self.path, self.question, list(self))
+                self.saved = len(self)
+            except (SceneError, OSError) as error:
+                if not self.told:
+                    note(f"what is done of the sweep is not kept: {error}")
+                self.told = True
+        now = time.monotonic()
+        self.due = now + max(SAVE_EVERY, 20 * (now - start))
+
+    def __enter__(self) -> _Rows:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._save()
 
 
 def _same(a: Scene, b: Scene) -> bool:
@@ -110,12 +160,6 @@ def _corners(outer: list[list[float]]):
         yield from ([*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])] for x in values)
 
 
-def _now() -> float:
-    import time
-
-    return time.monotonic()
-
-
 def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
     for name, value in zip(names, point):
         tables = changed(tables, name, value)
@@ -123,7 +167,7 @@ def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
-    """[[[x, y, theta, error], ...], ...] for all amplitudes of every scene, those that fit into one batch together."""
+    """[[x, y, theta, error], ...] for all amplitudes of every scene, those that fit into one batch together."""
     groups: dict = {}
     for k, scene in enumerate(scenes):
         groups.setdefault(_kind(scene), []).append(k)
@@ -133,7 +177,7 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
         found = np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
         for k, part in zip(members, np.split(found, len(members))):
             rows[k] = part.tolist()
-    return rows
+    return list(itertools.chain(*rows))
 
 
 def _kind(scene: Scene) -> str:
@@ -173,30 +217,13 @@ class Beside:
         return tuple(np.concatenate(x) for x in zip(*each))
 
 
-def _mark(scene: Scene, values) -> str:
-    return hashlib.sha256(json.dumps([scene.text, repr(scene.gait), repr(scene.numerics), values]).encode()).hexdigest()
-
-
-def _keep(kept: Path, scene: Scene, values, rows) -> None:
-    with whole_file(kept) as part:
-        part.write_text(json.dumps({"sweep": _mark(scene, values), "rows": rows}))
-
-
-def _taken_up(kept: Path | None, scene: Scene, values) -> list:
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        found = json.loads(kept.read_text()) if kept else {}
-        if found["sweep"] == _mark(scene, values):
-            return found["rows"]
-    return []
-
-
 def save(path: Path, scene: Scene, results: dict) -> None:
     """The results as NetCDF: dimensions are the parameters with their dots as underscores, and component."""
     from scipy.io import netcdf_file
 
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = f"Net displacement per cycle of the scene {scene.name}".encode()
-        file.scene = scene.text.encode()
+        file.title = attribute(f"Net displacement per cycle of the scene {scene.name}")
+        file.scene = attribute(scene.text)
         names = []
         for parameter, values in results["over"].items():
             names.append(parameter.replace(".", "_").replace("-", "_"))
