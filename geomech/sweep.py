@@ -24,7 +24,8 @@ from rft.effects import broken, together
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to show progress and lose little
 AMPLITUDE = "gait.amplitude"
-SAVE_EVERY = 2.0  # seconds between savings of what there is
+SAVE_EVERY = 2.0  # seconds between savings of what there is, and more where saving takes long:
+PATIENCE = 20  # times as long
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
@@ -140,7 +141,7 @@ class _Rows(list):
                     note(f"what is done of the sweep is not kept: {error}")
                 self.told = True
         now = time.monotonic()
-        self.due = now + max(SAVE_EVERY, 20 * (now - start))
+        self.due = now + max(SAVE_EVERY, PATIENCE * (now - start))
 
     def __enter__(self) -> _Rows:
         return self

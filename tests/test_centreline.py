@@ -260,9 +260,9 @@ def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
     toml = scene_in(tmp_path, 12)
     write(tmp_path / "data", "points", count=12, places=20)
     before = scenes.load(toml)
-    assert sweep._mark(before, {}) == sweep._mark(scenes.load(toml), {})
+    assert sweep.question(before, {}) == sweep.question(scenes.load(toml), {})
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
-    assert sweep._mark(before, {}) != sweep._mark(scenes.load(toml), {})
+    assert sweep.question(before, {}) != sweep.question(scenes.load(toml), {})
     swept = sweep.sweep(scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
     assert np.isfinite(swept["displacement"]).all()
 
