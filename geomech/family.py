@@ -23,6 +23,8 @@ import numpy as np
 from geomech import se2
 from geomech.connection import Velocity, evaluate
 from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
+from geomech.problem import number
 from geomech.simulate import turning
 
 
@@ -82,10 +84,10 @@ def fit(
 
     Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
     """
-    if not (np.isfinite(largest) and largest > 0):
-        raise ValueError(f"largest amplitude must be finite and > 0, got {largest!r}")
-    if not count >= 4:
-        raise ValueError(f"a family needs at least 4 curves, got {count!r}")
+    checked_gait(gait)
+    number("largest amplitude", largest, 1e-300, 1e300)
+    number("curves", count, 4, 1e6, whole=True)
+    count = int(count)
     amplitudes = largest * np.arange(count + 1) / count
     xi = np.zeros((count + 1, phases, 3))
     xi[1:] = evaluate(velocity, *gait.cycle(phases, amplitudes[1:]))

@@ -14,7 +14,8 @@ import numpy as np
 from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Connection, Velocity, evaluate
 from geomech.field import Field
-from geomech.gaits.base import Gait
+from geomech.gaits.base import Gait, checked_gait, real_array
+from geomech.problem import number
 from geomech.simulate import displacement
 
 
@@ -24,6 +25,7 @@ def area(ccf: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarr
     By Green's theorem the integral is that of P d(alpha_2) along the gait, dP/d(alpha_1) = CCF. Order 3 in the gait's
     size in a generic frame, 4 where A vanishes at its centre.
     """
+    checked_gait(gait)
     if ccf.joints != 2 or gait.joints != 2:
         raise ValueError(f"the area tier needs two joints, got a field of {ccf.joints} and a gait of {gait.joints}")
     alpha, alphadot = gait.cycle(phases, amplitudes)
@@ -39,9 +41,10 @@ def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases:
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
     """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
-    amplitudes = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
+    amplitudes = real_array("amplitudes", checked_gait(gait).amplitude if amplitudes is None else amplitudes)
     flat = amplitudes.reshape(-1)
-    step = max(1, SAMPLES_TOGETHER // phases)
+    number("phases", phases, 1, 1e9, whole=True)
+    step = max(1, SAMPLES_TOGETHER // int(phases))
     poses = [_cycle(velocity, gait, flat[k : k + step], phases) for k in range(0, flat.size, step)]
     return np.concatenate(poses).reshape(*amplitudes.shape, 3) if poses else np.zeros((*amplitudes.shape, 3))
 

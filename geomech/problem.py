@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import math
+import numbers
 from collections.abc import Iterable
 
 
@@ -22,6 +24,22 @@ def choose(place: str, word: object, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(word), known, 1, 0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
     raise SceneError(f"{place}: {short(word)} is unknown; {hint}")
+
+
+def number(name: str, value: object, low: float, high: float, whole: bool = False) -> None:
+    """ValueError naming it unless value is a number, or a whole one, from low to high; True and False are none."""
+    if not ((is_whole if whole else is_number)(value) and low <= value <= high):
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {short(value)}")
+
+
+def is_number(value: object) -> bool:
+    """Whether value is one real number; True and False are none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> bool:
+    """Whether value is a whole number, as an int or a float."""
+    return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
 
 
 def short(value: object) -> str:

@@ -14,6 +14,7 @@ from geomech import files
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 LARGEST_FILE = 100_000_000  # bytes, a few million rows
 LARGEST_NUMBER = 1e12
+SMALLEST_NUMBER = 1e-300  # that a period may be
 MOST_FRAMES = 10_000
 FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
 

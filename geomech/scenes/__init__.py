@@ -62,10 +62,10 @@ def inputs(scene: Scene) -> list[Path]:
 
 def parse(text: str, name: str = "scene") -> Scene:
     """The scene of a TOML text; SceneError if it is not one."""
+    if not isinstance(text, str):
+        raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
     try:
         tables = tomllib.loads(text)
-    except TypeError:
-        raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}") from None
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
         raise SceneError(f"{name} is not TOML: {error}") from None
     return from_tables(tables, name, text)

@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.base import halves
 from rft.effects.base import Effect
 from rft.loads import ALONE
-from rft.media.base import require
+from rft.media.base import check_ranges, require
 
 GRAVITY = 9.81  # m/s^2
 PRESSURE_FACTOR = 2.5  # k of Eq. 2, loosely packed 0.3 mm glass (Zhang and Goldman 2014)
@@ -30,6 +30,7 @@ class GrainInertia(Effect):
     depth: float
     strength: float = 1.0
 
+    kind = "grain-inertia"
     breaks = frozenset({"rate independence"})
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
@@ -38,14 +39,7 @@ class GrainInertia(Effect):
     batched = ("frequency", "length", "depth", "strength")
 
     def __post_init__(self):
-        for name, low, high in (
-            ("frequency", 0, 1e4),
-            ("length", 1e-9, 1e6),
-            ("depth", 1e-9, 1e6),
-            ("strength", 0, 1e6),
-        ):
-            value = getattr(self, name)
-            require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
+        check_ranges(self, frequency=(0, 1e4), length=(1e-9, 1e6), depth=(1e-9, 1e6), strength=(0, 1e6))
 
     def load(self, load, medium, body):
         require(medium.dry != (), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
