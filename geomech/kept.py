@@ -17,7 +17,7 @@ WIDTH = 4  # numbers in a row
 
 def beside(output: Path) -> Path:
     """The file that keeps what is done of a sweep to ``output``."""
-    return hidden(output, ".partial")
+    return hidden(output.resolve() if ".." in output.parts else output, ".partial")
 
 
 def keep(path: Path, question: dict, rows: list) -> None:
