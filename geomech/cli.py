@@ -318,7 +318,8 @@ def _sweep(option: str, text: str) -> list[float]:
 def main() -> None:
     """Entry point: one line on standard error and exit code 2 for what the user can mend."""
     for stream in (sys.stdout, sys.stderr):  # names of files may be of no alphabet at all
-        stream.reconfigure(errors="backslashreplace")
+        with contextlib.suppress(AttributeError):  # a stream of a caller's own
+            stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing half-written stays behind
     try:
         code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
