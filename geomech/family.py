@@ -24,7 +24,7 @@ from geomech import se2
 from geomech.connection import Velocity, evaluate
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
-from geomech.problem import number
+from geomech.problem import number, real_array
 from geomech.simulate import turning
 
 
@@ -67,7 +67,7 @@ class Family:
     def area(self, amplitudes) -> np.ndarray:
         """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: exp of the CCF's integral.
         ValueError for amplitudes off the table."""
-        a = np.asarray(amplitudes, float)
+        a = real_array("amplitudes", amplitudes)
         if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
             raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
         density = self._spline(2 * np.pi * self.A.mean(1)).derivative()  # over one cycle, per unit of a

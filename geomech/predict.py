@@ -14,8 +14,8 @@ import numpy as np
 from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Connection, Velocity, evaluate
 from geomech.field import Field
-from geomech.gaits.base import Gait, checked_gait, real_array
-from geomech.problem import number
+from geomech.gaits.base import Gait, checked_gait
+from geomech.problem import number, real_array
 from geomech.simulate import displacement
 
 
@@ -41,7 +41,8 @@ def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases:
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
     """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
-    amplitudes = real_array("amplitudes", checked_gait(gait).amplitude if amplitudes is None else amplitudes)
+    checked_gait(gait)
+    amplitudes = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
     flat = amplitudes.reshape(-1)
     number("phases", phases, 1, 1e9, whole=True)
     step = max(1, SAMPLES_TOGETHER // int(phases))

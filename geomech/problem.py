@@ -42,6 +42,19 @@ def is_whole(value: object) -> bool:
     return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
 
 
+def real_array(name: str, values):
+    """values as a NumPy array of floats, or ValueError naming it."""
+    import numpy as np  # the command starts without it
+
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "iuf":
+            return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be numbers in equal rows, got {short(values)}")
+
+
 def short(value: object) -> str:
     """repr(value) as one line of at most 60 characters."""
     try:

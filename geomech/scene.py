@@ -19,8 +19,8 @@ from geomech import harmonics as harm
 from geomech.curvature import ccf
 from geomech.field import Field
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait, real_array
-from geomech.problem import SceneError, choose, short
+from geomech.gaits.base import checked_gait
+from geomech.problem import SceneError, choose, real_array, short
 from geomech.simulate import displacement
 from rft.balance import checked_body
 from rft.loads import element_load, parse

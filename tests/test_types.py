@@ -9,7 +9,7 @@ import pytest
 from registry import GAITS
 
 import rft
-from geomech import connection, curvature, estimate, family, predict, scenes
+from geomech import connection, curvature, estimate, family, predict, scenes, simulate
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.problem import SceneError
 from geomech.scene import Numerics, Scene
@@ -101,6 +101,7 @@ def geometries(value):
     for tier in (predict.path, predict.direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)
+        yield "gait", lambda tier=tier: tier(velocity, value, [1.0])
         yield "phases", lambda tier=tier: tier(velocity, Circle(), phases=value)
     yield "amplitudes", lambda: predict.direct(velocity, Circle(), amplitudes=value)
     yield "gait", lambda: predict.area(curvature.ccf(fitted), value)
@@ -113,6 +114,9 @@ def geometries(value):
     yield "gait of the scene", lambda: plain.study([1.0], ["direct"], value)
     yield "amplitudes of a study", lambda: plain.study(value, ["direct"])
     yield "gait of the scene", lambda: plain.cycle(value)
+    yield "shape", lambda: fitted(value)
+    yield "xi", lambda: simulate.displacement(value)
+    yield "times", lambda: simulate.trajectory(np.zeros((4, 3)), value)
     yield "scene", lambda: scenes.load(value)
     yield "TOML", lambda: scenes.parse(value)
     yield "tables", lambda: scenes.from_tables(value)
@@ -125,7 +129,8 @@ def geometries(value):
 TAKEN = {
     *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
     *itertools.product(["amplitudes", "amplitudes of a study"], ("empty", "list", "deep", "array", "many")),
-    ("effects", "empty"), *itertools.product(("alpha", "alphadot"), ["array"]),
+    *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
+    ("effects", "empty"),
 }  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.problem import is_whole, number, short
+from geomech.problem import is_whole, number, real_array, short
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 
@@ -84,17 +84,6 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
         raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {short(values)}")
     return array
-
-
-def real_array(name: str, values) -> np.ndarray:
-    """values as an array of floats, or ValueError naming it."""
-    try:
-        array = np.asarray(values)
-        if array.dtype.kind in "iuf":
-            return array.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise ValueError(f"{name} must be numbers in equal rows, got {short(values)}")
 
 
 def checked_gait(gait) -> Gait:
