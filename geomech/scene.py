@@ -345,6 +345,8 @@ class Scene:
         estimate: error of each number in body lengths (`geomech.estimate`). Fields are timed on their own.
         """
         gait, amplitudes = checked_gait(self.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        if amplitudes.ndim != 1:
+            raise SceneError(f"{self.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
         for method in methods:
             self._allow(method)
         out: dict = {"amplitude": amplitudes.tolist()}

@@ -336,8 +336,9 @@ def test_a_sweep_stays_until_it_is_saved(tmp_path, monkeypatch):
     assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "s.png"}
 
 
-def test_the_longest_name_has_room(tmp_path):
-    name = "a" * 252 + ".nc"
+@pytest.mark.parametrize("length", [255, 246])  # of the target's name; 246: that of what is kept fits just so
+def test_the_longest_name_has_room(length, tmp_path):
+    name = "a" * (length - 3) + ".nc"
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", name]
     assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
     assert [p.name for p in tmp_path.iterdir()] == [name]

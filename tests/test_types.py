@@ -128,7 +128,8 @@ def geometries(value):
 
 TAKEN = {
     *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
-    *itertools.product(["amplitudes", "amplitudes of a study"], ("empty", "list", "deep", "array", "many")),
+    *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
+    *itertools.product(["amplitudes of a study"], ("empty", "list")),
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
     ("effects", "empty"),
 }  # fmt: skip
