@@ -6,11 +6,11 @@ import contextlib
 import errno
 import hashlib
 import os
+import secrets
 import shutil
 import sys
-import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from geomech.problem import SceneError
@@ -82,15 +82,15 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 def whole_file(path: str | Path):
     """A path to write to, of the same name; moved to ``path`` on success, removed on failure. SceneError if nothing can
     be written there."""
+    refused = lambda error: SceneError(f"cannot write {path}: {why(error)}; choose another output")
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
             raise OSError("it is no ordinary file")
-        workshop = _Workshop(target, target.parent)
         shown = target.name if target.parent.name == NEW else path
     except (OSError, RuntimeError, ValueError) as error:
-        raise SceneError(f"cannot write {path}: {why(error)}; choose another output") from None
-    with workshop as new:
+        raise refused(error) from None
+    with _Workshop(target, target.parent, refused) as new:
         try:
             yield new / target.name
             os.replace(new / target.name, target)
@@ -102,15 +102,15 @@ def whole_file(path: str | Path):
 def whole_folder(path: str | Path, inputs: Iterable[Path] = ()):
     """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
     SceneError if that cannot be, or if one would replace an input."""
+    refused = lambda error: SceneError(f"cannot write the folder {path}: {why(error)}; choose another with -o")
     try:
         target = Path(path).resolve()
         if os.path.lexists(target) and not target.is_dir():
             raise OSError("it is not a folder")
         there = next(p for p in (target, *target.parents) if p.exists())
-        workshop = _Workshop(target, there)
     except (OSError, RuntimeError, ValueError) as error:
-        raise SceneError(f"cannot write the folder {path}: {why(error)}; choose another with -o") from None
-    with workshop as new:
+        raise refused(error) from None
+    with _Workshop(target, there, refused) as new:
         try:
             yield new
             _move(sorted(new.iterdir()), target, Path(path), inputs)
@@ -141,27 +141,39 @@ class _Workshop:
     """A hidden folder in ``there`` in which what is meant for ``target`` is made; gone at the end.
 
     Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to the
-    same target knows it for a stray, and sweeps it.
+    same target knows it for a stray, and sweeps it. The name is chosen before anything is there, and a signal may come at
+    any moment: then the folder goes all the same. refused: what to raise for an error of the file system at the start.
     """
 
-    def __init__(self, target: Path, there: Path):
-        sweep_strays(target, there)
-        self.folder = Path(tempfile.mkdtemp(prefix=_prefix(target), dir=there))
-        try:
-            self.mark = (self.folder / MARK).open("wb", buffering=0)
-            if _locked(self.mark):
-                self.mark.write(_words(target))
-            (self.folder / NEW).mkdir()
-        except BaseException:
-            _discard(self.folder)
-            raise
+    def __init__(self, target: Path, there: Path, refused: Callable[[Exception], Exception]):
+        self.target, self.there, self.refused = target, there, refused
+        self.folder = there / f"{_prefix(target)}{secrets.token_hex(8)}"
+        self.mark = None
 
     def __enter__(self) -> Path:
+        try:
+            sweep_strays(self.target, self.there)
+            self.folder.mkdir(0o700)
+            self.mark = (self.folder / MARK).open("wb", buffering=0)
+            if _locked(self.mark):
+                self.mark.write(_words(self.target))
+            (self.folder / NEW).mkdir()
+        except BaseException as error:
+            self.__exit__()
+            if isinstance(error, (OSError, ValueError)):
+                raise self.refused(error) from None
+            raise
         return self.folder / NEW
 
     def __exit__(self, *_) -> None:
-        _discard(self.folder)
-        self.mark.close()
+        try:
+            _discard(self.folder)
+        except BaseException:  # a signal in the middle
+            _discard(self.folder)
+            raise
+        finally:
+            if self.mark:
+                self.mark.close()
 
 
 def _key(target: Path) -> str:

@@ -141,6 +141,39 @@ def test_a_folder_does_not_replace_an_input(tmp_path):
     assert file.read_text() == "input"
 
 
+@pytest.fixture(scope="module")
+def heard():
+    """A list of functions that are told of every event of the file system; a hook of Python's cannot be taken out."""
+    listeners = []
+
+    def tell(event, args):
+        if listeners and event.partition(".")[0] in ("os", "open", "shutil"):
+            listeners[0](event, str(args))
+
+    sys.addaudithook(tell)
+    return listeners
+
+
+@pytest.mark.parametrize("call", range(1, 40))
+@pytest.mark.parametrize("writer", WRITERS)
+def test_a_stop_at_any_moment_leaves_nothing(writer, call, heard, tmp_path):
+    """An interrupt at the n-th event of the file system: in the making, the writing and the tidying up."""
+    seen = []
+
+    def stop(event, args):
+        if str(tmp_path) in args:
+            seen.append(event)
+            if len(seen) == call:
+                heard.clear()
+                raise KeyboardInterrupt
+
+    heard.append(stop)
+    with contextlib.suppress(KeyboardInterrupt):
+        write(writer, tmp_path / "out")
+    heard.clear()
+    assert not [p for p in tmp_path.rglob("*") if p.name.startswith(".geomech-")], seen
+
+
 LIMITED = """
 import resource, sys
 from geomech import files
