@@ -17,10 +17,11 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.problem import SceneError, choose, whole_file
+from geomech.files import refuse_inputs, whole_file, whole_folder
+from geomech.problem import SceneError, choose
 
 app = typer.Typer(
-    add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, no_args_is_help=True,
+    add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait.",
 )  # fmt: skip
 
@@ -31,6 +32,17 @@ SceneArgument = Annotated[
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
+
+
+def _folder(text: str | Path) -> Path:
+    if not str(text):
+        raise typer.BadParameter("an empty name: name a folder, '.' for this one")
+    return Path(text)
+
+
+FolderOption = Annotated[
+    Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=_folder)
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
@@ -39,17 +51,16 @@ PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is
 @app.command()
 def run(
     name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
-        "results"
-    ),
+    out: FolderOption = Path("results"),
     yes: YesOption = False,
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech import report
-    from geomech.scenes import load
+    from geomech.scenes import inputs, load
 
     scene = load(name)
-    with report.whole_folder(out) as folder, progress(f"field of {scene.name}") as bar:
+    report.refuse_folder(scene, out, inputs(scene))
+    with whole_folder(out, inputs(scene)) as folder, progress(f"field of {scene.name}") as bar:
         allow(scene, report.cost(scene), yes)
         tables = report.write(scene, folder, bar)
     for title, table in tables.items():
@@ -134,7 +145,7 @@ def displacement(
     values = _sweep("--amplitudes", amplitudes)
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
     scene = _loaded(name, grid, extent)
-    _check_outputs(plot, plot)
+    _check_outputs(scene, None, plot)
     with progress(f"displacement of {scene.name}") as bar:
         if tol is None:
             allow(scene, scene.cost(values, chosen or scene.methods), yes)
@@ -154,23 +165,22 @@ def displacement(
 @app.command()
 def accuracy(
     name: SceneArgument,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results")] = Path(
-        "accuracy"
-    ),
+    out: FolderOption = Path("accuracy"),
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
     from geomech import accuracy as study
-    from geomech import plots, report
+    from geomech import plots
+    from geomech.scenes import inputs
 
     scene = _loaded(name, None, None)
-    with report.whole_folder(out) as folder, progress(f"accuracy of {scene.name}") as bar:
+    with whole_folder(out, inputs(scene)) as folder, progress(f"accuracy of {scene.name}") as bar:
         allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)
         text = "\n".join([study.table(results), "", *study.sentences(results)])
         (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
-        (folder / "accuracy.txt").write_text(text + "\n")
+        (folder / "accuracy.txt").write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
         fig = plots.work_precision_figure(results)
         for ending in ("png", "pdf"):
             plots.save(fig, folder / f"accuracy.{ending}")
@@ -186,7 +196,7 @@ def sweep(
     yes: YesOption = False,
 ):
     """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
-    from geomech import plots
+    from geomech import kept, plots
     from geomech import sweep as sweeping
 
     axes = {}
@@ -199,13 +209,15 @@ def sweep(
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
     scene = _loaded(name, None, None)
-    _check_outputs(out, plot)
+    partial = kept.beside(out)
+    _check_outputs(scene, out, plot, partial)
     with progress(f"sweep of {scene.name}") as bar:
         allow(scene, sweeping.cost(scene, axes), yes)
-        results = sweeping.sweep(scene, axes, out.with_name(f".{out.name}.partial"), bar)
+        results = sweeping.sweep(scene, axes, partial, bar)
     sweeping.save(out, scene, results)
     if plot:
         plots.save(sweeping.draw(scene, results), plot)
+    partial.unlink(missing_ok=True)
     net = plots.net(results["displacement"])
     print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.unit}, in {out}")
 
@@ -271,7 +283,7 @@ def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool
         raise SceneError(
             f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
         )
-    _check_outputs(output, plot)
+    _check_outputs(scene, output, plot)
     allow(scene, price([built(scene, "path")]), yes)
     with progress(f"field of {scene.name}") as bar:
         scene.compute_field(bar)
@@ -283,12 +295,18 @@ def _is_netcdf(path: Path) -> None:
         raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc")
 
 
-def _check_outputs(output: Path | None, plot: Path | None) -> None:
+def _check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
+    """SceneError unless the output and the plot can be written and are, like ``more``, no input of the scene."""
     from geomech import plots
+    from geomech.scenes import inputs
 
     if plot:
         plots.check_format(plot)
-    for path in filter(None, {output, plot}):
+    outputs = list(filter(None, {output, plot}))
+    refuse_inputs([*outputs, *more], inputs(scene))
+    if len(outputs) == 2:
+        refuse_inputs(outputs[:1], outputs[1:])
+    for path in outputs:
         with contextlib.suppress(_Unused), whole_file(path):
             raise _Unused
 
@@ -364,7 +382,7 @@ def main(argv: list[str] | None = None) -> None:
 
 def _run(argv: list[str] | None) -> int:
     try:
-        code = app(args=argv, standalone_mode=False)
+        code = app(args=(sys.argv[1:] if argv is None else argv) or ["--help"], standalone_mode=False)
         if code == 130:  # an interrupt that typer caught
             raise KeyboardInterrupt
         if sys.stdout:

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from geomech.field import Field
+from geomech.problem import is_whole, number, short
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
@@ -46,6 +47,8 @@ class Connection:
 def evaluate(velocity: Velocity, alpha, alphadot) -> np.ndarray:
     """velocity(alpha, alphadot), or ValueError if that is not finite and of shape (..., 3)."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
+    if not callable(velocity):
+        raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
     xi = np.asarray(velocity(alpha, alphadot))
     if xi.shape != shape:
         raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
@@ -57,20 +60,22 @@ def evaluate(velocity: Velocity, alpha, alphadot) -> np.ndarray:
 
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
     """``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
-    if not (np.isfinite(points) and int(points) == points and points >= 4):
-        raise ValueError(f"grid must be a whole number of at least 4 points, got {points!r}")
-    if not 1e-9 <= extent <= 1e6:
-        raise ValueError(f"extent must be a finite angle > 0 in rad, 1e-9 to 1e6, got {extent!r}")
+    number("joints", joints, 1, 10_000, whole=True)
+    number("grid", points, 4, 1e6, whole=True)
+    number("extent", extent, 1e-9, 1e6)
     axis = np.linspace(-extent, extent, int(points))
-    return ((axis - axis[::-1]) / 2,) * joints  # symmetric to the last digit, for `fit`'s mirror
+    return ((axis - axis[::-1]) / 2,) * int(joints)  # symmetric to the last digit, for `fit`'s mirror
 
 
 def directions(joints: int, count: int) -> np.ndarray:
     """Unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
     low-discrepancy sequence for more."""
+    number("joints", joints, 1, 10_000, whole=True)
     least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
-    if not (np.isfinite(count) and int(count) == count and count >= least):
-        raise ValueError(f"directions must be a whole number of at least {least} for {joints} joints, got {count!r}")
+    if not (is_whole(count) and count >= least):
+        raise ValueError(
+            f"directions must be a whole number of at least {least} for {joints} joints, got {short(count)}"
+        )
     if joints == 1:
         return np.ones((1, 1))
     if joints == 2:

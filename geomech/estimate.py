@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.gaits import Gait
-from geomech.problem import SceneError
+from geomech.problem import SceneError, is_number, short
 from geomech.simulate import displacement
 
 if TYPE_CHECKING:
@@ -135,8 +135,8 @@ def cheapest(
     """
     from geomech import cost
 
-    if not (np.isfinite(tol) and tol > 0):
-        raise SceneError(f"--tol must be a number > 0 in body lengths, got {tol!r}")
+    if not (is_number(tol) and 0 < tol <= 1e300):
+        raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
     if tol <= settling(scene):
         raise SceneError(f"{scene.name}: a march with these effects repeats to {settling(scene):g} only: raise --tol")

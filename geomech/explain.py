@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+from geomech.gaits import KINDS as GAITS
+from geomech.problem import short
 from geomech.scene import ALGEBRAIC, Scene
+from rft.bodies import KINDS as BODIES
 from rft.effects import ENGINES, KINDS, PREMISES
+from rft.media import LAWS
 
 
 def explain(scene: Scene) -> str:
     """Effects on and off, the engine and why, the cost of each effect and the results that are left, as plain text."""
-    kinds = {kind: name for name, kind in KINDS.items()}
-    on = [kinds[type(e)] for e in scene.effects]
-    lines = [f"{scene.name}: {scene.medium}, {scene.body}, {type(scene.gait).__name__.lower()} gait"]
+    medium, body = said(_kind(LAWS, scene.medium), scene.medium), said(_kind(BODIES, scene.body), scene.body)
+    lines = [f"{scene.name}: {medium}, {body}, {_kind(GAITS, scene.gait)} gait"]
     for effect in scene.effects:
         broken = ", ".join(sorted(effect.breaks)) or "nothing"
         lines.append(
-            f"on:  {kinds[type(effect)]}: {effect}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}, "
+            f"on:  {said(effect.kind, effect)}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}, "
             f"order {effect.order}"
         )
         if assumed := effect.assumes(scene.medium):
             lines.append(f"     assumes {assumed}")
-    off = [name for name in KINDS if name not in on]
+    off = [name for name in KINDS if name not in [e.kind for e in scene.effects]]
     lines.append("off, not evaluated: " + (", ".join(off) or "none"))
-    lines.append(f"engine: {scene.engine} ({ENGINES[scene.engine]}): {_why(scene, kinds)}")
+    lines.append(f"engine: {scene.engine} ({ENGINES[scene.engine]}): {_why(scene)}")
     lines.append("tiers: " + ", ".join(scene.tiers))
-    if blame := ", ".join(kinds[type(e)] for e in scene.effects if e.breaks):
+    if blame := ", ".join(e.kind for e in scene.effects if e.breaks):
         lost = "connection, CCF, area, path and harmonic tiers"
         if scene.engine != "algebraic":
             lost += ", adapted tier, velocity at a single shape"
@@ -35,10 +40,21 @@ def explain(scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def _why(scene: Scene, kinds) -> str:
+def said(kind: str, thing) -> str:
+    """What a part of a scene is and its numbers, as a scene has them."""
+    values = [f"{f.name} = {short(getattr(thing, f.name))}" for f in dataclasses.fields(thing)]
+    return f"{kind} ({', '.join(values)})" if values else kind
+
+
+def _kind(kinds: dict, thing) -> str:
+    """Its name in ``kinds``, or that of its class."""
+    return next((name for name, kind in kinds.items() if type(thing) is kind), type(thing).__name__)
+
+
+def _why(scene: Scene) -> str:
     """What makes the scene's engine necessary."""
     reasons = [
-        f"with {kinds[type(e)]} {PREMISES[premise].split(':')[0]}"
+        f"with {e.kind} {PREMISES[premise].split(':')[0]}"
         for e in scene.effects
         for premise in sorted(e.breaks & ALGEBRAIC)
     ]

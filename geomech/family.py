@@ -24,6 +24,8 @@ import numpy as np
 from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
+from geomech.problem import number, real_array
 from geomech.simulate import displacement, turning
 
 
@@ -71,7 +73,7 @@ class Family:
     def area(self, amplitudes) -> np.ndarray:
         """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of which the
         table has the exact value at each of its curves. ValueError for amplitudes off the table."""
-        a = np.asarray(amplitudes, float)
+        a = real_array("amplitudes", amplitudes)
         if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
             raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
         moved, start = displacement(self.xi), self.heading[:, 0]
@@ -87,10 +89,10 @@ def fit(
 
     Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
     """
-    if not (np.isfinite(largest) and largest > 0):
-        raise ValueError(f"largest amplitude must be finite and > 0, got {largest!r}")
-    if not count >= 4:
-        raise ValueError(f"a family needs at least 4 curves, got {count!r}")
+    checked_gait(gait)
+    number("largest amplitude", largest, 1e-300, 1e300)
+    number("curves", count, 4, 1e6, whole=True)
+    count = int(count)
     amplitudes = largest * np.arange(count + 1) / count
     xi = np.zeros((count + 1, phases, 3))
     step = max(1, SAMPLES_TOGETHER // phases)

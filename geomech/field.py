@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech.problem import real_array
+
 
 @dataclass(frozen=True)
 class Field:
@@ -56,7 +58,7 @@ class Field:
 
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""
-        alpha = np.asarray(alpha, float)
+        alpha = real_array("alpha", alpha)
         if alpha.ndim == 0 or alpha.shape[-1] != self.joints or not np.isfinite(alpha).all():
             raise ValueError(f"alpha must be finite and of shape (..., {self.joints}), got {alpha.shape}")
         for k, axis in enumerate(self.axes):

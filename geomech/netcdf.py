@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.problem import whole_file
+from geomech.files import whole_file
 from geomech.scene import Scene
 
 COMPONENTS = ("x", "y", "theta")
@@ -19,10 +19,10 @@ def save_connection(path: str | Path, scene: Scene) -> None:
 
     fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = f"Local connection and curvature constraint function of the scene {scene.name}".encode()
+        file.title = attribute(f"Local connection and curvature constraint function of the scene {scene.name}")
         for key, value in about(scene).items():
             setattr(file, key, value)
-        file.scene = (scene.text or repr(scene)).encode()
+        file.scene = attribute(scene.text or repr(scene))
         file.numerics = repr(scene.numerics)
         _coordinates(file, fitted)
         angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))
@@ -58,6 +58,11 @@ def about(scene: Scene) -> dict:
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
     }
+
+
+def attribute(text: str) -> bytes:
+    """In UTF-8; what is none in a file name is escaped."""
+    return text.encode("utf-8", "backslashreplace")
 
 
 def _coordinates(file, fitted) -> None:

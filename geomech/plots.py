@@ -10,8 +10,9 @@ import numpy as np
 
 from geomech.connection import Connection
 from geomech.field import Field
+from geomech.files import whole_file
 from geomech.gaits import Gait
-from geomech.problem import SceneError, whole_file
+from geomech.problem import SceneError
 
 STYLE = {
     "font.size": 9,

@@ -16,7 +16,8 @@ import numpy as np
 from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Connection, Velocity, evaluate
 from geomech.field import Field
-from geomech.gaits.base import Gait
+from geomech.gaits.base import Gait, checked_gait
+from geomech.problem import number, real_array
 from geomech.simulate import displacement
 
 
@@ -26,6 +27,7 @@ def area(ccf: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarr
     By Green's theorem the integral is that of P d(alpha_2) along the gait, dP/d(alpha_1) = CCF. Order 3 in the gait's
     size in a generic frame, 4 where A vanishes at its centre.
     """
+    checked_gait(gait)
     if ccf.joints != 2 or gait.joints != 2:
         raise ValueError(f"the area tier needs two joints, got a field of {ccf.joints} and a gait of {gait.joints}")
     potential = ccf.antiderivative(0)
@@ -45,8 +47,10 @@ def path(connection: Connection | Velocity, gait: Gait, amplitudes=None, phases:
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
     """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
+    checked_gait(gait)
     amplitudes = gait.amplitude if amplitudes is None else amplitudes
-    step = SAMPLES_TOGETHER // phases
+    number("phases", phases, 1, 1e9, whole=True)
+    step = SAMPLES_TOGETHER // int(phases)
     return in_groups(lambda some: _cycle(velocity, gait, some, phases), amplitudes, step)
 
 
@@ -58,7 +62,7 @@ def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarra
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
     """f(some) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded: (..., ...)."""
-    amplitudes = np.asarray(amplitudes, float)
+    amplitudes = real_array("amplitudes", amplitudes)
     flat, size = amplitudes.reshape(-1), max(1, size)
     found = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
     return np.concatenate(found).reshape(*amplitudes.shape, -1) if found else np.zeros((*amplitudes.shape, 3))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import os
-import tempfile
+import math
+import numbers
 from collections.abc import Iterable
-from pathlib import Path
 
 
 class SceneError(ValueError):
@@ -25,41 +23,42 @@ def choose(place: str, word: object, known: Iterable[str]) -> str:
         return word
     near = difflib.get_close_matches(str(word), known, 1, 0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
-    raise SceneError(f"{place}: {_short(word)} is unknown; {hint}")
+    raise SceneError(f"{place}: {short(word)} is unknown; {hint}")
 
 
-def _short(value: object) -> str:
+def number(name: str, value: object, low: float, high: float, whole: bool = False) -> None:
+    """ValueError naming it unless value is a number, or a whole one, from low to high; True and False are none."""
+    if not ((is_whole if whole else is_number)(value) and low <= value <= high):
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {short(value)}")
+
+
+def is_number(value: object) -> bool:
+    """Whether value is one real number; True and False are none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> bool:
+    """Whether value is a whole number, as an int or a float."""
+    return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
+
+
+def real_array(name: str, values):
+    """values as a NumPy array of floats, or ValueError naming it."""
+    import numpy as np  # the command starts without it
+
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "iuf":
+            return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be numbers in equal rows, got {short(values)}")
+
+
+def short(value: object) -> str:
+    """repr(value) as one line of at most 60 characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of more digits than Python prints
         text = "a very long number"
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-@contextlib.contextmanager
-def whole_file(path: str | Path):
-    """A path to write to, with the same ending; moved to ``path`` on success, removed on failure. SceneError if
-    nothing can be written there."""
-    try:
-        target = Path(path).resolve()
-        if target.exists() and not target.is_file():
-            raise OSError("it is no ordinary file")
-        handle, part = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-        os.close(handle)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise SceneError(
-            f"cannot write {path}: {getattr(error, 'strerror', None) or error}; choose another output"
-        ) from None
-    try:
-        yield Path(part)
-        os.chmod(part, 0o666 & ~_umask())
-        os.replace(part, target)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(part)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

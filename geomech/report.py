@@ -2,71 +2,64 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import shutil
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 
 from geomech import plots
 from geomech.cost import Cost, price, study
+from geomech.files import read, refuse_inputs
 from geomech.gaits import Butterfly, Circle, Gait
 from geomech.netcdf import save_connection
 from geomech.problem import SceneError
 from geomech.scene import Scene
 
 AMPLITUDES = 10  # in the study that `run` makes of each gait
+SCENE, TABLES = "scene.toml", "displacement.json"
 
 
-@contextlib.contextmanager
-def whole_folder(path: str | Path):
-    """A folder to fill; its files move to ``path`` on success and vanish on failure. SceneError if that cannot be."""
+def refuse_folder(scene: Scene, folder: Path, inputs: Iterable[Path]) -> None:
+    """SceneError if the files of `write` would replace an input, or a scene that no `run` has left in ``folder``."""
+    there = folder / SCENE
+    refuse_inputs([there, folder / TABLES], inputs)
+    if os.path.lexists(there) and not os.path.lexists(folder / TABLES) and not _holds(there, scene.text):
+        raise SceneError(f"cannot write {there}: another scene stands there; choose another folder with -o")
+
+
+def _holds(path: Path, text: str) -> bool:
     try:
-        target = Path(path).resolve()
-        if os.path.lexists(target) and not target.is_dir():
-            raise OSError("it is not a folder")
-        there = next(p for p in (target, *target.parents) if p.exists())
-        part = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=there))
-    except (OSError, RuntimeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise SceneError(f"cannot write the folder {path}: {reason}; choose another with -o") from None
-    try:
-        yield part
-        files = list(part.iterdir())
-        if blocked := [f.name for f in files if (target / f.name).is_dir()]:
-            raise SceneError(f"cannot write {target / blocked[0]}: it is a folder; choose another with -o")
-        target.mkdir(parents=True, exist_ok=True)
-        for file in files:
-            file.replace(target / file.name)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        return read(path, 4 * len(text) + 4) == text.encode()
+    except (OSError, ValueError):
+        return False
 
 
 def write(scene: Scene, folder: Path, progress: Callable) -> dict[str, dict]:
     """Compute everything and write it; returns the displacement tables by gait."""
     gaits = _gaits(scene)
+    amplitudes = [reachable(scene, gait) for gait in gaits]
     if "area" in scene.methods:
         scene.compute_field(progress)
         save_connection(folder / "connection.nc", scene)
         _save(plots.connection_figure(scene.fitted, scene.unit), folder / "connection")
         _save(plots.ccf_figure(scene.curvature, gaits, scene.unit, scene.curvature_error), folder / "ccf")
-    tables = {type(g).__name__.lower(): scene.study(reachable(scene, g), scene.methods, g) for g in gaits}
+    tables = {type(g).__name__.lower(): scene.study(a, scene.methods, g) for g, a in zip(gaits, amplitudes)}
     fig, axes = plots.figure(3.6 * len(gaits), 3.7, len(gaits))
     for ax, gait, table in zip(axes[0], gaits, tables.values()):
         plots.displacement(table, scene.unit, ax, gait=gait, marker="o")
     _save(fig, folder / "displacement")
-    (folder / "displacement.json").write_text(json.dumps(tables, indent=1) + "\n")
-    (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
+    (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
+    (folder / SCENE).write_text(scene.text, encoding="utf-8")
     return tables
 
 
 def cost(scene: Scene) -> Cost:
-    """Of `write`."""
+    """Of `write`; SceneError, before anything is computed, for what it refuses."""
     gaits = _gaits(scene)
+    for gait in gaits:
+        reachable(scene, gait)
     return price([job for g in gaits for job in study(scene, scene.methods, AMPLITUDES, g, tables=g is gaits[0])])
 
 
@@ -77,17 +70,18 @@ def _gaits(scene: Scene) -> list[Gait]:
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes up to the largest that keeps the gait inside the field; up to its own where the body has no field."""
-    if "path" not in scene.methods:
-        return [float(f"{a:.3g}") for a in gait.amplitude * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
-    t = np.linspace(0, 2 * np.pi, 721)
-    room = scene.numerics.extent - np.abs(np.array(gait.centre or 0.0)).max()
-    reach = np.abs(gait.unit(t)).max()
-    if reach == 0:
+    """Amplitudes up to the largest that keeps the gait inside the field; up to its own where the body has no field.
+    SceneError for a gait that does not move or lies outside."""
+    own = "path" not in scene.methods
+    unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
+    if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+    if own:
+        return [float(f"{a:.3g}") for a in gait.amplitude * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
+    room = scene.numerics.extent - np.abs(np.array(gait.centre or 0.0)).max()
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
-    top = 0.999 * room / reach
+    top = 0.999 * room / np.abs(unit).max()
     return [float(f"{a:.3g}") for a in top * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
 
 

@@ -21,12 +21,14 @@ from geomech.curvature import ccf
 from geomech.curvature import error as ccf_error
 from geomech.field import Field
 from geomech.gaits import Gait
-from geomech.problem import SceneError, choose
+from geomech.gaits.base import checked_gait
+from geomech.problem import SceneError, choose, real_array, short
 from geomech.simulate import displacement
+from rft.balance import checked_body
 from rft.bodies.base import halves
-from rft.effects import KINDS as EFFECTS
-from rft.loads import element_load
+from rft.loads import element_load, parse
 from rft.media import is_linear
+from rft.media.base import check_ranges, in_range
 
 if TYPE_CHECKING:
     from geomech.cost import Cost
@@ -37,6 +39,12 @@ VALUES_TOGETHER = (
     1 << 22
 )  # of a gait run side by side, angles and velocities: some 500 MB with all that is made of them
 ALGEBRAIC = {"symmetry", "no memory", "no inertia"}  # premises of a body velocity that follows from shape alone
+
+
+WHOLE = {  # numbers of [numerics], from and to
+    "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
+    "harmonics": (1, 999), "curves": (4, 4096), "cycles": (1, 10_000),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -60,23 +68,14 @@ class Numerics:
     cycles: int | None = None
 
     def __post_init__(self):
-        for name, low, high in (("regularisation", 1e-12, 1.0), ("tolerance", 1e-13, 1.0), ("extent", 1e-6, 100.0)):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name} must be a number from {low:g} to {high:g}, got {value!r}")
-        for name, low, high in (
-            ("directions", 2, 4096),
-            ("grid", 4, 4096),
-            ("phases", 8, 1_000_000),
-            ("curves", 4, 4096),
-            ("cycles", 1, 10_000),
-        ):
-            value = getattr(self, name)
-            if value is not None and not (low <= value <= high and int(value) == value):
-                raise ValueError(f"{name} must be a whole number from {low} to {high}, got {getattr(self, name)!r}")
-        if self.harmonics not in range(1, 1000, 2):
+        parse(self.loads)
+        check_ranges(self, regularisation=(1e-12, 1), tolerance=(1e-13, 1), extent=(1e-6, 100))
+        for name, (low, high) in WHOLE.items():
+            if name not in ("directions", "cycles") or getattr(self, name) is not None:
+                in_range(name, getattr(self, name), low, high, whole=True)
+        if self.harmonics % 2 == 0:
             raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
-        if self.interpolation not in (1, 2, 3, 4, 5) or self.interpolation >= self.grid:
+        if self.interpolation >= self.grid:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
 
 
@@ -106,6 +105,7 @@ class Scene:
     text: str = ""
 
     def __post_init__(self):
+        self._check_types()
         if self.gait.joints != self.body.joints:
             kind = type(self.gait).__name__.lower()
             raise SceneError(
@@ -120,17 +120,32 @@ class Scene:
         kinds = [type(e) for e in self.effects]
         for effect in self.effects:
             if kinds.count(type(effect)) > 1:
-                raise SceneError(f"{self.name}: [[effects]] {type(effect).__name__} is asked for twice: keep one")
+                raise SceneError(f"{self.name}: [[effects]] {effect.kind} is asked for twice: keep one")
             try:
                 effect.load(None, self.medium, self.body)
             except ValueError as error:
                 raise SceneError(f"{self.name}: [[effects]] {error}: drop it, or change the medium") from None
 
+    def _check_types(self) -> None:
+        """SceneError if a part is nothing of its kind."""
+        try:
+            for name in ("name", "text"):
+                if not isinstance(getattr(self, name), str):
+                    raise ValueError(f"{name} must be text, got {short(getattr(self, name))}")
+            if not isinstance(self.numerics, Numerics):
+                raise ValueError(f"numerics must be Numerics(...), got {short(self.numerics)}")
+            element_load(self.medium)
+            checked_body(self.body)
+            checked_gait(self.gait)
+            rft.effects.broken(self.effects)
+        except ValueError as error:
+            raise SceneError(f"{self.name}: {error}") from None
+
     def _agree(self) -> None:
         """SceneError if effects, or the body, say different things of the same swimmer."""
         sized = self.body.length != 1.0
         for what, said in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
-            said += [(type(e).__name__, getattr(e, what)) for e in self.effects if hasattr(e, what)]
+            said += [(e.kind, getattr(e, what)) for e in self.effects if hasattr(e, what)]
             for name, value in said[1:]:
                 if np.any(np.asarray(value) != said[0][1]):
                     raise SceneError(
@@ -166,7 +181,8 @@ class Scene:
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
         """A gait, or the scene's own, run by the scene's engine for amplitudes (...,), all at once; see `run`."""
-        return self.run(*(gait or self.gait).cycle(phases or self.numerics.phases, amplitudes), work)
+        gait = checked_gait(self.gait if gait is None else gait)
+        return self.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the scene's engine.
@@ -303,7 +319,7 @@ class Scene:
 
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
-        gait, phases = gait or self.gait, self.numerics.phases
+        gait, phases = self.gait if gait is None else checked_gait(gait), self.numerics.phases
         self._allow(method)
         if method == "area":
             return predict.area(self.curvature, gait, amplitudes, phases)
@@ -328,11 +344,10 @@ class Scene:
         self._refuse("connection or CCF", set(rft.effects.PREMISES), "use the direct tier")
 
     def _refuse(self, what: str, premises: set[str], instead: str) -> None:
-        kinds = {kind: name for name, kind in EFFECTS.items()}
         for effect in self.effects:
             if effect.breaks & premises:
                 raise SceneError(
-                    f"{self.name}: no {what} with the effect {kinds[type(effect)]}, which breaks "
+                    f"{self.name}: no {what} with the effect {effect.kind}, which breaks "
                     f"{', '.join(sorted(effect.breaks))}: {instead}, or drop the effect"
                 )
 
@@ -359,7 +374,9 @@ class Scene:
         estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.estimate`). Fields
         are timed on their own.
         """
-        gait, amplitudes = gait or self.gait, np.array(amplitudes, float)
+        gait, amplitudes = checked_gait(self.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        if amplitudes.ndim != 1:
+            raise SceneError(f"{self.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
         for method in methods:
             self._allow(method)
         out: dict = {"amplitude": amplitudes.tolist()}

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.problem import real_array, short
+
 
 def turning(xi) -> np.ndarray:
     """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
@@ -40,7 +42,9 @@ def displacement(xi) -> np.ndarray:
 
 def trajectory(xi, phases) -> np.ndarray:
     """Poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
-    s, t = _spectrum(xi), np.asarray(phases, float)
+    s, t = _spectrum(xi), real_array("phases", phases)
+    if t.ndim != 1 or not np.isfinite(t).all():
+        raise ValueError(f"phases must be a list of finite numbers, got {short(t)}")
     turns = (s.mean_turn + s.k)[..., None, :]
     span = t[:, None]
     reach = span * np.exp(0.5j * turns * span) * np.sinc(turns * span / (2 * np.pi))
@@ -50,7 +54,7 @@ def trajectory(xi, phases) -> np.ndarray:
 
 
 def _spectrum(xi) -> _Spectrum:
-    xi = np.asarray(xi, float)
+    xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3 or xi.shape[-2] < 3:
         raise ValueError(f"xi must have shape (..., N >= 3, 3), got {xi.shape}")
     if not np.isfinite(xi).all():

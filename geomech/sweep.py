@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import hashlib
 import itertools
-import json
+import time
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from geomech import estimate
+import rft
+from geomech import __version__, estimate, kept
 from geomech.cost import Cost, direct, price
+from geomech.files import note, whole_file
 from geomech.gaits import Gait
-from geomech.netcdf import COMPONENTS
-from geomech.problem import SceneError, whole_file
+from geomech.netcdf import COMPONENTS, attribute
+from geomech.problem import SceneError
 from geomech.scene import Scene
 from geomech.scenes import from_tables
 from rft.effects import broken, together
@@ -25,7 +25,8 @@ from rft.effects import broken, together
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
-SAVE_EVERY = 2.0  # seconds between savings of what there is
+SAVE_EVERY = 2.0  # seconds between savings of what there is, and more where saving takes long:
+PATIENCE = 20  # times as long
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
@@ -52,41 +53,28 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
 
 
 def sweep(
-    scene: Scene, over: Mapping[str, list[float]], kept: Path | None = None, progress: Callable | None = None
+    scene: Scene, over: Mapping[str, list[float]], partial: Path | None = None, progress: Callable | None = None
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}
     by the direct tier; estimates as in `estimate.direct`.
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
-    solver together. kept: a file that holds what is done and is taken up again when the
-    same sweep is asked for; removed at the end. SceneError if a point of the grid makes no scene.
+    solver together. partial: a file that keeps what is done (`geomech.kept`) and is taken up again when the same sweep is
+    asked for; it is the caller's to remove, once the results are saved. SceneError if a point of the grid makes no scene.
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
-    width, total = len(amplitudes or [0]), int(np.prod(shape))
-    rows = _taken_up(kept, scene, values)
-    saved = _now()
-    try:
-        while len(rows) < total:
-            k, done = divmod(len(rows), width)
+    with _Rows(partial, question(scene, values), int(np.prod(shape))) as rows:
+        while len(rows) < rows.total:
+            k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
             first = _scene_at(tables, scene, names, points[k])
             most = min(SAMPLES_TOGETHER, first.at_once(first.numerics.phases))
-            beyond = points[k + 1 : k + max(1, most // width)] if done == 0 else []
+            beyond = points[k + 1 : k + max(1, most // len(amplitudes or [0]))] if done == 0 else []
             batch = [first, *(_scene_at(tables, scene, names, p) for p in beyond)]
-            rows += _rows(batch, amplitudes[done : done + most] if amplitudes else None)
+            rows.add(_rows(batch, amplitudes[done : done + most] if amplitudes else None))
             if progress:
-                progress(len(rows) / total)
-            if kept and _now() - saved > SAVE_EVERY:
-                _keep(kept, scene, values, rows)
-                saved = _now()
-    except BaseException as error:
-        if kept and rows:
-            _keep(kept, scene, values, rows)
-            error.add_note(f"{len(rows)} of {total} points are kept in {kept}: the same command goes on from there")
-        raise
-    if kept:
-        kept.unlink(missing_ok=True)
-    flat = np.array(rows).reshape(*shape, 5)
+                progress(len(rows) / rows.total)
+    flat = np.array(list(rows)).reshape(*shape, kept.WIDTH)
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
     errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
@@ -108,10 +96,25 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     amplitude last; SceneError if they make no sweep."""
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
     values = {k: [float(x) for x in over[k]] for k in names}
-    shape = tuple(len(v) for v in values.values())
-    if not names or not 0 < np.prod(shape) <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST} points, got {int(np.prod(shape)) if names else 0}")
+    total = int(np.prod([len(v) for v in values.values()])) if names else 0
+    if not 0 < total <= LARGEST:
+        raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
     outer = [values[k] for k in names if k != AMPLITUDE]
+    tables = _tables(scene)
+    for corner in _corners(outer):
+        _scene_at(tables, scene, names, corner)  # refuse before computing
+    return tables, names, values, list(itertools.product(*outer))
+
+
+def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
+    """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
+    parts = {name: repr(getattr(scene, name)) for name in ("medium", "body", "gait", "effects", "numerics")}
+    over = [[name, list(x)] for name, x in values.items()]
+    return {"geomech": __version__, "solver": rft.SOLVER, "scene": scene.text, **parts, "over": over}
+
+
+def _tables(scene: Scene) -> dict:
+    """The scene's TOML with its numerics of now; SceneError if it is not what its text says."""
     if not scene.text:
         raise SceneError(f"{scene.name}: a sweep takes a scene that was read from TOML")
     numerics = {k: v for k, v in dataclasses.asdict(scene.numerics).items() if v is not None}
@@ -120,9 +123,44 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
         raise SceneError(
             f"{scene.name}: a sweep takes a scene as its TOML text has it: change that, or sweep the change"
         )
-    for corner in _corners(outer):
-        _scene_at(tables, scene, names, corner)  # refuse before computing
-    return tables, names, values, list(itertools.product(*outer))
+    return tables
+
+
+class _Rows(list):
+    """The rows done so far, saved to ``path`` every now and then, and when computing ends for whatever reason."""
+
+    def __init__(self, path: Path | None, question: dict, total: int):
+        super().__init__(kept.taken_up(path, question, total))
+        self.path, self.question, self.total, self.saved, self.told = path, question, total, len(self), False
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def add(self, rows: list) -> None:
+        self += rows
+        if time.monotonic() > self.due:
+            self._save()
+
+    def _save(self) -> None:
+        """A disk that is full now is no reason to lose what is computed."""
+        start = time.monotonic()
+        if self.path and len(self) > self.saved:
+            try:
+                kept.keep(self.path, self.question, list(self))
+                self.saved = len(self)
+            except (SceneError, OSError) as error:
+                if not self.told:
+                    note(f"what is done of the sweep is not kept: {error}")
+                self.told = True
+        now = time.monotonic()
+        self.due = now + max(SAVE_EVERY, PATIENCE * (now - start))
+
+    def __enter__(self) -> _Rows:
+        return self
+
+    def __exit__(self, kind, error, _) -> None:
+        self._save()
+        if error and self.path and self.saved:
+            told = f"{self.saved} of {self.total} points are kept in {self.path}: the same command goes on from there"
+            error.add_note(told)
 
 
 def _same(a: Scene, b: Scene) -> bool:
@@ -134,12 +172,6 @@ def _corners(outer: list[list[float]]):
     yield from itertools.product(*([v[0], v[-1]] for v in outer))
     for k, values in enumerate(outer):
         yield from ([*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])] for x in values)
-
-
-def _now() -> float:
-    import time
-
-    return time.monotonic()
 
 
 def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
@@ -200,30 +232,13 @@ class Beside:
         return tuple(np.concatenate(x) for x in zip(*each))
 
 
-def _mark(scene: Scene, values) -> str:
-    return hashlib.sha256(json.dumps([scene.text, repr(scene.gait), repr(scene.numerics), values]).encode()).hexdigest()
-
-
-def _keep(kept: Path, scene: Scene, values, rows) -> None:
-    with whole_file(kept) as part:
-        part.write_text(json.dumps({"sweep": _mark(scene, values), "rows": rows}))
-
-
-def _taken_up(kept: Path | None, scene: Scene, values) -> list:
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        found = json.loads(kept.read_text()) if kept else {}
-        if found["sweep"] == _mark(scene, values):
-            return found["rows"]
-    return []
-
-
 def save(path: Path, scene: Scene, results: dict) -> None:
     """The results as NetCDF: dimensions are the parameters with their dots as underscores, and component."""
     from scipy.io import netcdf_file
 
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = f"Net displacement per cycle of the scene {scene.name}".encode()
-        file.scene = scene.text.encode()
+        file.title = attribute(f"Net displacement per cycle of the scene {scene.name}")
+        file.scene = attribute(scene.text)
         names = []
         for parameter, values in results["over"].items():
             names.append(parameter.replace(".", "_").replace("-", "_"))

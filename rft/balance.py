@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.bodies.base import Body
 from rft.effects.base import Effect, broken, engine
-from rft.media.base import Medium, real_array
+from rft.media.base import Medium, in_range, real_array, require, shown
 from rft.newton import Balance
 
 
@@ -60,6 +60,8 @@ def body_velocity(
         lost = ", ".join(sorted(broken(effects)))
         raise ValueError(f"no body velocity follows from shape alone where effects break {lost}: use rft.march")
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
+    if threads is not None:
+        in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = np.sqrt((alphadot * alphadot).sum(0))
@@ -78,10 +80,17 @@ def body_velocity(
     return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
+def checked_body(body) -> Body:
+    """body, or ValueError if it is nothing of the kind."""
+    good = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
+    require(good, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
+    return body
+
+
 def checked_input(body, alpha, alphadot, regularisation, tolerance):
-    for name, value in (("regularisation", regularisation), ("tolerance", tolerance)):
-        if not (isinstance(value, (int, float, np.floating)) and 1e-15 <= value <= 1e3):
-            raise ValueError(f"{name} must be a finite number > 0, 1e-15 to 1e3, got {value!r}")
+    checked_body(body)
+    in_range("regularisation", regularisation, 1e-15, 1e3)
+    in_range("tolerance", tolerance, 1e-15, 1e3)
     arrays = []
     for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
         x = real_array(name, x)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import Medium, TermLaw
+from rft.media.base import Medium, TermLaw, require, shown
 
 TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
 SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
@@ -221,7 +221,7 @@ def gauss(medium: Medium, nodes: int) -> LoadLaw:
 def parse(how: str) -> tuple[str, int]:
     """('exact', 1), ('midpoint', n) or ('gauss', n) from 'exact', 'midpoint:n', 'gauss:n'. ValueError for other text."""
     kind, _, count = str(how).partition(":")
-    if how == "exact":
+    if isinstance(how, str) and how == "exact":
         return "exact", 1
     if kind in ("midpoint", "gauss") and re.fullmatch(r"[1-9]\d{0,3}", count) and int(count) <= 1000:
         return kind, int(count)
@@ -229,7 +229,9 @@ def parse(how: str) -> tuple[str, int]:
 
 
 def element_load(medium: Medium, how: str = "exact") -> LoadLaw:
-    """The load of a medium on an element, ``how`` as in `parse`."""
+    """The load of a medium on an element, ``how`` as in `parse`; ValueError for what is no medium."""
+    good = all(hasattr(medium, name) for name in ("dry", "viscous", "traction")) and not isinstance(medium, type)
+    require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
     kind, count = parse(how)
     if kind == "exact":
         return exact(medium)

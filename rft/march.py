@@ -18,7 +18,7 @@ from rft.balance import checked_input
 from rft.bodies.base import Body, Motion
 from rft.effects.base import Effect, Here, broken
 from rft.inertia import Mass
-from rft.media.base import Medium, require
+from rft.media.base import Medium, in_range, require
 from rft.newton import Balance
 from rft.work import Work, done_by
 
@@ -82,8 +82,8 @@ def march(
     """
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"a march takes 8 phases or more, got alpha {alpha.shape}")
-    good = cycles is None or (isinstance(cycles, int) and 1 <= cycles <= 10_000)
-    require(good, f"cycles must be a whole number from 1 to 10000, got {cycles!r}")
+    if cycles is not None:
+        in_range("cycles", cycles, 1, 10_000, whole=True)
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
     if 0 in batch:
         return _nothing(batch, phases)

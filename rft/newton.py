@@ -30,9 +30,16 @@ LENGTHEN = 2.0  # the next part to try, after a success
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
 
-# glibc hands freed memory back to the system, page by page, until it has once seen a large block freed. Then it keeps
-# up to twice that much for the next temporaries: half the solver's time on Linux, nothing elsewhere.
-np.empty(2**21)
+LARGE_BLOCK = 2**24  # bytes; glibc learns from blocks of up to 32 MB
+
+
+def keep_freed_memory() -> None:
+    """Let glibc see a large block freed: until then it hands freed memory back to the system, page by page; from then on
+    it keeps up to twice that much for the next temporaries. Half the solver's time on Linux, nothing elsewhere."""
+    np.empty(LARGE_BLOCK, np.uint8)
+
+
+keep_freed_memory()
 
 
 class Descent(NamedTuple):

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.balance import checked_input
 from rft.bodies.base import Body, Motion, halves
 from rft.effects.base import Effect
 from rft.loads import Known
-from rft.media.base import Medium
+from rft.media.base import Medium, real_array, require
 from rft.newton import Balance
 
 
@@ -39,11 +40,12 @@ def work(
     effects: Sequence[Effect] = (),
 ) -> Work:
     """Power and internal moments for body velocities xi (..., 3) that `body_velocity` gave for the same arguments."""
-    alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-    batch = alpha.shape[:-1]
+    alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
+    batch, xi = alpha.shape[:-1], real_array("xi", xi)
+    require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
     balance = Balance(medium, body, loads, regularisation, 1.0, effects)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
-    xi = np.asarray(xi, float).reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
+    xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
     speed = np.sqrt((alphadot**2).sum(0))
     scale = np.where(speed > 0, speed, 1.0)
     motion = balance.body.motion(alpha, alphadot / scale)

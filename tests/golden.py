@@ -170,6 +170,8 @@ if __name__ == "__main__":
     print(table(old, new))
     if "--write" in sys.argv[1:]:
         write(old, new)
-        print(f"recorded in {FILE}")
+        print(
+            f"recorded in {FILE}; raise rft.SOLVER too (now {rft.SOLVER}): unfinished sweeps of before are not gone on with"
+        )
     elif changed(old, new):
         sys.exit("not as recorded; if that is meant: python tests/golden.py --write")

@@ -178,7 +178,7 @@ def test_a_starved_solver_says_so(monkeypatch):
             [0.0, 0.0],
             [1.0, 0.0],
             {"regularisation": 0.0},
-            "regularisation must be a finite number > 0, 1e-15 to 1e3, got 0.0",
+            "regularisation must be a number from 1e-15 to 1000, got 0.0",
         ),
         ([0.0, 0.0], [1.0, 0.0], {"loads": "best"}, "loads must be"),
         ([0.0, 0.0], [0.0, 0.0], {"loads": "best"}, "loads must be"),

@@ -260,9 +260,9 @@ def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
     toml = scene_in(tmp_path, 12)
     write(tmp_path / "data", "points", count=12, places=20)
     before = scenes.load(toml)
-    assert sweep._mark(before, {}) == sweep._mark(scenes.load(toml), {})
+    assert sweep.question(before, {}) == sweep.question(scenes.load(toml), {})
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
-    assert sweep._mark(before, {}) != sweep._mark(scenes.load(toml), {})
+    assert sweep.question(before, {}) != sweep.question(scenes.load(toml), {})
     swept = sweep.sweep(scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
     assert np.isfinite(swept["displacement"]).all()
 
@@ -340,7 +340,7 @@ BAD = {
     "centre": (good, "centre = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "takes no centre"),
     "harmonics": (good, "keep_harmonics = 6", "from 0 to 5 for these 12 frames, got 6"),
     "modes": (good, "keep_modes = 7", "from 0 to 6 for 12 places, got 7"),
-    "period": (good, "period = 0", "period must be a number > 0"),
+    "period": (good, "period = 0", "period must be a number from"),
     "sha256": (good, 'sha256 = "0"', "not the one whose sha256 is given"),
 }  # fmt: skip
 
@@ -391,3 +391,18 @@ def test_mutated_files_run_or_are_refused(tmp_path):
         assert np.isfinite(made.cycle(16)).all()
     assert 10 < ran < 290
     assert all(line.startswith("swim.csv") and "\n" not in line for line in said)
+
+
+@pytest.mark.parametrize(
+    "line", ["root:x:0:0:secret", "secret", "password = secret", "t;secret", "secret,x", "[secret]"]
+)
+def test_files_that_do_not_look_like_ours_are_not_quoted(line, tmp_path):
+    (tmp_path / "data").mkdir()
+    path = tmp_path / "data" / "theirs"
+    path.write_text(f"{line}\nmore secret\n")
+    with pytest.raises(ValueError, match="the header must be t,s,curvature or") as caught:
+        Centreline(file=str(path))
+    assert "secret" not in str(caught.value)
+    path.write_text("t,s,kappa\n0,0,0\n")
+    with pytest.raises(ValueError, match="got 't,s,kappa'"):
+        Centreline(file=str(path))

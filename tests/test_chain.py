@@ -75,7 +75,7 @@ def test_carried_and_total_are_transposes():
         (lambda: Chain((1,)), "at least two links, got 1"),
         (lambda: Chain((1, -2)), r"finite and > 0, got \[1.0, -2.0\]"),
         (lambda: Chain((1, float("inf"))), "finite and > 0"),
-        (lambda: Chain(length=0.0), "length must be finite and > 0, 1e-15 to 1e15, got 0.0"),
+        (lambda: Chain(length=0.0), "length must be a number from 1e-15 to 1e\\+15, got 0.0"),
         (lambda: Chain(frame="link-4"), "'link-1' ... 'link-3', got 'link-4'"),
         (lambda: Chain(frame="head"), "got 'head'"),
         (lambda: Chain((1e308,) * 3), "finite and > 0"),

@@ -8,28 +8,37 @@ import os
 import signal
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
 import xarray
 
-from geomech import accuracy, cli, curvature, plots, scenes
+from geomech import accuracy, cli, curvature, files, plots, report, scenes
 
 SMALL = ["--grid", "9"]
 
 
 def geomech(*args, cwd="."):
     """(exit code, standard output, standard error) of a command, run by `cli.main` in this process."""
-    kept, out, err = (sys.argv, signal.getsignal(signal.SIGTERM)), io.StringIO(), io.StringIO()
-    sys.argv = ["geomech", *map(str, args)]
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
+    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    argv = ["geomech", *map(str, args)]
     try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), contextlib.chdir(cwd):
+        with (
+            mock.patch.object(sys, "argv", argv),
+            contextlib.redirect_stdout(streams[0]),
+            contextlib.redirect_stderr(streams[1]),
+            contextlib.chdir(cwd),
+            pytest.raises(SystemExit) as done,
+        ):
             cli.main()
-    except SystemExit as left:
-        return left.code, out.getvalue(), err.getvalue()
     finally:
-        sys.argv = kept[0]
-        signal.signal(signal.SIGTERM, kept[1])
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    for stream in streams:
+        stream.flush()
+    return done.value.code, *(stream.buffer.getvalue().decode() for stream in streams)
 
 
 def as_process(*args, cwd=None):
@@ -221,16 +230,185 @@ def test_letters_of_any_alphabet_are_kept(tmp_path):
 
 
 def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from geomech import plots, report
+    from geomech import plots
 
     def fail(*args, **kwargs):
         raise ValueError("half way")
 
     monkeypatch.setattr(plots, "displacement", fail)
     small = scenes.load("three-link-glass").with_numerics(grid=5)
-    with pytest.raises(ValueError, match="half way"), report.whole_folder(tmp_path / "out") as folder:
+    with pytest.raises(ValueError, match="half way"), files.whole_folder(tmp_path / "out") as folder:
         report.write(small, folder, None)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_arguments_the_help():
+    code, out, err = geomech()
+    assert (code, err) == (0, "")
+    assert out == geomech("--help")[1]
+    assert "Commands:" in out
+
+
+BACKBONE = '[medium]\nname = "coulomb"\n[body]\nkind = "backbone"\nelements = 8\n[gait]\nkind = "sine"\nelements = 8\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            '[medium]\nname = "coulomb"\n[body]\nkind = "chain"\n[gait]\nkind = "ellipse"\nsemi_axes = [0, 0]\n',
+            "not move",
+        ),
+        (BACKBONE + "amplitude = 0", "not move"),
+        ('[medium]\nname = "coulomb"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\ncentre = [2.6, 0]\n', "outside"),
+    ],
+)
+def test_run_refuses_before_it_computes(text, said, monkeypatch, tmp_path):
+    def solve(*args):
+        raise AssertionError("computed")
+
+    monkeypatch.setattr(scenes.Scene, "solve", solve)
+    (tmp_path / "s.toml").write_text(text)
+    code, _, err = geomech("run", "s.toml", cwd=tmp_path)
+    assert code == 2
+    assert said in err
+    assert [p.name for p in tmp_path.iterdir()] == ["s.toml"]
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """`run` and `accuracy` without their numbers."""
+
+    def write(scene, folder, progress):
+        for name in (report.SCENE, report.TABLES):
+            (folder / name).write_text(scene.text if name == report.SCENE else "{}")
+        return {}
+
+    monkeypatch.setattr(report, "write", write)
+
+
+def test_run_says_what_it_replaces(quick, tmp_path):
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "mine.txt").write_text("mine")
+    assert geomech("run", cwd=tmp_path)[::2] == (0, "")
+    code, _, err = geomech("run", "three-link-viscous", cwd=tmp_path)
+    assert (code, err) == (0, "note: replaced in results: displacement.json, scene.toml\n")
+    assert (tmp_path / "results" / "scene.toml").read_text() == scenes.load("three-link-viscous").text
+    assert (tmp_path / "results" / "mine.txt").read_text() == "mine"
+
+
+def test_run_replaces_no_scene_that_it_did_not_leave(quick, tmp_path):
+    mine = scenes.load("three-link-glass").text
+    (tmp_path / "scene.toml").write_text(mine)
+    for name, said in (("three-link-viscous", "another scene stands there"), ("scene.toml", "it is an input")):
+        code, _, err = geomech("run", name, "-o", ".", cwd=tmp_path)
+        assert code == 2
+        assert said in err
+    assert geomech("run", "three-link-glass", "-o", ".", cwd=tmp_path)[0] == 0  # the same text
+    assert (tmp_path / "scene.toml").read_text() == mine
+
+
+@pytest.mark.parametrize("command", ["run", "accuracy"])
+def test_no_folder_is_not_this_folder(command, tmp_path):
+    code, _, err = geomech(command, "-o", "", cwd=tmp_path)
+    assert code == 2
+    assert "an empty name" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def linked(how, source, target):
+    if how == "itself":
+        return source
+    (target.hardlink_to if how == "hard link" else target.symlink_to)(source)
+    return target
+
+
+@pytest.mark.parametrize("how", ["itself", "hard link", "symlink"])
+@pytest.mark.parametrize("command", ["sweep", "connection"])
+def test_a_scene_is_not_written_over(command, how, tmp_path):
+    text = scenes.load("three-link-viscous").text
+    (tmp_path / "in.nc").write_text(text)
+    out = linked(how, tmp_path / "in.nc", tmp_path / "out.nc")
+    args = ["--over", "gait.amplitude=0.5"] if command == "sweep" else SMALL
+    before = sorted(tmp_path.iterdir())
+    code, _, err = geomech(command, "in.nc", *args, "-o", out.name, cwd=tmp_path)
+    assert code == 2
+    assert f"cannot write {out.name}: it is an input, in.nc" in err
+    assert (tmp_path / "in.nc").read_text() == text
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_neither_are_its_measurements(tmp_path):
+    rows = [
+        f"{k / 16},{s},{2 * math.sin(2 * math.pi * (k / 16 + s))}" for k in range(16) for s in (0, 0.25, 0.5, 0.75, 1)
+    ]
+    (tmp_path / "swim.svg").write_text("\n".join(["t,s,curvature", *rows]))
+    text = BACKBONE.replace('"sine"', '"centreline"\nfile = "swim.svg"')
+    (tmp_path / "s.toml").write_text(text)
+    args = ["s.toml", "--over", "body.length=1,2", "-o", "s.nc", "--plot", "swim.svg"]
+    code, _, err = geomech("sweep", *args, cwd=tmp_path)
+    assert code == 2
+    assert "cannot write swim.svg: it is an input" in err
+    code, _, err = geomech("displacement", "s.toml", "--amplitudes", "0.1", "--plot", "swim.svg", cwd=tmp_path)
+    assert code == 2
+    assert "cannot write swim.svg: it is an input" in err
+    assert (tmp_path / "swim.svg").read_text().startswith("t,s,curvature")
+
+
+def test_one_file_is_not_two_outputs(tmp_path):
+    (tmp_path / "a.nc").write_text("")
+    (tmp_path / "a.svg").symlink_to("a.nc")
+    code, _, err = geomech("connection", "three-link-viscous", *SMALL, "-o", "a.nc", "--plot", "a.svg", cwd=tmp_path)
+    assert code == 2
+    assert "cannot write" in err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
+def test_names_that_are_not_text_are_kept(tmp_path):
+    name = os.fsdecode(b"caf\xe9.toml")
+    (tmp_path / name).write_text(scenes.load("three-link-viscous").text)
+    for args in (
+        (
+            "sweep",
+            name,
+            "--over",
+            "gait.amplitude=0.5,1",
+            "-o",
+            os.fsdecode(b"\xe9.nc"),
+            "--plot",
+            os.fsdecode(b"\xe9.png"),
+        ),
+        ("connection", name, *SMALL, "-o", "a.nc"),
+        ("displacement", name, "--amplitudes", "0.5", "--methods", "direct", "--plot", "d.pdf"),
+        ("displacement", name, "--amplitudes", "0.5", "--tol", "0.1", "--json"),
+        ("explain", name),
+    ):
+        code, _, err = geomech(*args, cwd=tmp_path)
+        assert (code, err) == (0, "")
+    for file, start in ((os.fsdecode(b"\xe9.nc"), "Net displacement"), ("a.nc", "Local connection")):
+        with xarray.open_dataset(tmp_path / file) as data:
+            assert data.attrs["title"].startswith(start)
+            assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
+            assert data.attrs["scene"] == scenes.load("three-link-viscous").text
+    assert not any(p.name.startswith(".") for p in tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", ".", "pipe", "large.toml", "latin.toml"])
+def test_what_is_no_scene_file_is_refused_at_once(path, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with (tmp_path / "large.toml").open("wb") as file:
+        file.truncate(1 << 40)
+    (tmp_path / "latin.toml").write_bytes(b"# \xe9")
+    code, out, err = geomech("explain", path, cwd=tmp_path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"error: cannot read scene '{path}': ")
+
+
+def test_neither_is_a_pipe_that_never_ends():
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen([sys.executable, "-m", "geomech", "explain", "/dev/stdin"], **pipes) as done:
+        assert done.stderr.read().startswith(b"error: cannot read scene '/dev/stdin': it is no ordinary file")
+    assert done.returncode == 2
 
 
 def test_the_command_starts_without_the_heavy_libraries():

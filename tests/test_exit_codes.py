@@ -73,9 +73,10 @@ def test_help_ends_with_0(name, ended):
 def refused(told, said):
     code, out, err, files = told
     assert (code, out, files) == (2, "", set())
-    assert err.startswith("error: ")
-    assert err.count("\n") == 1
-    assert said in err
+    lines = [line for line in err.splitlines() if "s of computing and" not in line]  # on a slow machine the cost is told
+    assert len(lines) == 1
+    assert lines[0].startswith("error: ")
+    assert said in lines[0]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -63,7 +63,7 @@ def test_points_are_reached_as_their_chords_are_run():
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: Circle(amplitude=float("nan")), "amplitude must be finite"),
+        (lambda: Circle(amplitude=float("nan")), "amplitude must be a number from"),
         (lambda: Circle(centre=(1.0,)), "centre must have 2 angles"),
         (lambda: Ellipse(semi_axes=(1.0,)), "two semi_axes"),
         (lambda: Fourier(cos=((1.0,),), sin=((1.0, 2.0),)), "one shape"),

@@ -1,13 +1,19 @@
 """Sweeps over a scene's parameters: right at every point, kept when interrupted, taken up again."""
 
+import contextlib
 import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 from test_cli import geomech
 
-from geomech import estimate, scenes, sweep
+from geomech import estimate, kept, scenes, sweep
 from geomech.problem import SceneError
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
@@ -95,9 +101,9 @@ def test_one_frequency_for_all_effects():
     found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
     np.testing.assert_allclose(found[1], swimmer.displacement("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
-    with pytest.raises(SceneError, match="BodyInertia gives frequency = 3.0 and GrainInertia 2.0: it is one swimmer"):
+    with pytest.raises(SceneError, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
         sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})
-    with pytest.raises(SceneError, match=r"\[body\] gives length = 0.2 and BodyInertia 0.1"):
+    with pytest.raises(SceneError, match=r"\[body\] gives length = 0.2 and body-inertia 0.1"):
         sweep.sweep(scenes.parse(both), {"body.length": [0.2]})
     with pytest.raises(SceneError, match="no effect of the scene gives 'speed'"):
         sweep.sweep(scenes.parse(both), {"effects.speed": [2.0]})
@@ -111,10 +117,18 @@ def test_what_cannot_share_a_batch_gets_its_own(monkeypatch):
     assert len(calls) == 2
 
 
-def test_an_interrupted_sweep_is_taken_up(tmp_path, monkeypatch):
-    kept, over = tmp_path / ".s.partial", {"body.length": [1.0, 2.0, 3.0, 4.0], "gait.amplitude": [0.5, 1.0]}
-    whole = sweep.sweep(GLASS, over)
-    rows, calls = sweep._rows, []
+OVER = {"body.length": [1.0, 2.0, 3.0, 4.0], "gait.amplitude": [0.5, 1.0]}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return sweep.sweep(GLASS, OVER)
+
+
+@pytest.fixture
+def interrupted(tmp_path, monkeypatch):
+    """(file, calls) of a sweep of GLASS over OVER, interrupted in its third batch of two points."""
+    partial, rows, calls = tmp_path / ".s.nc.partial", sweep._rows, []
 
     def failing(at, amplitudes):
         calls.append(at[0].body.length)
@@ -125,19 +139,255 @@ def test_an_interrupted_sweep_is_taken_up(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep, "_rows", failing)
     monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 2)  # both amplitudes of one length
     with pytest.raises(KeyboardInterrupt):
-        sweep.sweep(GLASS, over, kept)
-    assert np.shape(json.loads(kept.read_text())["rows"]) == (4, 5)  # two lengths, two amplitudes each
-    again = sweep.sweep(GLASS, over, kept)
+        sweep.sweep(GLASS, OVER, partial)
+    assert np.shape(json.loads(partial.read_text())["rows"]) == (4, 5)  # two lengths, two amplitudes each
+    return partial, calls
+
+
+def test_an_interrupted_sweep_is_taken_up(interrupted, whole):
+    partial, calls = interrupted
+    again = sweep.sweep(GLASS, OVER, partial)
     assert calls == [1.0, 2.0, 3.0, 3.0, 4.0]
     np.testing.assert_array_equal(again["displacement"], whole["displacement"])
-    assert not kept.exists()
+    assert len(json.loads(partial.read_text())["rows"]) == 8  # there until it is saved
+    assert sweep.sweep(GLASS, OVER, partial)["estimate"].tolist() == again["estimate"].tolist()
+    assert len(calls) == 5
 
 
-def test_another_sweep_does_not_take_up_what_is_not_its_own(tmp_path):
-    kept = tmp_path / ".s.partial"
-    kept.write_text(json.dumps({"sweep": "of something else", "rows": [[[9.0, 9.0, 9.0, 9.0]]]}))
-    results = sweep.sweep(GLASS, {"gait.amplitude": [1.0]}, kept)
-    assert abs(results["displacement"][0, 0]) < 1
+def test_a_sweep_over_amplitude_alone_is_kept_too(tmp_path, monkeypatch):
+    partial, over, rows = tmp_path / "p", {"gait.amplitude": [0.2, 0.4, 0.6, 0.8, 1.0]}, sweep._rows
+    plain, calls = sweep.sweep(GLASS, over), []
+
+    def failing(at, amplitudes):
+        calls.append(amplitudes)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return rows(at, amplitudes)
+
+    monkeypatch.setattr(sweep, "_rows", failing)
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 3)
+    with pytest.raises(KeyboardInterrupt):
+        sweep.sweep(GLASS, over, partial)
+    again = sweep.sweep(GLASS, over, partial)
+    assert calls == [[0.2, 0.4, 0.6], [0.8, 1.0], [0.8, 1.0]]
+    np.testing.assert_allclose(again["displacement"], plain["displacement"], atol=1e-12)
+
+
+@pytest.mark.parametrize("done", range(1, 13))
+def test_a_sweep_goes_on_anywhere(done, tmp_path, monkeypatch):
+    """Whatever was done before, each point comes once, in order."""
+    over = {"body.length": [1.0, 2.0, 3.0], "gait.amplitude": [0.1, 0.2, 0.3, 0.4]}
+    every = [(p, a) for p in over["body.length"] for a in over["gait.amplitude"]]
+    asked = sweep.question(GLASS, over)
+    for at_once in (1, 3, 4, 9):
+        found = []
+
+        def rows(batch, amplitudes):
+            found.extend((s.body.length, a) for s in batch for a in amplitudes)
+            return [[s.body.length, a, 0.0, 0.0, 0.0] for s in batch for a in amplitudes]
+
+        kept.keep(tmp_path / "p", asked, [[*point, 0.0, 0.0, 0.0] for point in every[:done]])
+        monkeypatch.setattr(sweep, "_rows", rows)
+        monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", at_once)
+        result = sweep.sweep(GLASS, over, tmp_path / "p")
+        assert found == every[done:]
+        assert [tuple(x) for x in result["displacement"][..., :2].reshape(-1, 2)] == every
+
+
+def other_values(found):
+    found["question"]["over"][0][1][0] = 9.0
+
+
+def other_name(found):
+    found["question"]["over"][0][0] = "gait.amplitude"
+
+
+def other_solver(found):
+    found["question"]["solver"] -= 1
+
+
+def other_scene(found):
+    found["question"]["scene"] += "# "
+
+
+def too_many(found):
+    found["rows"] *= 3
+
+
+def not_finite(found):
+    found["rows"][1][0] = float("nan")
+
+
+def too_wide(found):
+    found["rows"][1].append(0.0)
+
+
+def a_number(found):
+    found["rows"] = 5
+
+
+def no_rows(found):
+    del found["rows"]
+
+
+def no_question(found):
+    found["question"] = [1]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        other_values,
+        other_name,
+        other_solver,
+        other_scene,
+        too_many,
+        not_finite,
+        too_wide,
+        a_number,
+        no_rows,
+        no_question,
+    ],
+)
+def test_what_is_kept_of_anything_else_is_set_aside(change, interrupted, whole, capsys):
+    """With a checksum that is right, as another version or another sweep would leave it."""
+    partial, calls = interrupted
+    found = json.loads(partial.read_text())
+    change(found)
+    del found["checksum"]
+    partial.write_text(json.dumps({**found, "checksum": kept._checksum(found)}))
+    text = partial.read_text()
+    again = sweep.sweep(GLASS, OVER, partial)
+    assert calls[3:] == [1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_array_equal(again["displacement"], whole["displacement"])
+    aside = partial.with_name(".s.nc.partial.set-aside")
+    assert aside.read_text() == text
+    said = capsys.readouterr().err
+    assert said.startswith(f"note: {partial} is not taken up, ")
+    assert said.endswith(f": set aside as {aside.name}\n")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "text", ["", "5", "[]", "null", "{}", '{"rows": 5}', "[" * 100_000, "9" * 5000, "\0", "\ud800"]
+)
+def test_no_text_is_a_traceback(text, interrupted, capsys):
+    partial, _ = interrupted
+    for k in range(3):
+        partial.write_text(text, errors="surrogatepass")
+        assert kept.taken_up(partial, {}, 8) == []
+        assert not partial.exists()
+        assert capsys.readouterr().err.endswith(f"set aside as {partial.name}.set-aside{f'-{k + 1}' if k else ''}\n")
+
+
+def test_no_flipped_bit_is_believed(interrupted):
+    """Every bit of the rows, and a thousand cuts: what is taken up is what was kept."""
+    partial, _ = interrupted
+    raw = partial.read_bytes()
+    asked = sweep.question(GLASS, OVER)
+    rows = kept._believed(raw, asked, 8)
+    start = raw.index(b'"rows"')
+    damaged = [raw[:k] + bytes([raw[k] ^ 1 << bit]) + raw[k + 1 :] for k in range(start, len(raw)) for bit in range(8)]
+    damaged += [raw[:k] for k in np.linspace(0, len(raw) - 1, 1000).astype(int)]
+    for text in damaged:
+        with contextlib.suppress(ValueError, TypeError, KeyError, AttributeError):
+            assert kept._believed(text, asked, 8) == rows
+
+
+def test_a_sweep_of_another_axis_of_the_same_shape_is_another(tmp_path, capsys):
+    partial = tmp_path / "p"
+    sweep.sweep(GLASS, {"gait.amplitude": [0.5, 1.0]}, partial)
+    for over in ({"gait.amplitude": [0.5, 1.5]}, {"body.length": [0.5, 1.0]}, {"numerics.extent": [0.5, 1.0]}):
+        found = sweep.sweep(GLASS, over, partial)
+        np.testing.assert_array_equal(found["displacement"], sweep.sweep(GLASS, over)["displacement"])
+        assert "it is of another sweep (over)" in capsys.readouterr().err
+    sweep.sweep(GLASS.with_numerics(phases=64), over, partial)
+    assert "it is of another sweep (numerics)" in capsys.readouterr().err
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+@pytest.mark.parametrize("kind", ["fifo", "folder", "device", "dangling"])
+def test_what_is_no_file_keeps_nothing(kind, tmp_path):
+    partial = tmp_path / "p"
+    if kind == "fifo":
+        os.mkfifo(partial)
+    elif kind == "folder":
+        partial.mkdir()
+    else:
+        partial.symlink_to("/dev/zero" if kind == "device" else tmp_path / "nothing")
+    with pytest.raises(SceneError, match="it is no ordinary file; remove it"):
+        sweep.sweep(GLASS, {"gait.amplitude": [1.0]}, partial)
+
+
+def test_a_full_disk_loses_nothing_that_is_computed(tmp_path, monkeypatch, capsys):
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(kept, "keep", full)
+    monkeypatch.setattr(sweep, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
+    over = {"gait.amplitude": [0.5, 1.0]}
+    found = sweep.sweep(GLASS, over, tmp_path / "p")
+    assert np.isfinite(found["displacement"]).all()
+    assert capsys.readouterr().err.count("note: what is done of the sweep is not kept: ") == 1
+
+
+def test_a_sweep_stays_until_it_is_saved(tmp_path, monkeypatch):
+    """A failure to save, or to draw, costs no computing."""
+
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--plot", "s.png"]
+    for what in ("save", "draw"):
+        with monkeypatch.context() as patch:
+            patch.setattr(sweep, what, full)
+            assert geomech("sweep", *args, cwd=tmp_path)[0] == 2
+        assert (tmp_path / ".s.nc.partial").exists()
+    monkeypatch.setattr(sweep, "_rows", full)
+    assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
+    assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "s.png"}
+
+
+@pytest.mark.parametrize("length", [255, 246])  # of the target's name; 246: that of what is kept fits just so
+def test_the_longest_name_has_room(length, tmp_path):
+    name = "a" * (length - 3) + ".nc"
+    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", name]
+    assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    partial = kept.beside(tmp_path / name)
+    assert partial == tmp_path / kept.beside(Path(name))
+    assert partial != kept.beside(tmp_path / ("b" + name[1:]))
+    partial.write_text("5")
+    code, _, err = geomech("sweep", *args, cwd=tmp_path)
+    assert code == 0
+    assert err.endswith("set aside as " + partial.name + ".set-aside\n")
+
+
+def test_a_sweep_killed_in_the_middle_is_taken_up(tmp_path):
+    """SIGKILL while it computes, and while it saves: the next run has the same numbers, and leaves the target alone."""
+    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "--over", "body.length=1:4:4", "-o", "s.nc"]
+    script = """
+import os, signal, sys
+from geomech import cli, files, sweep
+sweep.SAVE_EVERY = sweep.PATIENCE = 0
+sweep.SAMPLES_TOGETHER = 2
+replace, done = os.replace, []
+def killing(source, target):
+    done.append(target)
+    if len(done) == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(source, target)
+files.os.replace = killing
+cli.main()
+"""
+    first = subprocess.run([sys.executable, "-c", script, "sweep", *args], cwd=tmp_path)
+    assert first.returncode == -signal.SIGKILL
+    left = {p.name[:9] for p in tmp_path.iterdir()}
+    assert left == {".s.nc.par", ".geomech-"}
+    assert len(json.loads((tmp_path / ".s.nc.partial").read_text())["rows"]) == 4
+    assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
+    assert [p.name for p in tmp_path.iterdir()] == ["s.nc"]
 
 
 def test_the_command_writes_netcdf_and_a_plot(tmp_path):
@@ -161,7 +411,7 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
         ({"gait.size": [1.0]}, "'size' is unknown"),
         ({"gait": [1.0]}, "name a parameter such as"),
         ({"effects.end-caps.radius": [0.1]}, "no effect 'end-caps'"),
-        ({"body.length": [1.0, -1.0]}, "length must be finite"),
+        ({"body.length": [1.0, -1.0]}, "length must be a number from"),
         ({}, "must span 1 to"),
     ],
 )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from geomech.problem import is_whole, number, real_array, short
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 
@@ -26,17 +27,16 @@ class Gait:
     harmonics = 1
 
     def __post_init__(self):
-        try:
-            object.__setattr__(self, "centre", tuple(float(x) for x in self.centre))
-            object.__setattr__(self, "amplitude", float(self.amplitude))
-        except (TypeError, OverflowError):
-            raise ValueError(f"amplitude and centre must be numbers, got {self.amplitude!r}, {self.centre!r}") from None
-        if not abs(self.amplitude) <= LARGEST:
-            raise ValueError(f"amplitude must be finite and at most {LARGEST:g}, got {self.amplitude!r}")
-        if self.centre and len(self.centre) != self.joints:
-            raise ValueError(f"centre must have {self.joints} angles, got {list(self.centre)}")
-        if not all(map(math.isfinite, self.centre)):
-            raise ValueError(f"centre must be finite, got {list(self.centre)}")
+        number("amplitude", self.amplitude, -LARGEST, LARGEST)
+        object.__setattr__(self, "amplitude", float(self.amplitude))
+        centre = real_array("centre", self.centre)
+        if centre.ndim != 1 or centre.size not in (0, self.joints):
+            raise ValueError(f"centre must have {self.joints} angles, got {short(self.centre)}")
+        if not np.isfinite(centre).all():
+            raise ValueError(f"centre must be finite, got {short(self.centre)}")
+        object.__setattr__(self, "centre", tuple(centre.tolist()))
+        if not isinstance(self.reverse, (bool, np.bool_)):
+            raise ValueError(f"reverse must be True or False, got {short(self.reverse)}")
 
     @property
     def joints(self) -> int:
@@ -64,7 +64,7 @@ class Gait:
         return self._times(amplitudes, sign * self.unit_rate(sign * np.asarray(t, float)))
 
     def _times(self, amplitudes, curve):
-        a = np.asarray(self.amplitude if amplitudes is None else amplitudes, float)
+        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
         if not (np.abs(a) <= LARGEST).all():
             raise ValueError(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
         return a[(..., *([None] * curve.ndim))] * curve
@@ -72,18 +72,22 @@ class Gait:
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
         """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
         least = max(4, 2 * self.harmonics + 1)
-        if not (np.isfinite(phases) and int(phases) == phases and phases >= least):
-            raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {phases!r}")
+        if not (is_whole(phases) and phases >= least):
+            raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {short(phases)}")
         t = 2 * np.pi * np.arange(phases) / phases
         return self.shape(t, amplitudes), self.rate(t, amplitudes)
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
     """values as a float array of that many dimensions, or ValueError naming it."""
-    try:
-        array = np.asarray(values, float)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be numbers in equal rows, got {values!r}") from None
+    array = real_array(name, values)
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
-        raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {values!r}")
+        raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {short(values)}")
     return array
+
+
+def checked_gait(gait) -> Gait:
+    """gait, or ValueError if it is nothing of the kind."""
+    if isinstance(gait, type) or not (hasattr(gait, "joints") and hasattr(gait, "cycle")):
+        raise ValueError(f"gait must be a gait such as Circle(amplitude=0.5), got {short(gait)}")
+    return gait

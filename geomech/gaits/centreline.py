@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from geomech.gaits import frames, midline
 from geomech.gaits.base import Gait
+from geomech.problem import number, short
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
@@ -46,14 +48,19 @@ class Centreline(Gait):
     sha256: str = ""
 
     def __post_init__(self):
+        if not isinstance(self.file, (str, Path)):
+            raise ValueError(f"file must be the name of a CSV file, got {short(self.file)}")
         object.__setattr__(self, "file", str(self.file))
-        if self.elements not in range(3, 2001):
-            raise ValueError(f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
+        for name, low in (("elements", 3), ("keep_harmonics", 0), ("keep_modes", 0)):
+            number(name, getattr(self, name), low, 2000, whole=True)
+            object.__setattr__(self, name, int(getattr(self, name)))
         super().__post_init__()
         if self.centre:
             raise ValueError("a measured centreline takes no centre: it undulates about the straight body")
-        if self.period is not None and not 0 < self.period < np.inf:
-            raise ValueError(f"period must be a number > 0 in the unit of t, got {self.period!r}")
+        if self.period is not None:
+            number("period", self.period, frames.SMALLEST_NUMBER, frames.LARGEST_NUMBER)
+        if not isinstance(self.sha256, str):
+            raise ValueError(f"sha256 must be text, got {short(self.sha256)}")
         data = frames.read(self.file)
         if self.sha256.lower() not in ("", data.sha256):
             raise data.wrong("the file is not the one whose sha256 is given: restore it, or leave sha256 out")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.gaits.base import Gait, finite_array
+from geomech.gaits.base import LARGEST, Gait, finite_array
+from geomech.problem import number, short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +62,9 @@ class Ellipse(Series):
 
     def __post_init__(self):
         axes = finite_array("semi_axes", self.semi_axes, 1)
-        if axes.size != 2 or not np.isfinite(finite_array("tilt", [self.tilt], 1)):
-            raise ValueError(f"an ellipse needs two semi_axes, got {self.semi_axes!r}")
+        if axes.size != 2:
+            raise ValueError(f"an ellipse needs two semi_axes, got {short(self.semi_axes)}")
+        number("tilt", self.tilt, -LARGEST, LARGEST)
         super().__post_init__()
 
     def coefficients(self):

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from geomech import files
+
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 LARGEST_FILE = 100_000_000  # bytes, a few million rows
 LARGEST_NUMBER = 1e12
+SMALLEST_NUMBER = 1e-300  # that a period may be
 MOST_FRAMES = 10_000
 FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
 
@@ -63,11 +66,7 @@ def read(path: str | Path) -> Frames:
 def _contents(path: Path) -> tuple[str, str]:
     """The text of a file and its sha256."""
     try:
-        if not path.is_file() and path.stat():
-            raise OSError(errno.EINVAL, "it is no ordinary file")
-        if path.stat().st_size > LARGEST_FILE:
-            raise OSError(errno.EFBIG, f"it is larger than {LARGEST_FILE / 1e6:g} MB")
-        raw = path.read_bytes()
+        raw = files.read(path, LARGEST_FILE)
         text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
@@ -76,11 +75,14 @@ def _contents(path: Path) -> tuple[str, str]:
 
 
 def _header(name: str, filled: list[tuple[int, str]]) -> tuple[str, ...]:
+    """The columns. What is found instead is quoted only if it has two of their names: another file's first line may be
+    nobody's business."""
     line, text = filled[0] if filled else (1, "")
     columns = tuple(word.strip().lower() for word in text.split(","))
     if columns not in HEADERS:
         known = " or ".join(",".join(h) for h in HEADERS)
-        raise ValueError(f"{name}, line {line}: the header must be {known}, got {text[:40]!r}")
+        found = f", got {text[:40]!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
+        raise ValueError(f"{name}, line {line}: the header must be {known}{found}")
     return columns
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.gaits.base import Gait, finite_array
+from geomech.problem import short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +24,7 @@ class Points(Gait):
             points = points[:-1]
         steps = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1)
         if len(points) < 3 or not (steps > 1e-12 * steps.sum()).all():
-            raise ValueError(f"points must be at least 3 shapes, neighbours distinct, got {self.points!r}")
+            raise ValueError(f"points must be at least 3 shapes, neighbours distinct, got {short(self.points)}")
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         super().__post_init__()
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.gaits.base import Gait
+from geomech.problem import number, real_array
 
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
@@ -42,12 +43,13 @@ class Sine(Gait):
     elements: int = 100
 
     def __post_init__(self):
+        number("elements", self.elements, 3, 2000, whole=True)
+        object.__setattr__(self, "elements", int(self.elements))
         super().__post_init__()
         if self.centre:
             raise ValueError("a sine wave takes no centre: it undulates about the straight body")
-        if not 3 <= self.elements <= 2000:
-            raise ValueError(f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
-        if not 0 < self.waves <= self.elements / 4:
+        number("waves", self.waves, 0, self.elements / 4)
+        if not self.waves > 0:
             raise ValueError(f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
         if not 0 <= self.amplitude <= 10:
             raise ValueError(f"amplitude (A / lambda) must lie from 0 to 10, got {self.amplitude!r}")
@@ -61,7 +63,7 @@ class Sine(Gait):
         return r"amplitude over wavelength $A/\lambda$"
 
     def _slopes(self, amplitudes) -> np.ndarray:
-        a = np.asarray(self.amplitude if amplitudes is None else amplitudes, float)
+        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
         if not ((a >= 0) & (a <= 10)).all():
             raise ValueError(f"amplitudes (A / lambda) must lie from 0 to 10, got {a.ravel()[:4]}")
         return 2 * np.pi * a

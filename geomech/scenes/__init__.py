@@ -12,12 +12,15 @@ from pathlib import Path
 import msgspec
 
 import rft
+from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
-from geomech.problem import SceneError, choose
+from geomech.problem import SceneError, choose, short
 from geomech.scene import Numerics, Scene
 from rft.bodies import KINDS as BODIES
 from rft.effects import KINDS as EFFECTS
 from rft.media import LAWS
+
+LARGEST = 10_000_000  # bytes of a scene file
 
 
 def builtin_names() -> list[str]:
@@ -31,14 +34,18 @@ def _folder():
 
 def load(scene: str | Path) -> Scene:
     """The scene of a built-in name or a TOML file; SceneError, one line, if it is not one."""
+    if not isinstance(scene, (str, Path)):
+        raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
     names = builtin_names()
     if str(scene) in names:
-        return parse((_folder() / f"{scene}.toml").read_text(), str(scene))
+        return parse((_folder() / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
     path = Path(scene)
-    if path.suffix != ".toml" and not path.exists():
-        choose("scene", str(scene), names)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        if path.suffix != ".toml" and not path.exists():
+            choose("scene", str(scene), names)
+        text = read_text(path, LARGEST)
+    except SceneError:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
         raise SceneError(
@@ -47,8 +54,16 @@ def load(scene: str | Path) -> Scene:
     return parse(text, str(scene))
 
 
+def inputs(scene: Scene) -> list[Path]:
+    """The files that a scene was read from: its own, unless it is built in, and its gait's."""
+    own = [] if scene.name in builtin_names() else [scene.name]
+    return [Path(x) for x in (*own, getattr(scene.gait, "file", None)) if x]
+
+
 def parse(text: str, name: str = "scene") -> Scene:
     """The scene of a TOML text; SceneError if it is not one."""
+    if not isinstance(text, str):
+        raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
@@ -58,6 +73,8 @@ def parse(text: str, name: str = "scene") -> Scene:
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     """The scene of the tables of a TOML text; SceneError if they make none."""
+    if not isinstance(tables, Mapping):
+        raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
     tables = dict(tables)
     for table in tables:
         choose(f"{name}: table", table, ("medium", "body", "gait", "numerics", "effects"))

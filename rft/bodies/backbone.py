@@ -12,7 +12,7 @@ import numpy as np
 
 from rft.bodies.base import Motion
 from rft.bodies.chain import Chain
-from rft.media.base import require
+from rft.media.base import in_range, is_number, require, shown
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Backbone:
     frame: str = "mean"
 
     def __post_init__(self):
-        require(3 <= self.elements <= 2000, f"elements must be a whole number from 3 to 2000, got {self.elements!r}")
+        in_range("elements", self.elements, 3, 2000, whole=True)
+        object.__setattr__(self, "elements", int(self.elements))
         self.chain  # noqa: B018 (checks length and frame)
 
     @cached_property
@@ -65,7 +66,8 @@ class Serpenoid(Backbone):
 
     def __post_init__(self):
         super().__post_init__()
-        require(0 < self.waves <= self.elements / 4, f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
+        good = is_number(self.waves) and 0 < self.waves <= self.elements / 4
+        require(good, f"waves must be > 0 and at most elements / 4, got {shown(self.waves)}")
 
     @property
     def joints(self) -> int:
@@ -85,7 +87,9 @@ class ConstantCurvature(Backbone):
 
     def __post_init__(self):
         super().__post_init__()
-        fits = 1 <= self.sections <= self.elements and self.elements % self.sections == 0
+        in_range("sections", self.sections, 1, self.elements, whole=True)
+        object.__setattr__(self, "sections", int(self.sections))
+        fits = self.elements % self.sections == 0
         require(fits, f"sections must divide elements ({self.elements}), got {self.sections!r}")
 
     @property

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.bodies.base import Motion
-from rft.media.base import require
+from rft.media.base import in_range, real_array, require, shown
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,15 @@ class Chain:
     frame: str = "mean"
 
     def __post_init__(self):
-        try:
-            object.__setattr__(self, "lengths", tuple(float(x) for x in self.lengths))
-        except (TypeError, OverflowError):
-            raise ValueError(f"lengths must be a list of numbers, got {self.lengths!r}") from None
+        lengths = real_array("lengths", self.lengths)
+        require(lengths.ndim == 1, f"lengths must be a list of numbers, got {shown(self.lengths)}")
+        object.__setattr__(self, "lengths", tuple(lengths.tolist()))
         require(len(self.lengths) >= 2, f"lengths needs at least two links, got {len(self.lengths)}")
         good = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        require(good, f"lengths must all be finite and > 0, got {list(self.lengths)}")
+        require(good, f"lengths must all be finite and > 0, got {shown(list(self.lengths))}")
         short = min(self.lengths) / sum(self.lengths)
         require(short >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {short:.3g}")
-        require(1e-15 <= self.length <= 1e15, f"length must be finite and > 0, 1e-15 to 1e15, got {self.length!r}")
+        in_range("length", self.length, 1e-15, 1e15)
         self._link_of(self.frame)
 
     @property
@@ -50,13 +49,14 @@ class Chain:
 
     def _link_of(self, frame: str) -> int | None:
         """Index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
-        if frame == "mean":
+        text = frame if isinstance(frame, str) else ""
+        if text == "mean":
             return None
-        found = re.fullmatch(r"link-([1-9]\d{0,6})", str(frame))
+        found = re.fullmatch(r"link-([1-9]\d{0,6})", text)
         n = len(self.lengths)
         require(
             bool(found) and int(found[1]) <= n,
-            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {frame!r}",
+            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {shown(frame)}",
         )
         return int(found[1]) - 1
 

@@ -9,15 +9,8 @@ from rft.effects.grain_inertia import GrainInertia
 from rft.effects.skin import SkinFriction
 from rft.effects.transient import Transient
 
-KINDS = {
-    "skin-friction": SkinFriction,
-    "end-caps": EndCaps,
-    "depth-profile": DepthProfile,
-    "grain-inertia": GrainInertia,
-    "body-inertia": BodyInertia,
-    "transient": Transient,
-    "disturbed-ground": DisturbedGround,
-}
+ALL = (SkinFriction, EndCaps, DepthProfile, GrainInertia, BodyInertia, Transient, DisturbedGround)
+KINDS = {effect.kind: effect for effect in ALL}
 
 __all__ = [
     "ENGINES",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Motion
+from rft.media.base import require, shown
 
 # What an effect may break. Each premise lost takes an engine, or a result, with it.
 PREMISES = {
@@ -43,8 +44,9 @@ class Here(NamedTuple):
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects. breaks: premises of `PREMISES` it takes away. An effect changes the load of an element, the
-    elements of the body, or both; as its parameter goes to ``limit`` the scene without it comes back at ``order``.
+    """Base of all effects. kind: its name in scenes and messages. breaks: premises of `PREMISES` it takes away. An effect
+    changes the load of an element, the elements of the body, or both; as its parameter goes to ``limit`` the scene without
+    it comes back at ``order``.
 
     rank: effects act in this order, whatever the scene's. batched: parameters that may be arrays (B,), one for each
     sample of a batch. inertia: mass of the body x length x (rad/s of phase)^2 over its axial drag. settles: change of
@@ -52,6 +54,7 @@ class Effect:
     march remembers for each sample, beside some for each element.
     """
 
+    kind = "effect"
     breaks = frozenset()
     limit = ""
     order = 1
@@ -96,7 +99,7 @@ def together(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
         values = [getattr(e, field.name) for e in effects]
         if any(v != values[0] for v in values):
             if field.name not in first.batched:
-                raise ValueError(f"{type(first).__name__}: {field.name} cannot differ within a batch")
+                raise ValueError(f"{first.kind}: {field.name} cannot differ within a batch")
             joined[field.name] = np.repeat(np.array(values, float), counts)
     return _with(first, joined)
 
@@ -118,7 +121,9 @@ def _with(effect: Effect, values: dict) -> Effect:
 
 
 def broken(effects: Sequence[Effect]) -> frozenset:
-    """All that the effects break."""
+    """All that the effects break; ValueError for what is no effect."""
+    good = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
+    require(good, f"effects must be a list of effects such as EndCaps(radius=0.06), got {shown(effects)}")
     return frozenset().union(*(e.breaks for e in effects))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.effects.base import Effect
-from rft.media.base import require
+from rft.media.base import check_ranges, require
 
 
 @dataclass(frozen=True)
@@ -24,20 +24,14 @@ class BodyInertia(Effect):
     length: float
     drag: float
 
+    kind = "body-inertia"
     breaks = frozenset({"no inertia", "rate independence"})
     limit = "mass = 0"
     cost = "a step at a time in place of all phases at once; a dozen operations a sample"
     batched = ("mass", "frequency", "length", "drag")
 
     def __post_init__(self):
-        for name, low, high in (
-            ("mass", 0, 1e9),
-            ("frequency", 0, 1e4),
-            ("length", 1e-9, 1e6),
-            ("drag", 1e-12, 1e12),
-        ):
-            value = getattr(self, name)
-            require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
+        check_ranges(self, mass=(0, 1e9), frequency=(0, 1e4), length=(1e-9, 1e6), drag=(1e-12, 1e12))
         require(self.inertia <= 1e6, f"inertia is {self.inertia:.3g} times the axial drag: beyond 1e6 no gait settles")
 
     @property

@@ -10,7 +10,7 @@ from rft.bodies.base import Body, stations
 from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.loads import ALONE
-from rft.media.base import require
+from rft.media.base import check_ranges, real_array, require, shown
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class DepthProfile(Effect):
     slope: float = 0.0
     towards: float = 0.0
 
+    kind = "depth-profile"
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
     rank = 4
@@ -34,11 +35,13 @@ class DepthProfile(Effect):
     angles = ("towards",)
 
     def __post_init__(self):
-        object.__setattr__(self, "along", tuple(self.along))
-        good = len(self.along) >= 2 and all(0 < x <= 1000 for x in self.along)
-        require(good, f"along must be two depths or more, over the reference depth, > 0 to 1000, got {self.along!r}")
-        require(0 <= self.slope <= 1000, f"slope must lie from 0 to 1000 per body length, got {self.slope!r}")
-        require(abs(self.towards) <= 1e6, f"towards must be an angle, got {self.towards!r}")
+        along = real_array("along", self.along)
+        good = along.ndim == 1 and along.size >= 2 and ((along > 0) & (along <= 1000)).all()
+        require(
+            good, f"along must be two depths or more, over the reference depth, > 0 to 1000, got {shown(self.along)}"
+        )
+        object.__setattr__(self, "along", tuple(along.tolist()))
+        check_ranges(self, slope=(0, 1000), towards=(-1e6, 1e6))
 
     @property
     def breaks(self) -> frozenset:

@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
-from rft.media.base import require
+from rft.media.base import check_ranges
 
 PATCH = 4.0  # body lengths: the ground is remembered on a square of this size that goes with the body
 CELLS = 2.0  # cells of that square to a radius
@@ -30,6 +30,7 @@ class DisturbedGround(Effect):
     radius: float
     weakening: float
 
+    kind = "disturbed-ground"
     breaks = frozenset({"no memory"})
     limit = "weakening = 0"
     cost = "a map of the ground, two look-ups and some thirty marks an element and step"
@@ -38,8 +39,7 @@ class DisturbedGround(Effect):
     settles = 1e-3  # the map has cells, and no two cycles meet them alike
 
     def __post_init__(self):
-        require(0.01 <= self.radius <= 0.25, f"radius must lie from 0.01 to 0.25 body lengths, got {self.radius!r}")
-        require(0 <= self.weakening <= 1, f"weakening must lie from 0 to 1, got {self.weakening!r}")
+        check_ranges(self, radius=(0.01, 0.25), weakening=(0, 1))
 
     @property
     def held(self) -> int:

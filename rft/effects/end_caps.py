@@ -10,7 +10,7 @@ import numpy as np
 from rft.bodies.base import Body, Motion, Wrapped
 from rft.effects.base import Effect
 from rft.loads import ALONE
-from rft.media.base import TermLaw, require
+from rft.media.base import TermLaw, check_ranges, require
 from rft.media.granular import Granular
 
 
@@ -42,15 +42,13 @@ class EndCaps(Effect):
     head: float = 1.0
     tail: float = 1.0
 
+    kind = "end-caps"
     limit = "radius = 0"
     cost = "one point load an end"
     rank = 3
 
     def __post_init__(self):
-        require(0 <= self.radius <= 1, f"radius must lie from 0 to 1 body length, got {self.radius!r}")
-        for name in ("head", "tail"):
-            value = getattr(self, name)
-            require(0 <= value <= 100, f"{name} must be a factor from 0 to 100, got {value!r}")
+        check_ranges(self, radius=(0, 1), head=(0, 100), tail=(0, 100))
 
     def load(self, load, medium, body):
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")

@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.base import halves
 from rft.effects.base import Effect
 from rft.loads import ALONE
-from rft.media.base import require
+from rft.media.base import check_ranges, require
 from rft.media.catalogue import GRAVITY
 
 ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed of grains of unknown k
@@ -32,6 +32,7 @@ class GrainInertia(Effect):
     strength: float = 1.0
     k: float | None = None
 
+    kind = "grain-inertia"
     breaks = frozenset({"rate independence"})
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
@@ -40,15 +41,9 @@ class GrainInertia(Effect):
     batched = ("frequency", "length", "depth", "strength", "k")
 
     def __post_init__(self):
-        for name, low, high in (
-            ("frequency", 0, 1e4),
-            ("length", 1e-9, 1e6),
-            ("depth", 1e-9, 1e6),
-            ("strength", 0, 1e6),
-        ):
-            value = getattr(self, name)
-            require(low <= value <= high, f"{name} must lie from {low:g} to {high:g}, got {value!r}")
-        require(self.k is None or 1e-3 <= self.k <= 1e3, f"k must lie from 0.001 to 1000, got {self.k!r}")
+        check_ranges(self, frequency=(0, 1e4), length=(1e-9, 1e6), depth=(1e-9, 1e6), strength=(0, 1e6))
+        if self.k is not None:
+            check_ranges(self, k=(1e-3, 1e3))
 
     def _known_k(self, medium):
         return getattr(medium, "k", None) if self.k is None else self.k

@@ -8,7 +8,7 @@ import numpy as np
 
 from rft.effects.base import Effect
 from rft.loads import ALONE
-from rft.media.base import require
+from rft.media.base import check_ranges
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,13 @@ class SkinFriction(Effect):
     backward: float = 0.137
     reference: float = 0.2
 
+    kind = "skin-friction"
     limit = "forward = backward = reference"
     cost = "one multiplication an element"
     batched = ("forward", "backward", "reference")
 
     def __post_init__(self):
-        for name in ("forward", "backward", "reference"):
-            value = getattr(self, name)
-            require(1e-3 <= value <= 100, f"{name} must be a coefficient of friction from 0.001 to 100, got {value!r}")
+        check_ranges(self, forward=(1e-3, 100), backward=(1e-3, 100), reference=(1e-3, 100))
 
     def load(self, load, medium, body):
         ahead, astern = self.forward / self.reference, self.backward / self.reference

@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
-from rft.media.base import require
+from rft.media.base import check_ranges
 
 SHORTEST = 1e-6  # body lengths: a travel of an element at rest, which creeps at the regularisation
 DEVELOPED = 3.0  # e-foldings: 95 % of the steady drag is there after the travel
@@ -28,6 +28,7 @@ class Transient(Effect):
 
     travel: float
 
+    kind = "transient"
     breaks = frozenset({"no memory"})
     limit = "travel = 0"
     cost = "two shares an element, one link integral more where its pivot lies inside"
@@ -35,7 +36,7 @@ class Transient(Effect):
     batched = ("travel",)
 
     def __post_init__(self):
-        require(0 <= self.travel <= 10, f"travel must lie from 0 to 10 body lengths, got {self.travel!r}")
+        check_ranges(self, travel=(0, 10))
 
     def body(self, body):
         return cut(body)

@@ -69,11 +69,38 @@ def is_linear(medium: Medium) -> bool:
 def real_array(name: str, x) -> np.ndarray:
     """x as an array of floats, or ValueError naming it."""
     try:
-        if np.iscomplexobj(x):
-            raise TypeError
-        return np.asarray(x, float)
+        array = np.asarray(x)
+        if array.dtype.kind in "iuf" or (array.dtype.kind == "O" and all(map(is_number, array.flat))):
+            return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be real numbers in equal rows, got {str(x)[:80]}") from None
+        pass
+    raise ValueError(f"{name} must be real numbers in equal rows, got {shown(x)}")
+
+
+def is_number(value) -> bool:
+    """Whether value is one real number; True and False are none."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def in_range(name: str, value, low: float, high: float, whole: bool = False) -> None:
+    """ValueError naming it unless value is a number, or a whole one, from low to high."""
+    good = is_number(value) and low <= value <= high and (not whole or value == int(value))
+    require(good, f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {shown(value)}")
+
+
+def check_ranges(owner, **ranges: tuple[float, float]) -> None:
+    """`in_range` for the parameters of ``owner`` that are given with their (low, high)."""
+    for name, (low, high) in ranges.items():
+        in_range(name, getattr(owner, name), low, high)
+
+
+def shown(value) -> str:
+    """repr(value) as one line of at most 60 characters."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very long number"
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def require(condition: bool, text: str) -> None:

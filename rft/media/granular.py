@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rft.media.base import TermLaw, require
+from rft.media.base import TermLaw, check_ranges, require
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,13 @@ class Granular(TermLaw):
     angles = ("gamma0",)
 
     def __post_init__(self):
-        require(0 <= self.C <= 1e6, f"C must be a finite number from 0 to 1e6, got {self.C!r}")
+        check_ranges(self, C=(0, 1e6), gamma0=(-1e6, 1e6))
         require(
-            math.isfinite(self.gamma0) and 0 < self.gamma0 < math.pi / 2,
+            0 < self.gamma0 < math.pi / 2,
             f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees",
         )
-        require(self.k is None or 1e-3 <= self.k <= 1e3, f"k must be a number from 0.001 to 1000, got {self.k!r}")
+        if self.k is not None:
+            check_ranges(self, k=(1e-3, 1e3))
 
     @property
     def dry(self):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rft.media.base import TermLaw, require
+from rft.media.base import TermLaw, check_ranges
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Viscous(TermLaw):
     ratio: float = 2.0
 
     def __post_init__(self):
-        require(1e-8 <= self.ratio <= 1e8, f"ratio must be a finite number from 1e-8 to 1e8, got {self.ratio!r}")
+        check_ranges(self, ratio=(1e-8, 1e8))
 
     @property
     def viscous(self):

@@ -1,0 +1,170 @@
+"""Wrong Python types are refused like wrong numbers: a ValueError of one line, from every public constructor."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+from registry import GAITS
+
+import rft
+from geomech import connection, curvature, estimate, family, predict, scenes, simulate
+from geomech.gaits import KINDS, Centreline, Circle, Sine
+from geomech.problem import SceneError
+from geomech.scene import Numerics, Scene
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity
+
+WRONG = {
+    "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
+    "ragged": [[1.0], 2.0], "words": ["1", "2"], "dict": {"a": 1}, "object": object(), "function": lambda x: x, "class": Chain,
+    "complex": 1j, "nan": math.nan, "inf": math.inf, "true": True, "huge": 10**400, "endless": 10**5000,
+    "array": np.eye(2), "many": np.zeros((40, 40)), "numpy nan": np.float32("nan"), "set": {1.0, 2.0},
+    "date": np.datetime64("2020"),
+}  # fmt: skip
+PARTS = {
+    "Granular": Granular(1.8, 0.24), "Viscous": Viscous(), "Chain": Chain(), "Backbone": rft.Backbone(8),
+    "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
+    "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
+    "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1),
+    "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Scene": Scene(Coulomb(), Chain(), Circle()),
+    "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
+}  # fmt: skip
+FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
+RIGHT = {  # what looks wrong and is not
+    ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
+    ("lengths", "list"), ("along", "list"), ("cos", "array"), ("sin", "array"),
+    *itertools.product(("name", "text"), ("text", "digits")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "field"), FIELDS)
+def test_no_constructor_takes_a_wrong_type(kind, field):
+    for wrong, value in WRONG.items():
+        if (field, wrong) in RIGHT:
+            dataclasses.replace(PARTS[kind], **{field: value})
+            continue
+        with pytest.raises(ValueError, match=".") as caught:
+            dataclasses.replace(PARTS[kind], **{field: value})
+        assert "\n" not in str(caught.value), wrong
+        assert len(str(caught.value)) < 450, wrong
+
+
+def test_every_public_class_is_in_the_table():
+    public = [getattr(rft, name) for name in rft.__all__] + list(KINDS.values())
+    outputs = {rft.Solution, rft.March, rft.Work}
+    made = {c for c in public if isinstance(c, type) and not getattr(c, "_is_protocol", False)} - outputs
+    assert made - {type(part) for part in PARTS.values()} == {Coulomb, Centreline}  # without parameters; with a file
+
+
+@pytest.mark.parametrize("value", [0.5, 1, np.float32(0.5), np.float64(0.5), np.int64(1)])
+def test_numbers_of_every_make_are_taken(value):
+    assert Granular(C=value, gamma0=0.24).C == value
+    assert Chain(length=value).length == Circle(amplitude=value).amplitude == value
+    assert rft.Backbone(np.int32(5)).joints == rft.Backbone(5.0).joints == Sine(elements=5.0, waves=1).joints == 4
+    assert Chain(np.array([1, 2])) == Chain([1, 2]) == Chain((1.0, 2.0))
+    assert Numerics(grid=np.int64(9)).grid == 9
+
+
+STILL = np.zeros(2)
+
+
+def body_velocities(value):
+    yield "medium", lambda: body_velocity(value, Chain(), STILL, STILL)
+    yield "body", lambda: body_velocity(Coulomb(), value, STILL, STILL)
+    yield "alpha", lambda: body_velocity(Coulomb(), Chain(), value, STILL)
+    yield "alphadot", lambda: body_velocity(Coulomb(), Chain(), STILL, value)
+    for name in ("loads", "regularisation", "tolerance", "threads", "effects"):
+        yield name, lambda name=name: body_velocity(Coulomb(), Chain(), STILL, STILL + 1, **{name: value})
+    march = np.zeros((8, 2))
+    for name in ("loads", "regularisation", "tolerance", "cycles", "effects"):
+        yield name, lambda name=name: rft.march(Coulomb(), Chain(), march, march + 1, **{name: value})
+    yield "medium", lambda: rft.march(value, Chain(), march, march + 1)
+    yield "body", lambda: rft.march(Coulomb(), value, march, march)
+    yield "alpha of a march", lambda: rft.march(Coulomb(), Chain(), value, march)
+    yield "medium", lambda: rft.work(value, Chain(), STILL, STILL, np.zeros(3))
+    yield "body", lambda: rft.work(Coulomb(), value, STILL, STILL, np.zeros(3))
+    yield "xi", lambda: rft.work(Coulomb(), Chain(), STILL, STILL, value)
+
+
+def geometries(value):
+    def velocity(alpha, alphadot):
+        return np.zeros((*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3))
+
+    plain = scenes.load("three-link-viscous")
+    fitted = connection.fit(velocity, connection.grid(2, 5))
+    yield "joints", lambda: connection.grid(value, 5, 1.0)
+    yield "grid", lambda: connection.grid(2, value, 1.0)
+    yield "extent", lambda: connection.grid(2, 5, value)
+    yield "joints", lambda: connection.directions(value, 64)
+    yield "directions", lambda: connection.directions(2, value)
+    for tier in (predict.path, predict.direct):
+        yield "velocity", lambda tier=tier: tier(value, Circle())
+        yield "gait", lambda tier=tier: tier(velocity, value)
+        yield "gait", lambda tier=tier: tier(velocity, value, [1.0])
+        yield "phases", lambda tier=tier: tier(velocity, Circle(), phases=value)
+    yield "amplitudes", lambda: predict.direct(velocity, Circle(), amplitudes=value)
+    yield "gait", lambda: predict.area(curvature.ccf(fitted), value)
+    yield "gait", lambda: family.fit(velocity, value, 1.0)
+    yield "largest", lambda: family.fit(velocity, Circle(), value)
+    yield "curves", lambda: family.fit(velocity, Circle(), 1.0, value)
+    yield "gait of the scene", lambda: plain.displacement("direct", value)
+    yield "method", lambda: plain.displacement(value)
+    yield "amplitudes", lambda: plain.displacement("direct", amplitudes=value)
+    yield "gait of the scene", lambda: plain.study([1.0], ["direct"], value)
+    yield "amplitudes of a study", lambda: plain.study(value, ["direct"])
+    yield "gait of the scene", lambda: plain.cycle(value)
+    yield "shape", lambda: fitted(value)
+    yield "xi", lambda: simulate.displacement(value)
+    yield "times", lambda: simulate.trajectory(np.zeros((4, 3)), value)
+    yield "scene", lambda: scenes.load(value)
+    yield "TOML", lambda: scenes.parse(value)
+    yield "tables", lambda: scenes.from_tables(value)
+    yield "file", lambda: Centreline(file=value)
+    for name in ("loads", "grid", "phases", "extent"):
+        yield "a change", lambda name=name: plain.with_numerics(**{name: value})
+    yield "tolerance", lambda: estimate.cheapest(plain, [1.0], value)
+
+
+TAKEN = {
+    *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
+    *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
+    *itertools.product(["amplitudes of a study"], ("empty", "list")),
+    *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
+    ("effects", "empty"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("calls", [body_velocities, geometries])
+@pytest.mark.parametrize("wrong", WRONG)
+def test_no_function_takes_a_wrong_type(calls, wrong):
+    for name, call in calls(WRONG[wrong]):
+        if (name, wrong) in TAKEN:
+            call()
+        elif name != "velocity" or not callable(WRONG[wrong]):
+            with pytest.raises(ValueError, match=".") as caught:
+                call()
+            assert "\n" not in str(caught.value), name
+            assert len(str(caught.value)) < 450, (name, str(caught.value))
+
+
+def test_the_place_is_named():
+    for call, said in (
+        (lambda: scenes.load(3), "scene must be a name or a TOML file, got 3"),
+        (
+            lambda: scenes.load("three-link-glass").with_numerics(grid="a"),
+            "three-link-glass: grid must be a whole number",
+        ),
+        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e+15, got 'x'"),
+        (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got [[1]]"),
+        (lambda: body_velocity("sand", Chain(), STILL, STILL), "medium must be a force law"),
+        (lambda: Scene(lambda v: v, Chain(), Circle()), "medium must be a force law"),
+        (lambda: Scene(Coulomb(), Chain(), [1, 2]), "gait must be a gait such as Circle(amplitude=0.5), got [1, 2]"),
+        (lambda: predict.direct(len, [1, 2]), "gait must be a gait"),
+        (lambda: connection.grid(2, 5, "a"), "extent must be a number from 1e-09 to 1e+06, got 'a'"),
+        (lambda: Scene(Coulomb(), Chain(), Circle(), effects=["caps"]), "effects must be a list of effects"),
+    ):
+        with pytest.raises(ValueError, match=".") as caught:
+            call()
+        assert said in str(caught.value)
+    assert issubclass(SceneError, ValueError)
