@@ -9,14 +9,14 @@ import numpy as np
 
 from rft.bodies.base import Body
 from rft.effects.base import Effect, broken, engine
-from rft.media.base import Medium, in_range, real_array, require, shown
+from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
 from rft.newton import Balance
 
 
 class Solution(NamedTuple):
     """Body velocities. xi: (..., 3), body frame, (length/time, length/time, rad/time). residual: (...), the larger
-    of force over the whole body's axial yield force (its drag at unit speed in a viscous medium) and moment over
-    that times the body's length. status: (...), "sliding", "stuck" (some element at rest) or "unconverged".
+    of force over the whole body's axial yield force (its drag at unit speed in a viscous medium) and moment about its
+    mean place over that times the body's length. status: (...), "sliding", "stuck" (some element at rest) or "unconverged".
     iterations: (...), evaluations of the load."""
 
     xi: np.ndarray
@@ -54,12 +54,13 @@ def body_velocity(
     regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
     off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
     threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
-    listed is not evaluated. Raises ValueError for shapes or values that make no sense.
+    listed is not evaluated. Raises ValueError for shapes or values that make no sense, and for a medium that pushes.
     """
     if engine(effects) != "algebraic":
         lost = ", ".join(sorted(broken(effects)))
         raise ValueError(f"no body velocity follows from shape alone where effects break {lost}: use rft.march")
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
+    require_drag(medium)
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]

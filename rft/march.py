@@ -18,7 +18,7 @@ from rft.balance import checked_input
 from rft.bodies.base import Body, Motion
 from rft.effects.base import Effect, Here, broken
 from rft.inertia import Mass
-from rft.media.base import Medium, in_range, require
+from rft.media.base import Medium, in_range, require, require_drag
 from rft.newton import Balance
 from rft.work import Work, done_by
 
@@ -81,6 +81,7 @@ def march(
     cycle is like another). Other arguments as in `rft.body_velocity`. ValueError for what makes no sense.
     """
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
+    require_drag(medium)
     require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"a march takes 8 phases or more, got alpha {alpha.shape}")
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)

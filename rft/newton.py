@@ -2,9 +2,10 @@
 
 A dry medium is first taken with its kinks rounded off widely (``eps``, a speed), where the problem is easy, then with
 less and less rounding down to the wanted ``regularisation``; the tangent dx/d(eps) carries the solution from one level
-to the next. On a level the steps are Newton's, halved while the residual does not fall; samples that need too many go
-back to the start and come down in smaller strides. Element velocities are carried beside xi and updated by small steps,
-so that an element at rest keeps all its digits.
+to the next. On a level the steps are Newton's, halved while the residual does not fall. Samples that need too many are
+followed along their curve of solutions, which may turn back on its way down (`rft.path`); where that breaks, slower
+descents are tried. Element velocities are carried beside xi and updated by small steps, so that an element at rest keeps
+all its digits. What decides about a step, or an end, is the same in every frame of the body.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Motion
-from rft.effects.base import applied
+from rft.effects.base import applied, broken
 from rft.inertia import Inertia
 from rft.loads import Known, element_load, parse
+from rft.path import follow
 
-LARGEST_STEP = 3.0  # in any component of xi, per radian: no body moves that fast
+LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
 LENGTHEN = 2.0  # the next part to try, after a success
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
@@ -52,14 +54,17 @@ class Descent(NamedTuple):
     budget: int  # iterations allowed
 
 
-ATTEMPTS = (
-    Descent(0.03, 0.03, 1e-3, 5.0, 60),
+QUICK = Descent(0.03, 0.03, 1e-3, 5.0, 48)
+WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
+# Walks along a curve: size of a step's first correction, evaluations allowed. A force law alone needs no more than these;
+# the slow descents are for effects, and quadrature rules, with kinks of their own that no rounding takes away.
+WALKS = ((0.2, 150), (0.02, 600))
+SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150),
     Descent(0.3, 0.3, 1e-6, np.inf, 500),
     Descent(1.0, 0.6, 1e-8, np.inf, 3000),
 )
-SCATTERED, STARTS = 8, 200  # balances that no descent solves, and starts for each
-WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
+DIFFERENCE = 1e-6  # of eps, for the derivative with respect to it
 
 
 class Solved(NamedTuple):
@@ -77,6 +82,7 @@ class _State:
 
     index: np.ndarray
     motion: Motion
+    centre: np.ndarray  # (2, B) the body's mean place
     xi: np.ndarray  # (3, B)
     dx: np.ndarray  # (3, B) the step to try
     v: np.ndarray  # (3, n, B) element velocities at xi
@@ -106,11 +112,12 @@ class Balance:
         self.regularisation = regularisation
         self.load, self.body = applied(effects, element_load(medium, loads), medium, body)
         self.nodes = parse(loads)[1]
-        axial, lateral = float(medium.traction(1.0, 0.0)[0]), float(medium.traction(0.0, 1.0)[1])
-        self.unit = axial
+        axial, lateral = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
+        self.unit = axial or lateral  # residuals are magnitudes
         self.viscous_unit = medium.viscous[0] if medium.dry and medium.viscous else 0.0
-        self.limit = tolerance + 1e-14 * max(1.0, lateral / axial)  # rounding of the largest forces
+        self.limit = tolerance + 1e-14 * max(1.0, lateral / self.unit)  # rounding of the largest forces
         self.linear = medium.dry == ()
+        self.homogeneous = bool(medium.dry) and not any(medium.viscous) and not broken(effects)
 
     def weigh(self, inertia: Inertia) -> None:
         """Let mass take part."""
@@ -127,40 +134,28 @@ class Balance:
         size = speed.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
-        for descent in ((WARM,) if guess is not None else ()) + ATTEMPTS:
-            self._attempt(todo, descent, out, threads)
+        for way in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
+            if isinstance(way, Descent):
+                self._attempt(todo, way, out, threads)
+            else:
+                self._follow(todo, *way, out)
             todo = np.flatnonzero(out.residual > self.limit)
             if not todo.size:
                 break
-        for sample in todo[:SCATTERED]:
-            self._scatter(sample, out)
         return out
 
-    def _scatter(self, sample: int, out: Solved) -> None:
-        """Least squares from scattered starts, for a balance whose kinks stop every descent: one in 200,000 steps of random
-        marches, with weakened sides and hardly any axial drag."""
-        from scipy.optimize import least_squares
+    def _follow(self, todo, wanted: float, budget: int, out: Solved) -> None:
+        """Solve the samples ``todo`` along their curves."""
+        for index in np.array_split(todo, math.ceil(todo.size / self._together(todo))):
+            for i, xi, v, residual, evaluations in follow(self, index, wanted, budget):
+                out.iterations[i] += evaluations
+                solved = residual <= self.limit
+                i = i[solved]
+                out.xi[:, i], out.residual[i], out.stuck[i] = xi[:, solved], residual[solved], self._stuck(v)[solved]
 
-        index, rng = np.array([sample]), np.random.default_rng(0)
-        motion, eps = self.motion(index), np.array([self.regularisation])
-
-        def net(x):
-            x = x[:, None]
-            return self._net(motion, motion.v + motion.carried(x), x, eps, index)[1][..., 0] / self.units[sample]
-
-        for _ in range(STARTS):
-            start = out.xi[:, sample] + rng.normal(size=3) * 10 ** rng.uniform(-6, 0)
-            found = least_squares(
-                lambda x: net(x)[:, 0], start, lambda x: net(x)[:, 1:], xtol=1e-15, ftol=1e-15, gtol=1e-15
-            )
-            residual = np.abs(found.fun).max()
-            if residual < out.residual[sample]:
-                v = motion.v + motion.carried(found.x[:, None])
-                out.xi[:, sample], out.residual[sample] = found.x, residual
-                out.stuck[sample] = self._stuck(v)[0]
-            out.iterations[sample] += found.nfev
-            if residual <= self.limit:
-                return
+    def _together(self, todo) -> int:
+        """How many samples are solved side by side."""
+        return max(1, ELEMENTS_TOGETHER // (self.motion(todo[:1]).half.shape[0] * self.nodes))
 
     def _stuck(self, v: np.ndarray) -> np.ndarray:
         """(B,): whether some element is at rest, from (a, m, w) as (3, n, B)."""
@@ -169,8 +164,7 @@ class Balance:
 
     def _attempt(self, todo, descent: Descent, out: Solved, threads) -> None:
         """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
-        elements = self.motion(todo[:1]).half.shape[0] * self.nodes
-        batch = max(1, ELEMENTS_TOGETHER // elements)
+        batch = self._together(todo)
 
         def work(share, stop):
             queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
@@ -192,9 +186,28 @@ class Balance:
         if descent is WARM:
             dx = self.guess[:, index]
         else:
-            net = self._net(motion, motion.v, at_rest, np.full(size, 1e3), index)[1]
-            dx = -_solve3(net[:, 1:], net[:, 0])
-        return _State(index, motion, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
+            dx = self.viscous(motion, index)
+        count = np.zeros(size, int)
+        return _State(index, motion, motion.centre, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, count)
+
+    def viscous(self, motion: Motion, index) -> np.ndarray:
+        """(3, B): the solution with kinks rounded off almost without end."""
+        net = self._net(motion, motion.v, np.zeros((3, index.size)), np.full(index.size, 1e3), index)[1]
+        return -_solve3(net[:, 1:], net[:, 0])
+
+    def with_slope(self, motion: Motion, xi, v, eps, index) -> tuple[np.ndarray, np.ndarray, int]:
+        """What comes to the frame, (3, 4, B), its derivative with respect to log eps, (3, B), and the evaluations taken."""
+        load, net = self._net(motion, v, xi, eps, index)
+        if self.homogeneous:
+            return net, -motion.total(_along(load, v)), 1
+        more = self._net(motion, v, xi, (1.0 + DIFFERENCE) * eps, index)[1]
+        return net, (more[:, 0] - net[:, 0]) / DIFFERENCE, 2
+
+    def residual(self, net: np.ndarray, centre: np.ndarray, index) -> np.ndarray:
+        """(B,): the larger of force and moment about the mean place, from those on the frame (3, B)."""
+        force = np.sqrt(net[0] * net[0] + net[1] * net[1])
+        moment = net[2] - centre[0] * net[1] + centre[1] * net[0]
+        return np.maximum(force, np.abs(moment)) / self.units[index]
 
     def _net(self, motion: Motion, v, xi, eps, index) -> tuple[np.ndarray, np.ndarray]:
         """Element loads (3, 4, n, B) and what they, and the mass, come to on the frame, (3, 4, B)."""
@@ -218,7 +231,7 @@ class Balance:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.motion.carried(s.dx)
         load, net = self._net(s.motion, v, s.xi + s.dx, s.eps_next, s.index)
-        residual = np.abs(net[:, 0]).max(0) / self.units[s.index]
+        residual = self.residual(net[:, 0], s.centre, s.index)
         kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
         s.iterations = s.iterations + 1
         s.xi = np.where(kept, s.xi + s.dx, s.xi)
@@ -243,15 +256,20 @@ class Balance:
             s.eps_next[d] = np.maximum(ratio * s.eps[d], self.regularisation)
             # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v. An element at rest creeps
             # in proportion to eps; one that slides feels eps^2.
-            slope = np.einsum("ijnb,jnb->inb", load[:, 1:][..., d], s.v[..., d])
+            slope = _along(load[..., d], s.v[..., d])
             change = s.eps_next[d] / s.eps[d]
             right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.motion.take(d).total(slope)
         dx = _solve3(net[:, 1:], right)
-        return np.clip(dx, -LARGEST_STEP, LARGEST_STEP)
+        if np.abs(dx).max(initial=0.0) <= 1.0:  # then no place within a body length moves by LARGEST_STEP
+            return dx
+        x, y, turn = dx
+        size2 = (x - s.centre[1] * turn) ** 2 + (y + s.centre[0] * turn) ** 2 + turn * turn
+        return dx * (LARGEST_STEP / np.sqrt(np.maximum(size2, LARGEST_STEP**2)))
 
     def _write(self, s: _State, ended: np.ndarray, out: Solved) -> None:
         i = s.index[ended]
-        out.xi[:, i], out.residual[i] = s.xi[:, ended], s.residual[ended]
+        there = s.eps <= self.regularisation  # a balance with wider rounding is not the one that was asked for
+        out.xi[:, i], out.residual[i] = s.xi[:, ended], np.where(there, s.residual, np.inf)[ended]
         out.iterations[i] += s.iterations[ended]
         out.stuck[i] = self._stuck(s.v[..., ended])
 
@@ -260,6 +278,11 @@ def _slowest(v: np.ndarray) -> np.ndarray:
     """(B,): the speed of the slowest element, each by its faster end, from (a, m, w) as (3, n, B)."""
     a, m, w = v
     return np.sqrt((a * a + (np.abs(m) + np.abs(w)) ** 2).min(0))
+
+
+def _along(load: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """(3, n, B): the change of element loads (3, 4, n, B) along their velocities, tangent times v."""
+    return np.einsum("ijnb,jnb->inb", load[:, 1:], v)
 
 
 def _workers(threads: int | None, useful: int) -> int:

@@ -1,12 +1,16 @@
 """Force laws: Eqs. 2-3 as printed, limits, and what every medium must satisfy."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from registry import DRY, MEDIA
 
-from rft import CATALOGUE, Coulomb, Granular, Viscous
+from geomech.gaits import Circle
+from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, march
+from rft.media.base import TermLaw, require_drag
+from rft.newton import Balance
 
 DIRECTIONS = np.linspace(-np.pi, np.pi, 41)
 
@@ -72,6 +76,82 @@ def test_limits():
     v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
     np.testing.assert_allclose(Granular(0.0, 0.2).traction(*v), Coulomb().traction(*v), atol=1e-15)
     np.testing.assert_allclose(Viscous(3.0).traction(*v), [v[0], 3 * v[1]], rtol=1e-15)
+
+
+class Law(TermLaw):
+    """Terms of one's own; compared by value and not hashable, as a dataclass is by default."""
+
+    __hash__ = None
+
+    def __init__(self, *dry, viscous=(0.0, 0.0)):
+        self.dry, self.viscous = dry, viscous
+
+
+class Tilted:
+    """No terms: traction alone. It drags but for motion about 45 degrees to the left, faster than 1e3."""
+
+    dry = viscous = None
+    mirror = False
+
+    def traction(self, v_t, v_n, eps=0.0):
+        speed = np.sqrt(v_t**2 + v_n**2 + eps**2)
+        push = (v_t * v_n > 0.9 * speed**2 / 2) & (v_n > 0) & (speed > 1e3)
+        sign = np.where(push, -1.0, 1.0) / np.where(speed == 0, 1.0, speed)
+        return sign * v_t, sign * v_n
+
+
+class Backwards(Tilted):
+    def traction(self, v_t, v_n, eps=0.0):
+        return -np.asarray(v_t, float), -np.asarray(v_n, float)
+
+
+PUSHING = {
+    "along": (Law((1.0, -1.0, 1.0)), "Law pushes instead of drags at velocity"),
+    "across": (Law((1.0, 1.0, 1.0), (0.2, 0.0, -1.5)), "Law pushes"),
+    "only fast": (Law((1.0, 1.0, 1.0), viscous=(0.5, -1e-6)), "Law pushes"),
+    "only slow": (Law((1.0, -1e-6, 1.0), viscous=(0.5, 1.0)), "Law pushes"),
+    "one way": (Tilted(), "Tilted pushes instead of drags at velocity"),
+    "everywhere": (Backwards(), "Backwards has no drag"),
+    "nothing": (Law(), "Law has no drag at any velocity"),
+}
+
+
+@pytest.mark.parametrize("name", PUSHING)
+@pytest.mark.parametrize("solve", [body_velocity, march])
+def test_a_medium_that_pushes_is_refused(name, solve):
+    medium, said = PUSHING[name]
+    alpha, alphadot = Circle().cycle(8)
+    with pytest.raises(ValueError, match=said) as caught:
+        solve(medium, Chain(), alpha, alphadot, loads="gauss:4")
+    assert "\n" not in str(caught.value)
+
+
+def test_the_velocity_at_which_it_pushes_is_named():
+    with pytest.raises(ValueError, match=r"at velocity \((\S+), (\S+)\)") as caught:
+        require_drag(Tilted())
+    v_t, v_n = (float(x) for x in re.search(r"\((\S+), (\S+)\)", str(caught.value)).groups())
+    assert np.hypot(v_t, v_n) > 1e3
+    assert v_n == pytest.approx(v_t, rel=0.5)
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_media_that_drag_pass(name):
+    require_drag(MEDIA[name])
+
+
+def test_residuals_are_magnitudes():
+    """Whatever the sign of the law: the solver below the check has no negative residual."""
+    solved = Balance(Law((1.0, -1.0, -3.0)), Chain(), "exact", 1e-6, 1e-10)
+    alpha, alphadot = np.array([[0.4], [-0.7]]), np.array([[1.0], [0.2]])
+    assert (solved.solve(Chain().motion(alpha, alphadot).take, np.ones(1), 1).residual >= 0).all()
+    assert solved.unit == 1.0
+
+
+def test_a_law_without_axial_drag():
+    """Sideways friction alone: residuals are then over the drag across."""
+    medium = Law((1.0, 0.0, 2.0))
+    found = body_velocity(medium, Chain((1, 1.5, 0.8)), [0.9, 0.7], [1.0, -0.4]).checked()
+    assert found.residual < 1e-9
 
 
 @pytest.mark.parametrize(

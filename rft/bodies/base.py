@@ -38,6 +38,13 @@ class Motion(NamedTuple):
         """(n, B), complex: the elements' centres; the lever (r_t, r_n) is i place conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
+    @property
+    def centre(self) -> np.ndarray:
+        """(2, B): the mean place of the body's length."""
+        part = self.half / self.half.sum()
+        x, y = self.r_t * self.s + self.r_n * self.c, self.r_n * self.s - self.r_t * self.c
+        return np.stack([(part * x).sum(0), (part * y).sum(0)])
+
     def take(self, keep: np.ndarray) -> Motion:
         """The samples that ``keep`` (an index or mask over B) selects."""
         c, s, r_t, r_n, half, weight, v = self

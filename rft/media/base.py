@@ -61,6 +61,27 @@ class TermLaw:
         )
 
 
+SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
+
+
+def require_drag(medium: Medium) -> None:
+    """Raise ValueError if the medium pushes: if at some velocity, of 48 directions and speeds from 1e-12 to 1e12, its force
+    has a part along the motion, not against it, or if it has none at all."""
+    v_t, v_n = TRIED
+    with np.errstate(all="ignore"):
+        f_t, f_n = medium.traction(v_t, v_n)
+        against = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1: straight against the motion
+    name, against = type(medium).__name__, np.nan_to_num(against)
+    require(bool((against > 0).any()), f"{name} has no drag at any velocity: give its traction a positive one")
+    worst = np.unravel_index(np.argmin(against), against.shape)
+    require(
+        against[worst] > -1e-9,  # rounding, in laws that hardly drag along the body
+        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body: "
+        "drag is positive in the direction of the motion it opposes, change its sign there",
+    )
+
+
 def is_linear(medium: Medium) -> bool:
     """Whether drag is proportional to velocity, so that the body velocity is linear in alphadot."""
     return medium.dry == ()

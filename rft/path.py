@@ -1,0 +1,196 @@
+"""Follow the solutions of a balance from a wide rounding of its kinks to the wanted one, round folds.
+
+With a wide rounding ``eps`` a dry law is viscous and has one solution. From there a curve of solutions (xi, eps) leads to
+any smaller rounding, since drag bounds the velocities. Where a law is not monotone, as a granular one, the curve may
+fold: eps grows again for a while, three solutions share it, and a descent that only lowers eps falls off. The curve goes
+on, and is followed by its arc length: a step along the tangent predicts, Newton's method across it corrects, with parts of
+its steps where the natural monotonicity test asks for them. (Allgower and Georg, Numerical Continuation Methods, 1990,
+chapters 2 and 6; Deuflhard, Newton Methods for Nonlinear Problems, 2004, section 3.3.)
+
+A change of (xi, log eps) counts as the largest change of an element's velocity over its speed or eps, the larger: no
+frame, unit or scale matters. Of several solutions this takes the first on the curve, where the tangent dF/dxi has a
+positive determinant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.bodies.base import Motion
+
+WIDE = 10.0  # rounding to start from, body lengths per radian: no element is that fast
+FIRST = 2.0  # the first step
+LONGEST = 1.0  # first correction that is not refused
+CLOSE, SMALL = 0.25, 1e-6  # a correction is the last one: as part of the one before, or whatever that was
+CORRECTIONS, AT_THE_END = 5, 8  # of a step; of one that reaches the wanted rounding
+FINE, PATIENCE = 1e-5, 30  # steps below this are corrected with damping, so many times
+GROWS, SHRINKS = 3.0, 0.5  # the step's change, at most after a success, at least after a failure
+LEAST = 2.0**-10  # part of a correction that is taken whether it helps or not
+
+
+class _Point(NamedTuple):
+    """xi: (3, B). v: (3, n, B), element velocities there. eps: (B,)."""
+
+    xi: np.ndarray
+    v: np.ndarray
+    eps: np.ndarray
+
+    def moved(self, motion: Motion, change: np.ndarray) -> _Point:
+        """After a change (4, B) of (xi, log eps)."""
+        return _Point(self.xi + change[:3], self.v + motion.carried(change[:3]), self.eps * np.exp(change[3]))
+
+    def where(self, mask: np.ndarray, other: _Point) -> _Point:
+        """This point where the mask (B,) says so, the other elsewhere."""
+        return _Point(*(np.where(mask, x, y) for x, y in zip(self, other)))
+
+    def take(self, keep) -> _Point:
+        return _Point(*(x[..., keep] for x in self))
+
+    def speed2(self) -> np.ndarray:
+        """(n, B): squares of the elements' speeds, each at its faster end, and of eps."""
+        a, m, w = self.v
+        return a * a + (np.abs(m) + np.abs(w)) ** 2 + self.eps**2
+
+    def size(self, motion: Motion, change: np.ndarray) -> np.ndarray:
+        """(B,): the size of a change (4, B), as the module's heading has it."""
+        v = motion.carried(change[:3])
+        return np.maximum(np.sqrt(((v * v).sum(0) / self.speed2()).max(0)), np.abs(change[3]))
+
+
+@dataclass
+class _Walk:
+    """Samples on their curves. Every array has them on its last axis."""
+
+    index: np.ndarray
+    motion: Motion
+    centre: np.ndarray
+    evaluations: np.ndarray
+    foot: _Point  # on the curve
+    tangent: np.ndarray  # (4, B) there, of size 1
+    border: np.ndarray  # (4, B) what a correction is to leave alone: the tangent, by the metric
+    step: np.ndarray  # along the tangent
+    point: _Point  # on the way to the curve, after a step
+    change: np.ndarray  # (4, B) to try from there
+    part: np.ndarray  # of the correction that is
+    size: np.ndarray  # of the whole correction
+    matrix: np.ndarray  # (4, 4, B) that it was solved with
+    tries: np.ndarray  # corrections since the foot
+    miss: np.ndarray  # size of the first one
+    last: np.ndarray  # whether the step reaches the wanted rounding
+
+    def take(self, keep: np.ndarray) -> _Walk:
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        moves = ("motion", "foot", "point")
+        return _Walk(**{k: x.take(keep) if k in moves else x[..., keep] for k, x in parts.items()})
+
+
+def follow(problem, index: np.ndarray, wanted: float, budget: int):
+    """Solve the samples ``index`` (B,) of a `rft.newton.Balance` under way. Yields (their places in the batch, xi (3, b),
+    element velocities, residual (b,), evaluations (b,)) as they end, with residual inf where the budget is spent.
+    wanted: the size of a step's first correction, by which the next step is chosen."""
+    s = _start(problem, index)
+    while s.index.size:
+        new = s.point.moved(s.motion, s.change)
+        new = new._replace(eps=np.where(s.last, problem.regularisation, new.eps))
+        net, slope, cost = problem.with_slope(s.motion, *new, s.index)
+        s.evaluations = s.evaluations + cost
+        residual = problem.residual(net[:, 0], s.centre, s.index)
+        done = s.last & (residual <= problem.limit)
+        _correct(s, new, net, slope, wanted, problem.regularisation)
+        ended = done | (s.evaluations >= budget)
+        if ended.any():
+            i = np.flatnonzero(ended)
+            residual = np.where(done, residual, np.inf)[i]
+            yield s.index[i], new.xi[:, i], new.v[..., i], residual, s.evaluations[i]
+            s = s.take(np.flatnonzero(~ended))
+
+
+def _start(problem, index: np.ndarray) -> _Walk:
+    """At the viscous solution, on the way to less rounding."""
+    motion = problem.motion(index)
+    size = index.size
+    xi = problem.viscous(motion, index)
+    foot = _Point(xi, motion.v + motion.carried(xi), np.full(size, max(WIDE, problem.regularisation)))
+    down = np.zeros((4, size))
+    down[3] = -1.0
+    zero, one, count = np.zeros(size), np.ones(size), np.zeros(size, int)
+    s = _Walk(index, motion, motion.centre, count + 1, foot, down, down, FIRST * one, foot, down, one, zero,
+              np.zeros((4, 4, size)), count, zero, count > 0)  # fmt: skip
+    _predict(s, np.ones(size, bool), problem.regularisation)
+    return s
+
+
+def _predict(s: _Walk, who: np.ndarray, target: float) -> None:
+    """A step along the tangent for the samples ``who``, straight in (xi, eps), for an element at rest creeps with eps."""
+    slope = s.tangent[3]
+    eps = s.foot.eps * np.exp(np.clip(s.step * slope, -100.0, 5.0))
+    last = eps <= target
+    eps = np.where(last, target, eps)
+    level = np.abs(slope) < 1e-9
+    part = np.where(level, s.step, (eps / s.foot.eps - 1.0) / np.where(level, 1.0, slope))
+    ahead = np.concatenate([s.tangent[:3] * part, np.log(eps / s.foot.eps)[None]])
+    s.point = s.foot.where(who, s.point)
+    s.change = np.where(who, ahead, s.change)
+    s.last = np.where(who, last, s.last)
+    s.part, s.tries = np.where(who, 1.0, s.part), np.where(who, 0, s.tries)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # corrections that fail may be of any size
+def _correct(s: _Walk, new: _Point, net, slope, wanted: float, target: float) -> None:
+    """Judge the points that were tried, and choose what to try next."""
+    matrix = _bordered(s, net, slope)
+    right = np.zeros((4, 2, s.index.size))
+    right[:3, 0], right[3, 1] = -net[:, 0], 1.0
+    correction, tangent = np.moveaxis(_solve4(matrix, right), 1, 0)
+    size = new.size(s.motion, correction)
+    first, fine = s.tries == 0, s.step < FINE
+    s.miss = np.where(first, size, s.miss)
+    # With the matrix of the point before, a correction must be smaller by about half the part that was taken.
+    before = s.point.size(s.motion, _solve4(np.where(first, np.eye(4)[..., None], s.matrix), right[:, :1])[:, 0])
+    smaller = first | (before <= (1.0 - 0.5 * s.part) * s.size) | (s.part <= LEAST)
+    most = np.where(fine, PATIENCE, np.where(s.last, AT_THE_END, CORRECTIONS))
+    failed = ~np.isfinite(size) | (first & (size > LONGEST)) | ~(smaller | fine) | (s.tries >= most)
+    onto = ~failed & smaller & ~first & ~s.last & (s.part == 1.0) & (size <= np.maximum(CLOSE * s.size, SMALL))
+    going = ~failed & smaller & ~onto
+    part = np.where(going, np.where(first, 1.0, np.minimum(1.0, 2.0 * s.part)), 0.5 * s.part)
+    s.change = np.where(going, part * correction, 0.5 * s.change)
+    s.change[3] = np.clip(s.change[3], -1.0, 1.0)
+    s.point = new.where(going, s.point)
+    s.size, s.matrix = np.where(going, size, s.size), np.where(going, matrix, s.matrix)
+    s.part, s.tries = part, s.tries + 1
+    if onto.any():
+        _stand(s, onto, new, correction, tangent)
+    factor = np.sqrt(wanted / np.fmax(s.miss, 1e-9))
+    s.step = np.where(onto, s.step * np.clip(factor, 1 / GROWS, GROWS), s.step)
+    s.step = np.where(failed, s.step * np.fmin(np.fmax(factor, 0.1), SHRINKS), s.step)
+    if (failed | onto).any():
+        _predict(s, failed | onto, target)
+
+
+def _bordered(s: _Walk, net, slope) -> np.ndarray:
+    """(4, 4, B): the tangent with respect to (xi, log eps) over the border; over eps itself in the last step."""
+    matrix = np.empty((4, 4, s.index.size))
+    matrix[:3, :3], matrix[:3, 3] = net[:, 1:], slope
+    matrix[3] = np.where(s.last, np.eye(4)[3][:, None], s.border)
+    return matrix
+
+
+def _stand(s: _Walk, who: np.ndarray, new: _Point, correction, tangent) -> None:
+    """Take the corrected points of the samples ``who`` for points of the curve, and the tangents there."""
+    foot = new.moved(s.motion, np.where(who, correction, 0.0))
+    tangent = tangent / foot.size(s.motion, tangent)
+    border = s.motion.total(s.motion.carried(tangent[:3]) / foot.speed2())
+    s.foot = foot.where(who, s.foot)
+    s.tangent = np.where(who, tangent, s.tangent)
+    s.border = np.where(who, np.concatenate([border, tangent[3:]]), s.border)
+
+
+def _solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """x (4, k, B) with matrix (4, 4, B) x = right; a matrix that is singular, or no number, gives a step that fails."""
+    matrix, right = np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0)
+    sound = np.abs(np.linalg.det(matrix)) > 0
+    x = np.linalg.solve(np.where(sound[:, None, None], matrix, np.eye(4)), right)
+    return np.moveaxis(np.where(sound[:, None, None], x, np.nan), 0, -1)
