@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import Medium, TermLaw, require, shown
+from rft.media.base import Medium, TermLaw, require_law
 
 TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
 SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
@@ -230,8 +230,7 @@ def parse(how: str) -> tuple[str, int]:
 
 def element_load(medium: Medium, how: str = "exact") -> LoadLaw:
     """The load of a medium on an element, ``how`` as in `parse`; ValueError for what is no medium."""
-    good = all(hasattr(medium, name) for name in ("dry", "viscous", "traction")) and not isinstance(medium, type)
-    require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    require_law(medium)
     kind, count = parse(how)
     if kind == "exact":
         return exact(medium)

@@ -73,7 +73,9 @@ def test_help_ends_with_0(name, ended):
 def refused(told, said):
     code, out, err, files = told
     assert (code, out, files) == (2, "", set())
-    lines = [line for line in err.splitlines() if "s of computing and" not in line]  # on a slow machine the cost is told
+    lines = [
+        line for line in err.splitlines() if "s of computing and" not in line
+    ]  # on a slow machine the cost is told
     assert len(lines) == 1
     assert lines[0].startswith("error: ")
     assert said in lines[0]

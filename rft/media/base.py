@@ -65,9 +65,16 @@ SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.
 TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
+def require_law(medium: Medium) -> None:
+    """Raise ValueError for what is no medium."""
+    good = all(hasattr(medium, name) for name in ("dry", "viscous", "traction")) and not isinstance(medium, type)
+    require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+
+
 def require_drag(medium: Medium) -> None:
     """Raise ValueError if the medium pushes: if at some velocity, of 48 directions and speeds from 1e-12 to 1e12, its force
     has a part along the motion, not against it, or if it has none at all."""
+    require_law(medium)
     v_t, v_n = TRIED
     with np.errstate(all="ignore"):
         f_t, f_n = medium.traction(v_t, v_n)
