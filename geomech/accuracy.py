@@ -24,6 +24,8 @@ TOLERANCES = 10.0 ** -np.arange(1, 7)
 ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
 TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of a march, which takes them one by one
+FINE_PIECES = 320  # of body, where effects cut it
+FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
 GRIDS = (7, 11, 15, 21, 31, 45, 61)
 
 
@@ -50,7 +52,7 @@ class Knob:
     def applies(self, scene: Scene) -> bool:
         if scene.linear and (self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")):
             return False
-        return self.tier in scene.tiers
+        return self.tier in scene.tiers and (self.setting != "pieces" or scene.pieces > 0)
 
 
 KNOBS = (
@@ -61,6 +63,8 @@ KNOBS = (
          "nothing that exact link integrals do not give for less", "limit", "gauss"),
     Knob("regularisation", "direct", "regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1",
          "links that really stand still", "limit"),
+    Knob("pieces", "direct", "pieces", (5, 10, 20, 40, 80), "2 in the mean, scattered by pivots",
+         "effects that vary along long links", "limit"),
     Knob("curves", "adapted", "curves", (4, 6, 8, 12, 16, 24, 48), "4 if smooth, about 2 across kinks",
          "every amplitude of one family from one table"),
     Knob("grid", "harmonic", "grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
@@ -80,6 +84,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     runs: each setting is timed so often, and the quickest counts; a march once, it is long enough for that to tell."""
     amplitudes = scene.gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
+    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.pieces else finest
     truth = finest.with_numerics(phases=_truth_phases(scene)).displacement("direct", None, amplitudes)
     knobs, lines = _knobs(scene), []
     for done, knob in enumerate(knobs):
@@ -139,9 +144,7 @@ def _limit(scene: Scene, knob: Knob) -> Scene:
     """The scene with a knob as far as it goes."""
     if knob.setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
         return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
-    return scene.with_numerics(
-        **{knob.setting: {"loads": "exact", "regularisation": 1e-9, "directions": 192}[knob.setting]}
-    )
+    return scene.with_numerics(**{knob.setting: FINEST[knob.setting]})
 
 
 def _fresh(knob: Knob, scene: Scene, value, amplitudes):

@@ -140,8 +140,10 @@ def direct(
 
 def _refinements(scene: Scene, marching: bool) -> float:
     """Balances that `estimate.direct` solves over those of the gait at its phases: a march again at a half, a quarter and
-    an eighth of them, and a quarter with a finer model where there is one."""
+    an eighth of them, and a quarter with a finer model where there is one. Pieces of body are doubled on the quarter, and
+    halved and quartered at all phases: as much as half and a half and a quarter."""
     again = 0.5 + 0.25 + 0.125 if marching else 0.0
+    again += 0.5 + 0.5 + 0.25 if scene.pieces else 0.0
     return 1.0 + again + (0.25 if estimate.finer_model(scene) else 0.0)
 
 

@@ -1,8 +1,9 @@
 """How far a displacement can be trusted, and the cheapest way to one that can be trusted far enough.
 
 Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the phases
-and, on the quarter, with the regularisation ten times smaller and exact link integrals; every other tier against the
-direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net headings, in rad.
+and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half the
+length; every other tier against the direct tier. Errors come in pairs: the distance between net positions, in body lengths,
+and between net headings, in rad.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ CHECKED = (
 FEWEST_STEPS = 64  # of a march that is refined: an eighth of them still makes one
 REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
 MOST_PHASES = 1 << 16
+MOST_PIECES = 10_000  # to a body length
+FINEST_PIECES = 640  # that a tolerance asks for
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
 
 
@@ -43,6 +46,11 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     """(poses (B, 3), errors (B, 2), body lengths and rad) of the direct tier; phases is rounded up to a multiple of 8,
     >= 32. Many
     amplitudes go in groups, so that memory is bounded."""
+    poses, *errors = _in_groups(scene, gait, amplitudes, phases)
+    return poses, sum(errors)
+
+
+def _in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
     if amplitudes is None:
         return _direct(scene, gait, None, phases)
     size = scene.at_once(phases)
@@ -50,7 +58,8 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     return tuple(np.concatenate(x) for x in zip(*(_direct(scene, gait, some, phases) for some in groups)))
 
 
-def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, np.ndarray]:
+def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
+    """(poses, errors of all but the pieces of body, errors of these) of the direct tier."""
     phases = max(32, 8 * -(-phases // 8))
     marching = scene.engine != "algebraic"
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if marching else phases, amplitudes)
@@ -67,12 +76,30 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
     error += 2 * np.pi * (run.residual * run.speed)[:, None]
     if finer := finer_model(scene):
         error += 1.2 * apart(finer.run(*every[1]).net, coarse, scene.body.length)
-    return full, error + settling(scene)
+    error += np.asarray(run.to_come)[..., None]
+    return full, error, pieces_error(scene, shapes, every[1], coarse)
+
+
+def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
+    """(B, 2), body lengths and rad: what pieces that are no shorter leave of the effects that vary along an element.
+
+    fewer: a quarter of the phases of ``shapes``, where pieces of half the length are compared with ``coarse``, the poses
+    there. Which pieces the pivots lie in is chance, so the error is of order 2 in the mean only: half of the pieces against a
+    quarter, at all phases, shows what that may hide.
+    """
+    pieces = scene.pieces
+    if not pieces:
+        return np.zeros((*coarse.shape[:-1], 2))
+    net = lambda n, cycle: scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).run(*cycle).net
+    length = scene.body.length
+    doubled = apart(net(2 * pieces, fewer), coarse, length)
+    chance = apart(net(pieces // 2, shapes), net(pieces // 4, shapes), length) / 8
+    return 2.0 * np.maximum(doubled, chance)
 
 
 def settling(scene: Scene) -> float:
-    """Change of displacement between cycles, body lengths and rad, at which a march of the scene ends; 0 without one."""
-    return 0.0 if scene.engine == "algebraic" else max(e.settles for e in scene.effects)
+    """Change of displacement still to come, body lengths and rad, at which its march ends; 0 where it need not settle."""
+    return max(e.settles for e in scene.effects) if scene.settles else 0.0
 
 
 def _left(d0, d1, d2, kinks: bool) -> np.ndarray:
@@ -143,7 +170,8 @@ def cheapest(
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(32 if scene.engine == "algebraic" else FEWEST_STEPS, 8 * gait.harmonics)
     if scene.lookups:
-        pilot, phases = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
+        pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
+        phases = settings["phases"]
     for method in sorted(scene.lookups, key=lambda m: solves(scene, m, len(amplitudes), phases)):
         if solves(scene, method, len(amplitudes), phases) >= solves(scene, "direct", len(amplitudes), phases):
             break
@@ -157,31 +185,38 @@ def cheapest(
             error = against_direct(scene, poses, gait, amplitudes)
             if error[:, 0].max() <= tol:
                 return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
-    (poses, error), phases = _refined(scene, gait, amplitudes, tol, phases, ask)
+    (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
+        found = " and ".join(f"{n} {name}" for name, n in settings.items())
         raise SceneError(
-            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} at {phases} phases): "
+            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             "raise --tol, or lower [numerics] regularisation and tolerance"
         )
-    return _answer("direct", amplitudes, poses, error, {"phases": phases}, start)
+    return _answer("direct", amplitudes, poses, error, settings, start)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
-    """The direct tier at twice the phases again and again, for the amplitudes that need it, until all positions are
-    within ``tol`` or doubling stops helping."""
+    """The direct tier at twice the phases, or the pieces of body where these leave more, again and again, for the
+    amplitudes that need it, until all positions are within ``tol`` or doubling stops helping. Returns (poses, errors) and
+    {"phases": ..., "pieces": ... where there are any}."""
     from geomech import cost
 
     ask(cost.direct(scene, gait, len(amplitudes), phases))
-    (poses, error), open_ = direct(scene, gait, amplitudes, phases), np.arange(len(amplitudes))
-    while (worse := open_[error[open_, 0] > tol]).size and 2 * phases <= MOST_PHASES:
-        phases *= 2
-        ask(cost.direct(scene, gait, len(worse), phases))
-        finer, now = direct(scene, gait, amplitudes[worse], phases)
-        stalled = (now > 0.9 * error[worse])[:, 0].all() and phases > 1024
-        poses[worse], error[worse], open_ = finer, now, worse
+    poses, error, of_pieces = _in_groups(scene, gait, amplitudes, phases)
+    error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), scene.numerics.pieces
+    while (worse := open_[error[open_, 0] > tol]).size:
+        coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
+        pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
+        if phases > MOST_PHASES or pieces > FINEST_PIECES:
+            break
+        finer_scene = scene.with_numerics(pieces=pieces)
+        ask(cost.direct(finer_scene, gait, len(worse), phases))
+        finer, now, left = _in_groups(finer_scene, gait, amplitudes[worse], phases)
+        stalled = (now + left > 0.9 * error[worse])[:, 0].all() and phases > 1024
+        poses[worse], error[worse], of_pieces[worse], open_ = finer, now + left, left, worse
         if stalled:
             break
-    return (poses, error), phases
+    return (poses, error), {"phases": phases, **({"pieces": pieces} if scene.pieces else {})}
 
 
 def _answer(method, amplitudes, poses, error, settings, start) -> dict:

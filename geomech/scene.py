@@ -26,6 +26,8 @@ from geomech.problem import SceneError, choose, real_array, short
 from geomech.simulate import displacement
 from rft.balance import checked_body
 from rft.bodies.base import halves
+from rft.bodies.pieces import PIECES
+from rft.effects.base import MOST_PIECES, pieced
 from rft.loads import element_load, parse
 from rft.media import is_linear
 from rft.media.base import check_ranges, in_range
@@ -43,7 +45,7 @@ ALGEBRAIC = {"symmetry", "no memory", "no inertia"}  # premises of a body veloci
 
 WHOLE = {  # numbers of [numerics], from and to
     "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
-    "harmonics": (1, 999), "curves": (4, 4096), "cycles": (1, 10_000),
+    "harmonics": (1, 999), "curves": (4, 4096), "cycles": (1, 10_000), "pieces": (1, MOST_PIECES),
 }  # fmt: skip
 
 
@@ -53,7 +55,8 @@ class Numerics:
     lengths per radian (rft.balance). tolerance: normalised residual. directions: of alphadot in the least-squares
     fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on either side.
     interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's table.
-    cycles: of a march (rft.march); if left out until they repeat, one where effects break symmetry."""
+    cycles: of a march (rft.march); if left out until they repeat, one where effects break symmetry. pieces: to a body
+    length, 1 to 10,000, into which effects that vary along an element cut it (`rft.effects`)."""
 
     loads: str = "exact"
     regularisation: float = 1e-6
@@ -66,6 +69,7 @@ class Numerics:
     harmonics: int = 15
     curves: int = 24
     cycles: int | None = None
+    pieces: int = PIECES
 
     def __post_init__(self):
         parse(self.loads)
@@ -82,7 +86,8 @@ class Numerics:
 class Cycle(NamedTuple):
     """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
     in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work:
-    `rft.Work`, (..., N) each, or None. cycles: how many a march took, 1 without one."""
+    `rft.Work`, (..., N) each, or None. cycles: how many a march took, 1 without one. to_come: (...), change of displacement
+    still to come in a march that goes on until cycles repeat, body lengths or rad; 0 elsewhere."""
 
     xi: np.ndarray
     net: np.ndarray
@@ -90,6 +95,7 @@ class Cycle(NamedTuple):
     speed: np.ndarray
     work: rft.Work | None
     cycles: int
+    to_come: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -160,6 +166,7 @@ class Scene:
         return rft.body_velocity(
             self.medium, self.body, alpha, alphadot,
             loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance, effects=self.effects,
+            pieces=n.pieces,
         )  # fmt: skip
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
@@ -167,7 +174,7 @@ class Scene:
         n = self.numerics
         return rft.work(
             self.medium, self.body, alpha, alphadot, xi,
-            loads=n.loads, regularisation=n.regularisation, effects=self.effects,
+            loads=n.loads, regularisation=n.regularisation, effects=self.effects, pieces=n.pieces,
         )  # fmt: skip
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
@@ -193,20 +200,35 @@ class Scene:
             each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
             solution = each.solve(alpha, alphadot).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
-            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1)
+            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
         march = rft.march(
             self.medium, self.body, alpha, alphadot, effects=self.effects, cycles=n.cycles, with_work=work,
-            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
+            loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance, pieces=n.pieces,
         ).checked()  # fmt: skip
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
         repeats = "symmetry" not in rft.effects.broken(self.effects) and (march.status == "settled").all()
         net = displacement(march.xi) if repeats else march.displacement
-        return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles)
+        to_come = march.drift if self.settles else 0.0 * speed
+        return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles, to_come)
+
+    @property
+    def settles(self) -> bool:
+        """Whether its cycles are run until they repeat."""
+        place_matters = "symmetry" in rft.effects.broken(self.effects)
+        return self.engine != "algebraic" and self.numerics.cycles is None and not place_matters
+
+    @property
+    def pieces(self) -> int:
+        """To a body length, that effects which vary along elements see: as asked for, or whole elements where these are
+        shorter; 0 without such effects."""
+        if not any(e.varies for e in self.effects):
+            return 0
+        return max(self.numerics.pieces, int(np.ceil(0.5 / halves(self.body).max() - 1e-9)))
 
     @property
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
-        body = self.body
+        body = pieced(self.body, self.effects, self.numerics.pieces)
         for effect in self.effects:
             body = effect.body(body)
         return len(halves(body))

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body
-from rft.effects.base import Effect, broken, engine
+from rft.bodies.pieces import PIECES
+from rft.effects.base import Effect, broken, engine, pieced
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
 from rft.newton import Balance
 
@@ -47,6 +48,7 @@ def body_velocity(
     tolerance: float = 1e-10,
     threads: int | None = None,
     effects: Sequence[Effect] = (),
+    pieces: int = PIECES,
 ) -> Solution:
     """Body velocity at which the medium's net force and moment on the body vanish.
 
@@ -54,7 +56,8 @@ def body_velocity(
     regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
     off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
     threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
-    listed is not evaluated. Raises ValueError for shapes or values that make no sense, and for a medium that pushes.
+    listed is not evaluated. pieces: to a body length, into which effects that vary along an element cut it. Raises
+    ValueError for shapes or values that make no sense, and for a medium that pushes.
     """
     if engine(effects) != "algebraic":
         lost = ", ".join(sorted(broken(effects)))
@@ -67,7 +70,7 @@ def body_velocity(
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = np.sqrt((alphadot * alphadot).sum(0))
     moving = speed > 0
-    problem = Balance(medium, body, loads, regularisation, tolerance, effects)
+    problem = Balance(medium, pieced(body, effects, pieces), loads, regularisation, tolerance, effects)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():

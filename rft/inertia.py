@@ -55,6 +55,7 @@ class Mass:
         self.inertia, self.dt = inertia, dt
         self.momenta: list[np.ndarray] = []
         self.flows: list[np.ndarray] = []
+        self.shapes: list[tuple] = []  # motion and heading at the same steps, for a kick
 
     def term(self, motion: Motion, scale: np.ndarray, unit: float, linear: bool) -> Inertia:
         """For the balance of this step, whose loads are over ``unit`` and, in a linear medium, over the scale."""
@@ -67,17 +68,31 @@ class Mass:
         mass, as `rft.work` takes it: (force (n, B), complex in the body frame; moment about its centre (n, B))."""
         n = np.count_nonzero(motion.half)
         M, shape = _momentum(motion)
-        v = (motion.v + motion.carried(xi))[:, :n] * scale
         turn = np.exp(1j * heading)
-        flow = np.stack([(v[0] + 1j * v[1]) * (motion.c + 1j * motion.s)[:n] * turn, v[2] + 0j])
+        flow = _over_ground(motion, (motion.v + motion.carried(xi)) * scale, turn)
         change = np.zeros_like(flow)
         if self.flows:
             rate, past = _difference(self.flows, self.dt)
             change = rate * flow - past
         self.momenta = [*self.momenta[-1:], scale * (np.einsum("ijb,jb->ib", M, xi) + shape)]
         self.flows = [*self.flows[-1:], flow]
+        self.shapes = [*self.shapes[-1:], (motion, turn)]
+        self.M, self.xi = M, scale * xi
         mass = self.inertia * 2 * motion.half[:n]
         return mass * change[0] * turn.conj(), mass * motion.half[:n] / 3 * change[1].real
+
+    def kick(self, change: np.ndarray) -> None:
+        """Let the body have been faster by so much, (3, B), in the body frame, at the last step, and have coasted there."""
+        more = np.einsum("ijb,jb->ib", self.M, change)
+        before = more + self.dt * (_coadjoint(self.xi, more) + _coadjoint(change, self.momenta[-1] + more))
+        self.momenta = [p + kick for p, kick in zip(self.momenta, (before, more))]
+        self.flows = [f + _over_ground(s[0], s[0].carried(change), s[1]) for f, s in zip(self.flows, self.shapes)]
+
+
+def _over_ground(motion: Motion, v: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(2, n, B), complex: velocities of the centres on the ground and turning of the elements, from (a, m, w) as (3, n, B)."""
+    n = np.count_nonzero(motion.half)
+    return np.stack([((v[0] + 1j * v[1]) * (motion.c + 1j * motion.s))[:n] * turn, v[2, :n] + 0j])
 
 
 def _difference(before: list, dt: float):

@@ -9,7 +9,8 @@ import numpy as np
 
 from rft.balance import checked_input
 from rft.bodies.base import Body, Motion, halves
-from rft.effects.base import Effect
+from rft.bodies.pieces import PIECES
+from rft.effects.base import Effect, pieced
 from rft.loads import Known
 from rft.media.base import Medium, real_array, require
 from rft.newton import Balance
@@ -38,12 +39,13 @@ def work(
     loads: str = "exact",
     regularisation: float = 1e-6,
     effects: Sequence[Effect] = (),
+    pieces: int = PIECES,
 ) -> Work:
     """Power and internal moments for body velocities xi (..., 3) that `body_velocity` gave for the same arguments."""
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
     require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
-    balance = Balance(medium, body, loads, regularisation, 1.0, effects)
+    balance = Balance(medium, pieced(body, effects, pieces), loads, regularisation, 1.0, effects)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
     speed = np.sqrt((alphadot**2).sum(0))

@@ -16,15 +16,17 @@ from rft import (
     DisturbedGround,
     EndCaps,
     SkinFriction,
+    Transient,
     Viscous,
     body_velocity,
     march,
 )
+from rft.bodies.base import stations
 from rft.bodies.pieces import Pieces, cut
 from rft.effects.base import Here
 from rft.effects.disturbed import Ground
-from rft.effects.sides import sides
-from rft.effects.transient import _developed
+from rft.effects.sides import parts, weakened
+from rft.effects.transient import SIGN, _developed
 from rft.loads import element_load
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -82,17 +84,22 @@ def test_sides_are_parts_of_the_whole():
     a, m, w = rng.normal(size=(3, 4, 50))
     m[0], w[1] = 0.0, 0.0
     eps, load = np.full(50, 1e-3), element_load(GLASS)
-    left, right = sides(load, a, m, w, eps)
-    np.testing.assert_allclose(left + right, load(a, m, w, eps), atol=1e-12)
+
+    def side(share):
+        return weakened(load, lambda m, w, known: (np.stack([share + 0 * m, 1 - share + 0 * m]), None, None))
+
+    left, right = (side(share)(a, m, w, eps) for share in (1.0, 0.0))
+    np.testing.assert_allclose((left + right)[1:], load(a, m, w, eps)[1:], atol=1e-12)
     s = (np.arange(20000) + 0.5) / 10000 - 1
     u = m + w * s[:, None, None]
     f_t, f_n = GLASS.traction(a, u, 1e-3)
     for part, where in ((left, u > 0), (right, u < 0)):
-        for row, f in enumerate((f_t, f_n, s[:, None, None] * f_n)):
+        np.testing.assert_allclose(part[0, 0], f_t.mean(0), atol=3e-4)  # along the body nothing is taken away
+        for row, f in ((1, f_n), (2, s[:, None, None] * f_n)):
             np.testing.assert_allclose(part[row, 0], (f * where).mean(0), atol=3e-4)
     h, inner = 1e-6, np.abs(np.abs(m) - np.abs(w)) > 1e-3
     for column, step in ((2, (0, h, 0)), (3, (0, 0, h))):
-        up, down = (sides(load, a + k * step[0], m + k * step[1], w + k * step[2], eps)[0] for k in (1, -1))
+        up, down = (side(1.0)(a + k * step[0], m + k * step[1], w + k * step[2], eps) for k in (1, -1))
         slope = (up - down)[1:, 0] / (2 * h)
         np.testing.assert_allclose(left[1:, column][:, inner], slope[:, inner], rtol=1e-3, atol=1e-3)
 
@@ -114,31 +121,55 @@ def test_transients_follow_their_equation():
     def marched(steps):
         h, t = np.zeros((2, 1, 1)), np.linspace(0, t_end, steps + 1)
         for before, now in itertools.pairwise(t):
-            h, _ = _developed(h, np.full((1, 1), way(before)), np.full((1, 1), way(now)), now - before, 3 / travel)
+            h, _ = _developed(h, SIGN * way(before), SIGN * way(now), now - before, 3 / travel)
         return h[:, 0, 0]
 
     truth, counts = exact(), np.array([50, 100, 200, 400])
     errors = [np.abs(marched(n) - truth).max() for n in counts]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2, abs=0.3)
-    one = np.ones((1, 1))
-    (left, right), _ = _developed(np.array([[[0.0]], [[1.0]]]), one, one, travel, 3 / travel)
+    (left, right), _ = _developed(np.array([[[0.0]], [[1.0]]]), SIGN, SIGN, travel, 3 / travel)
     assert left == pytest.approx(1 - np.exp(-3))
     assert right == pytest.approx(np.exp(-3))
 
 
 def test_slopes_of_shares_are_derivatives():
     rng = np.random.default_rng(3)
-    memory, before, now, h = rng.uniform(size=(2, 5, 40)), *rng.normal(size=(2, 5, 40)), 1e-6
+    memory, before, now, h = rng.uniform(size=(2, 5, 40)), *rng.normal(size=(2, 2, 5, 40)), 1e-6
     values, slopes = _developed(memory, before, now, 0.3, 2.0)
     difference = _developed(memory, before, now + h, 0.3, 2.0)[0] - _developed(memory, before, now - h, 0.3, 2.0)[0]
     np.testing.assert_allclose(slopes, difference / (2 * h), atol=1e-7)
     assert (values >= 0).all()
     assert (values <= 1).all()
-    assert (slopes[0] >= 0).all()  # the faster to the left, the more of the drag to the left
-    assert (slopes[1] <= 0).all()
+    assert (slopes >= 0).all()  # the faster to a side, the more of the drag to that side
+    paused = _developed(memory, np.abs(before), 0 * now, 0.3, 2.0)[0]  # it went on for a while before it stopped
+    np.testing.assert_allclose(paused, 1 - (1 - memory) * np.exp(-2.0 * 0.15 * np.abs(before)), rtol=1e-12)
     still = _developed(memory, before, now, 0.3, np.inf)
     assert (still[0] == 1).all()
     assert (still[1] == 0).all()
+
+
+def test_parts_of_elements_are_means_of_their_velocities():
+    rng = np.random.default_rng(6)
+    m, w = rng.normal(size=(2, 60))
+    m[0], w[1], w[2] = 0.0, 0.0, -m[2]
+    velocity, left, inside = parts(m, w)
+    u = m + w * ((np.arange(200_000)[:, None] + 0.5) / 100_000 - 1)
+    np.testing.assert_allclose(left, (u > 0).mean(0), atol=1e-5)
+    for side, share, found in ((u > 0, left, velocity[0]), (u < 0, 1 - left, velocity[1])):
+        np.testing.assert_allclose(share * found, (u * side).mean(0), atol=1e-5)
+    assert (inside == (np.abs(w) > np.abs(m))).all()
+
+
+def test_a_piece_that_turns_remembers_both_of_its_sides():
+    """About its middle for a long way: each half has built up its own side, so that the piece has half of either."""
+    effect, chain = Transient(travel=0.01), Chain((1, 1))
+    motion = chain.motion(np.zeros((1, 1)), np.ones((1, 1)))
+    here = Here(1.0, motion.place, motion.c + 1j * motion.s, motion, np.zeros((3, 2, 1)), np.ones(1))
+    v = np.array(
+        [[[0.0], [0.0]], [[0.0], [0.5]], [[1.0], [1.0]]]
+    )  # the second has its pivot at a quarter of its length
+    memory = effect.after(np.ones((2, 2, 1)), here, v)[..., 0]
+    np.testing.assert_allclose(memory, [[0.5, 0.75], [0.5, 0.25]], atol=1e-12)
 
 
 def test_ground_remembers_where_the_body_was():
@@ -157,7 +188,7 @@ def test_ground_remembers_where_the_body_was():
 def test_a_body_that_finds_fresh_ground_is_not_weakened():
     """The first steps of a straight-ahead chain: its own track lies behind and under it, not at its sides."""
     effect = DisturbedGround(radius=0.03, weakening=1.0)
-    body = cut(Chain((1, 1, 1)))
+    body = cut(Chain((1, 1, 1)), 40)
     motion = body.motion(np.zeros((2, 1)), np.ones((2, 1)))
     here = Here(0.1, motion.place, motion.c + 1j * motion.s, motion, motion.v, np.ones(1))
     memory = effect.start(len(motion.half), 1)
@@ -167,6 +198,19 @@ def test_a_body_that_finds_fresh_ground_is_not_weakened():
     aside = here._replace(place=motion.place + 0.06j)
     assert effect.at(memory, aside).right.max() < 0.1  # the track it left
     assert effect.at(memory, aside).left.min() == 1.0
+
+
+def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
+    """A track beside one half of an element takes half of that side's drag: the mean along it, not the most."""
+    effect, body = DisturbedGround(radius=0.03, weakening=1.0), Chain((1, 1))
+    motion = body.motion(np.zeros((1, 1)), np.ones((1, 1)))
+    here = Here(0.1, motion.place, motion.c + 1j * motion.s, motion, motion.v, np.ones(1))
+    ground = effect.start(2, 1)
+    track = np.linspace(-0.5, -0.25, 40)[:, None, None] + 0.06j  # along the tail half of the tail's link, to its left
+    ground.mark(track, 0.03)
+    left, right = effect.at(ground, here).left[:, 0], effect.at(ground, here).right[:, 0]
+    assert left[0] == pytest.approx(0.5, abs=0.08)
+    assert [left[1], *right] == [1, 1, 1]
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -195,6 +239,27 @@ def test_depth_along_the_body():
     np.testing.assert_allclose(up.pose, down.pose * [1, -1, -1], atol=1e-7)
 
 
+def test_a_slope_rises_where_it_says():
+    """Towards pi / 2 it is deeper where y > 0, so what lies there weighs more: a straight body whose drag grows
+    from tail to head, standing along y, turns about a point nearer to its head."""
+    chain, rate = Chain((1, 1)), np.array([1.0])
+    motion = chain.motion(np.zeros((1, 1)), rate[:, None])
+    here = Here(0.1, np.array([[0.3j], [-0.2j]]), np.full((2, 1), 1j), motion, motion.v, np.ones(1))
+    there = DepthProfile(slope=0.5, towards=np.pi / 2).at(None, here)
+    np.testing.assert_allclose(there.added[:2, 0], [0.15, -0.1], atol=1e-15)
+    askew = DepthProfile(slope=0.5, towards=np.pi / 6).at(None, here._replace(place=np.array([[1.0 + 0j], [1j]])))
+    np.testing.assert_allclose(askew.added[:2, 0], [0.5 * np.cos(np.pi / 6), 0.25], atol=1e-15)
+
+
+def test_stations_run_from_the_tails_cap_to_the_heads():
+    body = EndCaps(radius=0.05).body(Chain((1, 3)))
+    np.testing.assert_allclose(stations(body), [1 / 8, 5 / 8, 0, 1], atol=1e-15)
+    motion = body.motion(np.zeros((1, 1)), np.zeros((1, 1)))
+    np.testing.assert_allclose(motion.place[-2:, 0], [-0.5, 0.5], atol=1e-15)  # on which places they are
+    tail = EndCaps(radius=0.05, tail=4.0, head=0.0).body(Chain((1, 3))).motion(np.zeros((1, 1)), np.zeros((1, 1)))
+    assert tail.weight[-2] > tail.weight[-1] == 0
+
+
 def test_depth_along_a_straight_chain_in_closed_form():
     """In a viscous medium, straight, the tail's link turning: two linear equations for drift and turn."""
     depth = lambda x: 1.5 + x
@@ -207,5 +272,8 @@ def test_depth_along_a_straight_chain_in_closed_form():
         drift += [[np.sum(f), np.sum(f * x)], [np.sum(f * x), np.sum(f * x * x)]]
     wanted = np.linalg.solve(drift, -own)
     effect, body = DepthProfile(along=(1.0, 2.0)), Chain((1, 1, 1), frame="link-2")
-    xi = body_velocity(Viscous(2.0), body, [0.0, 0.0], [1.0, 0.0], effects=(effect,)).xi
-    np.testing.assert_allclose(xi, [0, *wanted], atol=2e-4)  # pieces count as their centres
+    counts = np.array([12, 24, 48, 96])
+    xi = [body_velocity(Viscous(2.0), body, [0.0, 0.0], [1.0, 0.0], effects=(effect,), pieces=n).xi for n in counts]
+    errors = np.abs(np.array(xi) - [0, *wanted]).max(1)  # pieces count as their centres
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2, abs=0.05)
+    assert errors[-1] < 2e-5

@@ -133,6 +133,41 @@ def test_effects_vanish_at_their_limit(name):
     assert errors[-1] < 1e-8
 
 
+UNEVEN, OFF_CENTRE = Chain((1, 1.4, 0.8)), Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_effects_vanish_on_chains_too(name):
+    """At the declared order over six decades, pivots inside links and links at rest included. Of a transient, which feels
+    all of what reverses and links that come to rest as they do, the order is that of its docstring."""
+    make, order = EFFECTS[name]
+    alpha, alphadot = OFF_CENTRE.cycle(32)
+    plain = body_velocity(GLASS, UNEVEN, alpha, alphadot).xi
+
+    def off(x):
+        effects = (make(x),)
+        return np.abs(march(GLASS, UNEVEN, alpha, alphadot, effects=effects, cycles=2, pieces=12).xi - plain).mean()
+
+    sizes = np.array([1e-2, 1e-3, 1e-4, 1e-6])[: 4 if order == 1 else 3]
+    slopes = np.diff(np.log([off(x) for x in sizes])) / np.diff(np.log(sizes))
+    if name == "transient":
+        assert (slopes > 0.45).all()
+        assert (slopes < 1.1).all()
+    else:
+        np.testing.assert_allclose(slopes, order, atol=0.1)
+    assert off(0.0) < 1e-8
+
+
+@pytest.mark.parametrize("pieces", [1, 40])
+def test_no_travel_is_no_transient_however_long_the_pieces(pieces):
+    alpha, alphadot = Circle(amplitude=1.2).cycle(64)
+    none, hardly = (
+        march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=t),), cycles=2, pieces=pieces).displacement
+        for t in (0.0, 1e-6)
+    )
+    np.testing.assert_allclose(hardly, none, atol=1e-5)
+
+
 PARTS = ("load", "body", "start", "at", "after")
 
 

@@ -7,9 +7,10 @@ import pytest
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 
-from geomech import scenes, swimmers
+from geomech import accuracy, estimate, scenes, swimmers
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.problem import SceneError
+from geomech.scene import Scene
 from geomech.simulate import displacement
 from geomech.sweep import beside
 from rft import (
@@ -29,6 +30,8 @@ from rft import (
     march,
 )
 from rft.bodies.base import halves
+from rft.march import _Steps
+from rft.settling import Approach
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
@@ -211,8 +214,6 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
 
 
 def test_a_tolerance_below_what_a_march_repeats_to_is_refused():
-    from geomech import estimate
-
     slowed = scenes.load("sandfish-transient")
     with pytest.raises(SceneError, match="repeats to 1e-06 only: raise --tol"):
         estimate.cheapest(slowed, [0.2], 1e-7)
@@ -302,8 +303,6 @@ def periodic(effects, gait, body, phases, amplitudes):
 
 def test_estimates_of_marches_cover_the_truth(truths):
     """Against four times the phases."""
-    from geomech import estimate
-
     for effect in (Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)):
         scene = dataclasses.replace(SANDFISH, body=Backbone(30), gait=Sine(elements=30), effects=(effect,))
         a = np.array([0.12, 0.22, 0.35])
@@ -313,6 +312,163 @@ def test_estimates_of_marches_cover_the_truth(truths):
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
         assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(effect)  # one heading may be right by chance
+
+
+def pieced_scene(rng, kind):
+    """A random chain in a random medium on a random ellipse, with an effect that varies along its links."""
+    medium = [GLASS, Viscous(2.0), Granular(C=rng.uniform(0.5, 5), gamma0=rng.uniform(0.1, 0.6))][rng.integers(3)]
+    body = Chain(tuple(rng.uniform(0.4, 1.5, 3)))
+    axes, centre = tuple(rng.uniform(0.3, 1, 2)), tuple(rng.uniform(-0.4, 0.4, 2))
+    effect = {
+        "transient": Transient(travel=10 ** rng.uniform(-2.5, -0.7)),
+        "disturbed": DisturbedGround(radius=rng.uniform(0.04, 0.1), weakening=rng.uniform(0.1, 0.6)),
+        "depth": DepthProfile(along=tuple(rng.uniform(0.5, 2, 4))),
+    }[kind]
+    return Scene(medium, body, Ellipse(semi_axes=axes, tilt=rng.uniform(0, 3), centre=centre), effects=(effect,))
+
+
+def errors_over_estimates(scene, pieces, phases, finer):
+    """(3, 2): of three amplitudes, in place and heading, against so many times the pieces and phases."""
+    a = np.array([0.5, 1.0, 1.4])
+    scene = scene.with_numerics(pieces=pieces, phases=finer * phases, tolerance=1e-9, cycles=2)
+    found, error = estimate.direct(scene, scene.gait, a, phases)
+    truth = scene.with_numerics(pieces=finer * pieces).displacement("direct", None, a)
+    return estimate.apart(found, truth, 1.0) / (error + 1e-9)
+
+
+@pytest.mark.parametrize(("kind", "seeds"), [("depth", range(10)), ("transient", [0])])
+def test_estimates_cover_what_pieces_leave(kind, seeds):
+    found = [errors_over_estimates(pieced_scene(np.random.default_rng(k), kind), 10, 64, 4) for k in seeds]
+    assert np.max(found) <= 1
+    assert np.median(found) > 0.02
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3000)
+def test_estimates_cover_what_pieces_leave_of_many_random_chains():
+    """60 scenes of three amplitudes: the README's row."""
+    found = {}
+    for kind in ("transient", "disturbed", "depth"):
+        for k in range(20):
+            some = errors_over_estimates(pieced_scene(np.random.default_rng([7, k]), kind), 20, 64, 4)
+            found.setdefault(kind, []).extend(some.ravel())
+        print(
+            f"\n{kind}: error over estimate {np.median(found[kind]):.2f} in the middle, {max(found[kind]):.2f} at most"
+        )
+    assert np.mean(np.concatenate(list(found.values())) <= 1) >= 0.95
+
+
+def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
+    """Depth that differs along long links, all else being exact enough long before."""
+    scene = Scene(Viscous(2.0), Chain((1, 1.4, 0.8)), Circle(amplitude=1.2), effects=(DepthProfile(along=(0.5, 2, 1)),))
+    scene = scene.with_numerics(pieces=5)
+    found = estimate.cheapest(scene, [1.2], 1e-5)
+    assert found["settings"]["pieces"] > 5
+    truth = scene.with_numerics(pieces=640).displacement("direct", None, [1.2])
+    off = estimate.distance(np.array(found[found["tier"]]), truth)
+    assert (off <= found["estimate"]).all()
+    assert max(found["estimate"]) <= 1e-5
+    monkeypatch.setattr(estimate, "FINEST_PIECES", 40)
+    with pytest.raises(SceneError, match="no tier gets to 1e-08 body lengths .* with .* phases and 80 pieces"):
+        estimate.cheapest(scene, [1.2], 1e-8)
+
+
+def test_a_knob_for_pieces():
+    depth = dataclasses.replace(scenes.load("three-link-glass"), effects=(DepthProfile(along=(0.5, 2, 1)),))
+    knob = next(k for k in accuracy.KNOBS if k.name == "pieces")
+    assert knob.applies(depth)
+    assert not knob.applies(dataclasses.replace(depth, effects=()))
+    a = np.linspace(0.5, 1.5, 8)
+    far = depth.with_numerics(pieces=320, phases=64).displacement("direct", Circle(), a)
+    coarse = [knob.turned(depth.with_numerics(phases=64), n).displacement("direct", Circle(), a) for n in knob.values]
+    errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
+    assert -np.polyfit(np.log(knob.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
+    with pytest.raises(ValueError, match="pieces must be a whole number from 1 to 10000, got 0"):
+        body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.effects, pieces=0)
+    with pytest.raises(SceneError, match="pieces must be a whole number from 1 to 10000, got 0.5"):
+        depth.with_numerics(pieces=0.5)
+
+
+HEAVY = Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3))
+
+
+def test_what_is_left_is_the_sum_of_all_changes_to_come():
+    """Two modes of a massless march, one of either sign, one in heading; the change of each cycle is known."""
+    ratio, size = np.array([0.5, 0.8]), np.array([[1.0, 0.0], [0.0, 0.0], [0.0, -2.0]])
+    approach = Approach(2)
+    for k in range(6):
+        left = approach.after(None, None, 3.0 + size * ratio**k)
+    np.testing.assert_allclose(left, np.abs(size).max(0) * ratio**4, rtol=1e-12)  # counted from the cycle before
+    assert np.isinf(Approach(2).after(None, None, size)).all()
+
+
+def test_heavy_bodies_know_how_far_they_are():
+    """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left of the way is what is said."""
+    alpha, alphadot = HEAVY.cycle(32)
+    march_on = lambda **how: march(Viscous(2.0), Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(20.0),), **how)
+    limit = march_on().checked()
+    assert limit.cycles < 15
+    for cycles in (8, 12):
+        some = march_on(cycles=cycles)
+        off = np.abs(some.displacement - limit.displacement).max()
+        assert off > 1e-5
+        assert some.drift == pytest.approx(off, rel=0.2)
+    far = march_on(cycles=60)  # nothing was led to another limit
+    assert np.abs(limit.displacement - far.displacement).max() <= limit.drift + 1e-9
+    np.testing.assert_allclose(limit.xi, far.xi, atol=2e-6)
+
+
+def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
+    scene = Scene(Viscous(2.0), Chain((1, 2, 1.5)), HEAVY, effects=(heavy(20.0),)).with_numerics(phases=64)
+    a, shapes = np.array([1.0]), HEAVY.cycle(64, np.array([1.0]))
+    left = march(scene.medium, scene.body, *shapes, effects=scene.effects).drift
+    assert scene.run(*shapes).to_come == left > 0
+    assert (scene.with_numerics(cycles=3).run(*shapes).to_come == 0).all()
+    of_steps = estimate.direct(scene, HEAVY, a, 64)[1]
+    monkeypatch.setattr(
+        Scene, "run", lambda *args, run=Scene.run: (c := run(*args))._replace(to_come=c.to_come + 0.125)
+    )
+    np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 64)[1], of_steps + 0.125, rtol=1e-6)
+
+
+def test_a_kicked_body_coasts():
+    """In almost nothing, a kick that turns the frame changes the momentum over the ground once, not step by step after."""
+    alpha, alphadot = (x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64))
+    steps = _Steps(Viscous(2.0), Chain(), Chain(), alpha, alphadot, (heavy(1e6),), "exact", 1e-6, 1e-10)
+    over_ground = lambda: complex(*steps.mass.momenta[-1][:2, 0]) * np.exp(1j * steps.pose[2, 0])
+    for _ in range(5):
+        steps.next(False)
+    before, change = over_ground(), np.array([[0.3], [-0.2], [0.4]])
+    steps.kick(change)
+    kicked = over_ground()
+    assert abs(kicked - before) > 0.3
+    after = [steps.next(False) and over_ground() for _ in range(12)]
+    assert np.abs(np.array(after) - kicked).max() < 0.01 * abs(kicked - before)
+
+
+@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
+def test_heavy_bodies_settle_in_tens_of_cycles(medium):
+    alpha, alphadot = HEAVY.cycle(32, np.linspace(0.3, 1.2, 6))
+    for inertia in (60.0, 300.0):
+        found = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(inertia),)).checked()
+        assert found.cycles <= 40
+        assert found.drift.max() <= 1e-6
+
+
+def test_a_march_that_fails_says_so(monkeypatch):
+    """Starved descents: the status, and RuntimeError by `checked`."""
+    import rft.newton
+
+    starved = tuple(d._replace(budget=1) for d in rft.newton.ATTEMPTS)
+    monkeypatch.setattr(rft.newton, "ATTEMPTS", starved)
+    monkeypatch.setattr(rft.newton, "WARM", rft.newton.WARM._replace(budget=1))
+    monkeypatch.setattr(rft.newton.Balance, "_scatter", lambda *a: None)
+    alpha, alphadot = Circle().cycle(8, np.array([0.0, 1.0]))
+    found = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1)
+    assert list(found.status) == ["running", "unconverged"]
+    assert found.residual[1] > 1e-9
+    with pytest.raises(RuntimeError, match="did not converge"):
+        found.checked()
 
 
 def test_halves_are_the_whole_body():

@@ -9,14 +9,14 @@ import numpy as np
 
 from rft.bodies.base import Body, Motion, Wrapped, halves
 
-LONGEST = 1 / 40  # of a piece, in body lengths
+PIECES = 40  # to a body length, where nothing else is asked for; what they leave is estimated, not assumed
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces(Wrapped):
-    """``inner`` with every element cut into equal pieces no longer than ``longest``."""
+    """``inner`` with every element cut into equal pieces no longer than ``longest``, in body lengths."""
 
-    longest: float = LONGEST
+    longest: float
 
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -35,6 +35,7 @@ class Pieces(Wrapped):
         return Motion(c[owner], s[owner], r_t[owner], r_n[owner] + at, half[owner] * share, weight[owner] * share, v)
 
 
-def cut(body: Body, longest: float = LONGEST) -> Body:
-    """``body`` in pieces, or as it is where its elements are short enough."""
+def cut(body: Body, pieces: int) -> Body:
+    """``body`` in pieces, so many to its length or more, or as it is where its elements are short enough."""
+    longest = 1 / pieces
     return Pieces(body, longest) if (2 * halves(body) > longest * (1 + 1e-9)).any() else body

@@ -1,6 +1,6 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine, repeated, together
+from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine, pieced, repeated, together
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -27,6 +27,7 @@ __all__ = [
     "applied",
     "broken",
     "engine",
+    "pieced",
     "repeated",
     "together",
 ]

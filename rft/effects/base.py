@@ -10,7 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Motion
-from rft.media.base import require, shown
+from rft.bodies.pieces import PIECES, cut
+from rft.media.base import in_range, require, shown
+
+MOST_PIECES = 10_000  # to a body length
 
 # What an effect may break. Each premise lost takes an engine, or a result, with it.
 PREMISES = {
@@ -51,7 +54,8 @@ class Effect:
     rank: effects act in this order, whatever the scene's. batched: parameters that may be arrays (B,), one for each
     sample of a batch. inertia: mass of the body x length x (rad/s of phase)^2 over its axial drag. settles: change of
     displacement from cycle to cycle, body lengths, below which a march with this effect has settled. held: numbers that a
-    march remembers for each sample, beside some for each element.
+    march remembers for each sample, beside some for each element. varies: along an element, of which it takes means:
+    longer elements are cut into pieces (`pieced`).
     """
 
     kind = "effect"
@@ -64,6 +68,7 @@ class Effect:
     inertia = 0.0
     settles = 1e-6
     held = 0
+    varies = False
 
     def load(self, load, medium, body: Body):
         """The load law (`rft.loads`) of the body's elements with this effect; the same one by default."""
@@ -133,6 +138,12 @@ def engine(effects: Sequence[Effect]) -> str:
     if "no inertia" in lost:
         return "dynamic"
     return "marching" if lost & {"no memory", "symmetry"} else "algebraic"
+
+
+def pieced(body: Body, effects: Sequence[Effect], pieces: int = PIECES) -> Body:
+    """The body as finely cut as its effects need. ValueError for no number of pieces."""
+    in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
+    return cut(body, pieces) if any(e.varies for e in effects) else body
 
 
 def applied(effects: Sequence[Effect], load, medium, body: Body):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.bodies.base import Body, stations
-from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.loads import ALONE
 from rft.media.base import check_ranges, real_array, require, shown
@@ -20,7 +19,7 @@ class DepthProfile(Effect):
     along: |z| over that depth at equally spaced places from tail to head, linear between them; (1, 1) is level. slope:
     what the place on the ground adds to it per body length (a surface that is not level above a level plane of motion),
     rising in the direction ``towards``, rad from the frame's heading at the start. A piece of body
-    counts as its centre; links longer than a fortieth of the body are cut. With a slope, place and heading matter.
+    counts as its centre. With a slope, place and heading matter.
     """
 
     along: tuple[float, ...] = (1.0, 1.0)
@@ -33,6 +32,7 @@ class DepthProfile(Effect):
     rank = 4
     batched = ("slope", "towards")
     angles = ("towards",)
+    varies = True
 
     def __post_init__(self):
         along = real_array("along", self.along)
@@ -47,11 +47,8 @@ class DepthProfile(Effect):
     def breaks(self) -> frozenset:
         return frozenset({"symmetry"}) if np.any(self.slope) else frozenset()
 
-    def body(self, body: Body) -> Body:
-        return cut(body)
-
     def load(self, load, medium, body: Body):
-        depth = _depths(self.along, cut(body))
+        depth = _depths(self.along, body)
         return _scaled(load, lambda known: depth)
 
     def at(self, memory, here: Here) -> Effect:

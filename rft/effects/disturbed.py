@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.pieces import cut
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
 from rft.media.base import check_ranges
@@ -36,6 +35,7 @@ class DisturbedGround(Effect):
     cost = "a map of the ground, two look-ups and some thirty marks an element and step"
     rank = 1
     batched = ("weakening",)
+    varies = True
     settles = 1e-3  # the map has cells, and no two cycles meet them alike
 
     def __post_init__(self):
@@ -44,9 +44,6 @@ class DisturbedGround(Effect):
     @property
     def held(self) -> int:
         return 2 * _cells(self.radius / CELLS) ** 2
-
-    def body(self, body):
-        return cut(body)
 
     def start(self, elements: int, samples: int) -> Ground:
         return Ground(self.radius / CELLS, samples)
@@ -82,7 +79,7 @@ class _Now(Effect):
     rank = DisturbedGround.rank
 
     def load(self, load, medium, body):
-        return weakened(load, lambda m, known: ((known.of(self.left), known.of(self.right)), (0.0, 0.0)))
+        return weakened(load, lambda m, w, known: (np.stack([known.of(self.left), known.of(self.right)]), None, None))
 
 
 def _cells(cell: float) -> int:

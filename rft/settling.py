@@ -1,0 +1,81 @@
+"""How far a march is from its limit cycle, and how a heavy body gets there sooner.
+
+From cycle to cycle the displacement changes by less and less; what is left is the sum of all changes to come, not the
+last of them. Without mass the last two give their ratio. A heavy body forgets over many cycles, but only what its three
+velocities at the start of a cycle are: the map from these to those at the next start is affine near its fixed point, and
+the last few cycles tell it along the ways they went (Anderson's mixing, for which nothing but the velocities is touched:
+what the ground remembers follows by itself).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+DEEPEST = 6  # cycles the limit is found from; a velocity has three numbers, but the map bends
+SINGULAR = 1e-6  # of the largest singular value, below which two cycles went the same way
+UNKNOWN = 0.5  # ratio of the first change of displacement to the next, assumed
+SLOWEST = 0.95  # ratio of a change to that before, where they hardly shrink: what the ground remembers has cells
+ASTRAY = 100.0  # times the change of velocity before: a kick that led away from the limit
+FAILURES = 3  # after so many of these a sample goes round and round without
+
+
+class Approach:
+    """Cycle after cycle of B samples."""
+
+    def __init__(self, samples: int):
+        self.moved, self.drift = None, np.full(samples, np.inf)
+
+    def after(self, start, end, moved: np.ndarray) -> np.ndarray:
+        """(B,): how much displacement changes from the cycle before and in all to come, its largest component, after a cycle
+        that moved so, (3, B). start, end: (3, B), body velocities at the ends of the cycle."""
+        if self.moved is None:
+            self.moved = moved
+            return self.drift
+        drift, self.moved = np.abs(moved - self.moved).max(0), moved
+        known = np.isfinite(self.drift)
+        ratio = np.where(known, drift / np.where(known & (self.drift > 0), self.drift, 1.0), UNKNOWN)
+        self.drift = drift
+        return drift / (1 - np.minimum(ratio, SLOWEST))
+
+
+class HeavyApproach(Approach):
+    """The same with mass: from the last cycles' first velocities, their changes and displacements."""
+
+    def __init__(self, samples: int):
+        super().__init__(samples)
+        self.cycles: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.step, self.failures = np.zeros((3, samples)), np.zeros(samples, int)
+
+    def after(self, start, end, moved):
+        last, self.moved = self.moved, moved
+        if start is None:  # the first cycle starts from rest
+            return self.drift
+        self.cycles = [*self.cycles[1 - DEEPEST :], (start, end - start, moved)]
+        if len(self.cycles) < 2:
+            return self.drift
+        self._forget()
+        starts, changes, moves = (np.diff(np.stack(x), axis=0) for x in zip(*self.cycles))
+        mix = _mix(changes, self.cycles[-1][1])
+        self.step = ((starts + changes) * mix[:, None]).sum(0)
+        to_come = (moves * mix[:, None]).sum(0)
+        return np.maximum(np.abs(to_come), np.abs(moved - last)).max(0)
+
+    def _forget(self):
+        """Drop all but the last cycle of samples that a kick has led astray."""
+        sizes = [np.abs(change).max(0) for _, change, _ in self.cycles[-2:]]
+        astray = (sizes[1] > ASTRAY * sizes[0]) & (self.step != 0).any(0)
+        self.failures += astray
+        self.cycles = [tuple(np.where(astray, x, y) for x, y in zip(self.cycles[-1], c)) for c in self.cycles]
+
+    def kick(self, which: np.ndarray) -> np.ndarray:
+        """(3, B): change of velocity that leads the samples ``which`` to the limit, as far as is known."""
+        self.step = np.where(which & (self.failures < FAILURES), self.step, 0.0)
+        return self.step
+
+
+def _mix(changes: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """(k, B): how much of the differences (k, 3, B) takes the last change (3, B) nearest to nothing."""
+    size = np.sqrt((changes**2).sum(1))
+    size = np.where(size > 0, size, 1.0)
+    matrix = np.moveaxis(changes / size[:, None], (0, 1, 2), (2, 1, 0))
+    return -np.einsum("bki,ib->kb", np.linalg.pinv(matrix, SINGULAR), last) / size
