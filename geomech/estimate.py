@@ -206,9 +206,9 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
     error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), scene.numerics.pieces
     while (worse := open_[error[open_, 0] > tol]).size:
         coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
-        pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        if phases > MOST_PHASES or pieces > FINEST_PIECES:
+        if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
             break
+        pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
         finer_scene = scene.with_numerics(pieces=pieces)
         ask(cost.direct(finer_scene, gait, len(worse), phases))
         finer, now, left = _in_groups(finer_scene, gait, amplitudes[worse], phases)

@@ -369,7 +369,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     assert (off <= found["estimate"]).all()
     assert max(found["estimate"]) <= 1e-5
     monkeypatch.setattr(estimate, "FINEST_PIECES", 40)
-    with pytest.raises(SceneError, match="no tier gets to 1e-08 body lengths .* with .* phases and 80 pieces"):
+    with pytest.raises(SceneError, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
         estimate.cheapest(scene, [1.2], 1e-8)
 
 
