@@ -44,8 +44,7 @@ def apart(a, b, length: float) -> np.ndarray:
 
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
     """(poses (B, 3), errors (B, 2), body lengths and rad) of the direct tier; phases is rounded up to a multiple of 8,
-    >= 32. Many
-    amplitudes go in groups, so that memory is bounded."""
+    >= 32. Many amplitudes go in groups, so that memory is bounded."""
     poses, *errors = _in_groups(scene, gait, amplitudes, phases)
     return poses, sum(errors)
 

@@ -20,18 +20,19 @@ from rft.newton import Balance
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
 SLOPING = scenes.parse(
-    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 8")
+    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 10")
     + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
 )
 
 
 @pytest.fixture
 def solved(monkeypatch):
-    """Counts the force balances that are solved."""
-    counts, solve = [], Balance.solve
+    """Counts the force balances that are solved; those of a body in other pieces by the share of its elements."""
+    counts, elements, solve = [], [], Balance.solve
 
     def counting(self, motion, speed, *args, **kwargs):
-        counts.append(speed.size)
+        elements.append(len(motion(np.arange(1)).half))
+        counts.append(speed.size * elements[-1] / elements[0])
         return solve(self, motion, speed, *args, **kwargs)
 
     monkeypatch.setattr(Balance, "solve", counting)
@@ -61,11 +62,11 @@ def test_a_pilot_tells_what_a_balance_takes(scene, solved, monkeypatch):
     """By a clock on which every balance takes a tenth of a millisecond."""
     monkeypatch.setattr(cost.time, "process_time", lambda: 1e-4 * sum(solved))
     foretold = cost.price(cost.direct(scene, scene.gait, 3000, 256))
-    assert foretold.balances == 3000 * 256 * (1.25 if scene is GLASS else 3 * 2.125)
+    assert foretold.balances == pytest.approx(3000 * 256 * (1.25 if scene is GLASS else 3 * 3.375), abs=1)
     assert foretold.seconds == pytest.approx(1e-4 * foretold.balances, rel=0.05)
     assert 0 < sum(solved) < foretold.balances / 50
     solved.clear()
-    assert cost.price(cost.direct(scene, scene.gait, 1, 32)).seconds < 1.0
+    assert cost.price(cost.direct(scene.with_numerics(cycles=1), scene.gait, 1, 32)).seconds < 1.0
     assert not solved  # too small for a pilot
 
 

@@ -459,10 +459,10 @@ def test_a_march_that_fails_says_so(monkeypatch):
     """Starved descents: the status, and RuntimeError by `checked`."""
     import rft.newton
 
-    starved = tuple(d._replace(budget=1) for d in rft.newton.ATTEMPTS)
-    monkeypatch.setattr(rft.newton, "ATTEMPTS", starved)
+    monkeypatch.setattr(rft.newton, "QUICK", rft.newton.QUICK._replace(budget=5))  # enough for a body at rest
     monkeypatch.setattr(rft.newton, "WARM", rft.newton.WARM._replace(budget=1))
-    monkeypatch.setattr(rft.newton.Balance, "_scatter", lambda *a: None)
+    for name in ("WALKS", "SLOW"):
+        monkeypatch.setattr(rft.newton, name, ())
     alpha, alphadot = Circle().cycle(8, np.array([0.0, 1.0]))
     found = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1)
     assert list(found.status) == ["running", "unconverged"]
