@@ -8,8 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from figures import main
-from geomech import connection, plots, predict
+from geomech import connection, predict
 from geomech.gaits import Circle
+from geomech.output import plots
 from rft import CATALOGUE, Chain, body_velocity
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium

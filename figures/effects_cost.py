@@ -12,8 +12,8 @@ import time
 import numpy as np
 
 from figures import main
-from geomech import plots
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import load
 from rft import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
 
 ALGEBRAIC = {

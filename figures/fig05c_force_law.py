@@ -11,7 +11,7 @@ from importlib import resources
 import numpy as np
 
 from figures import main
-from geomech import plots
+from geomech.output import plots
 from rft import CATALOGUE, Granular, Viscous
 
 GRAINS = {"depth_m": 0.030, "radius_m": 0.008, "length_m": 0.080, "bulk_density": 0.588 * 1030.0}  # header of the CSV

@@ -19,10 +19,10 @@ import dataclasses
 import numpy as np
 
 from figures import main
-from geomech import plots, swimmers
 from geomech.gaits import Sine
-from geomech.scene import Scene
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import Scene, load
+from geomech.study import undulation
 
 SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
 ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
@@ -40,7 +40,7 @@ MEASURES = {  # what is best: the largest (1) or the least (-1)
 
 
 def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
-    """For each scene, with ``finer`` times its elements, its `swimmers.performance` over amplitudes A / lambda (B,), and
+    """For each scene, with ``finer`` times its elements, its `undulation.performance` over amplitudes A / lambda (B,), and
     "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the amplitudes. For the
     sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is assumed, and not marked), and
     "cycle" (N, 3), body velocity at that amplitude.
@@ -51,16 +51,16 @@ def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
     out = {}
     for name in SCENES:
         scene = refined(load(name), finer)
-        found = swimmers.performance(scene, amplitudes)
+        found = undulation.performance(scene, amplitudes)
         best = {k: optimum(amplitudes, found[k], sign) for k, (sign, _) in {"progress": (1, ""), **MEASURES}.items()}
         found["best"] = {k: v for k, v in best.items() if v is not None}
         if name.startswith("sandfish"):
             for key, (capped, kinematics, _, _) in ENDLESS.items():
                 cap = scene.effects[0] if capped else None
-                waves = [swimmers.endless_sine(scene.medium, a, cap, kinematics=kinematics) for a in amplitudes]
+                waves = [undulation.endless_sine(scene.medium, a, cap, kinematics=kinematics) for a in amplitudes]
                 found[key] = np.array(waves)
             found["animal"] = scene.gait.amplitude
-            found["cycle"] = swimmers.performance(scene, [scene.gait.amplitude])["velocity"][0]
+            found["cycle"] = undulation.performance(scene, [scene.gait.amplitude])["velocity"][0]
         out[name] = found
     return out
 
@@ -77,7 +77,7 @@ def optimum(amplitudes, values, sign: int) -> tuple[float, float] | None:
     heights = sign * np.log(values)
     if np.argmax(heights) in (0, len(heights) - 1):
         return None
-    place, height = swimmers.best(amplitudes, heights)
+    place, height = undulation.best(amplitudes, heights)
     return place, float(np.exp(sign * height))
 
 

@@ -1,7 +1,7 @@
 """Fig. 10: muscle activation of a swimming sandfish, predicted by the internal moment that holds against the sand.
 
-The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.swimmers.activation`), for a plain body
-at the animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
+The sign of the moment is taken for the side that works, as in Sec. III C (`geomech.study.undulation.activation`), for a
+plain body at the animal's amplitude in loose glass; dashed in (d), with the sandfish's head drag.
 
 (a) As Fig. 10(c): lines where the right side starts and stops to work, over the shaded part of the cycle in which
 curvature to the left falls. (b) As Fig. 10(b): curvature and moment at one place. The caption's place is x = 0.71 pi,
@@ -26,9 +26,10 @@ import dataclasses
 import numpy as np
 
 from figures import main
-from geomech import plots, swimmers
 from geomech.gaits import Sine
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import load
+from geomech.study import undulation
 from rft import Backbone
 
 WAVES = np.linspace(0.5, 1.8, 27)
@@ -41,14 +42,14 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
     """Of a sandfish in loose glass at the scene's A / lambda, for ``waves`` (W,) on its body, without head drag:
 
     "waves": (W,). "s": (S,), tail 0 to head 1. "lag": (W, S), rad. "speed", "fundamental_speed": (W,), ratios by the lines
-    of onset and offset and by the first harmonic. "one": all of `swimmers.activation` for one wave.
+    of onset and offset and by the first harmonic. "one": all of `undulation.activation` for one wave.
     "head": {"lag", "speed", "fundamental_speed"}, the same with head drag.
     """
     fish = load("sandfish-loose").with_numerics(phases=phases)
 
     def run(count, effects=()):
         gait = Sine(waves=count, amplitude=fish.gait.amplitude, elements=elements)
-        return swimmers.activation(dataclasses.replace(fish, gait=gait, body=Backbone(elements), effects=effects))
+        return undulation.activation(dataclasses.replace(fish, gait=gait, body=Backbone(elements), effects=effects))
 
     keys = {"lag": "lag", "speed": "speed_ratio", "fundamental_speed": "fundamental_speed_ratio"}
     plain, head = ([run(w, effects) for w in waves] for effects in ((), fish.effects))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main
-from geomech import plots
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import load
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from figures import main
-from geomech import plots
 from geomech.gaits import Butterfly
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import load
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -6,10 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from figures import main
-from geomech import plots
 from geomech.gaits import Butterfly, Circle
-from geomech.scene import METHODS
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import METHODS, load
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
 AMPLITUDES = {"circle": np.linspace(0.125, 2.25, 18), "butterfly": np.linspace(0.1, 1.3, 13)}

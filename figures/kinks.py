@@ -11,8 +11,9 @@ import functools
 import numpy as np
 
 from figures import main
-from geomech import connection, harmonics, plots
-from geomech.scenes import load
+from geomech import connection, harmonics
+from geomech.output import plots
+from geomech.scene import load
 
 
 def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from figures import fig11d_ccf, fig11e_displacement, main
-from geomech import plots
+from geomech.output import plots
 
 
 def compute() -> dict:

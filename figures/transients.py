@@ -12,10 +12,10 @@ import dataclasses
 import numpy as np
 
 from figures import main
-from geomech import plots
 from geomech.gaits import Sine
-from geomech.scenes import load
-from geomech.sweep import beside
+from geomech.output import plots
+from geomech.scene import load
+from geomech.study.sweep import beside
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from figures import main
-from geomech import accuracy, plots
-from geomech.scenes import load
+from geomech.output import plots
+from geomech.scene import load
+from geomech.study import accuracy
 
 
 def compute(scene: str = "three-link-glass", runs: int = 2) -> dict:

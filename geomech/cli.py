@@ -17,8 +17,8 @@ from typing import Annotated, Optional
 
 import typer
 
+from geomech.errors import SceneError, choose
 from geomech.files import refuse_inputs, whole_file, whole_folder
-from geomech.problem import SceneError, choose
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -55,8 +55,8 @@ def run(
     yes: YesOption = False,
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
-    from geomech import report
-    from geomech.scenes import inputs, load
+    from geomech.output import report
+    from geomech.scene import inputs, load
 
     scene = load(name)
     report.refuse_folder(scene, out, inputs(scene))
@@ -76,7 +76,7 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
-    from geomech.scenes import load
+    from geomech.scene import load
 
     scene = load(name)
     solution = scene.solve(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
@@ -100,8 +100,8 @@ def connection(
     yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF."""
-    from geomech import plots
-    from geomech.netcdf import save_connection
+    from geomech.output import plots
+    from geomech.output.netcdf import save_connection
 
     _is_netcdf(out)
     scene = _field_scene(name, grid, extent, out, plot, plot is not None, yes)
@@ -119,7 +119,7 @@ def ccf(
     yes: YesOption = False,
 ):
     """The CCF map with the scene's gait drawn on it."""
-    from geomech import plots
+    from geomech.output import plots
 
     scene = _field_scene(name, grid, extent, plot, plot, True, yes)
     plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit, scene.curvature_error), plot)
@@ -138,9 +138,10 @@ def displacement(
     yes: YesOption = False,
 ):
     """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
-    from geomech import cost, plots, report
-    from geomech.estimate import cheapest
+    from geomech.output import plots, report
     from geomech.scene import METHODS
+    from geomech.study import cost
+    from geomech.study.estimate import cheapest
 
     values = _sweep("--amplitudes", amplitudes)
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
@@ -170,9 +171,9 @@ def accuracy(
     yes: YesOption = False,
 ):
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
-    from geomech import accuracy as study
-    from geomech import plots
-    from geomech.scenes import inputs
+    from geomech.output import plots
+    from geomech.scene import inputs
+    from geomech.study import accuracy as study
 
     scene = _loaded(name, None, None)
     with whole_folder(out, inputs(scene)) as folder, progress(f"accuracy of {scene.name}") as bar:
@@ -196,8 +197,9 @@ def sweep(
     yes: YesOption = False,
 ):
     """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
-    from geomech import kept, plots
-    from geomech import sweep as sweeping
+    from geomech.output import plots
+    from geomech.study import kept
+    from geomech.study import sweep as sweeping
 
     axes = {}
     for text in over:
@@ -225,7 +227,7 @@ def sweep(
 @app.command()
 def explain(name: SceneArgument):
     """Which effects a scene asks for, the engine that follows, what each costs and what it takes away."""
-    from geomech.explain import explain as told
+    from geomech.output.explain import explain as told
 
     print(told(_loaded(name, None, None)))
 
@@ -234,7 +236,7 @@ def explain(name: SceneArgument):
 def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's TOML")] = None):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
-    from geomech.scenes import builtin_names, load
+    from geomech.scene import builtin_names, load
 
     if show is not None:
         print(load(choose("--show", show, builtin_names())).text, end="")
@@ -268,14 +270,14 @@ def progress(title: str):
 
 
 def _loaded(name: str, grid: int | None, extent: float | None):
-    from geomech.scenes import load
+    from geomech.scene import load
 
     return load(name).with_numerics(grid=grid, extent=extent)
 
 
 def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
     """The scene with its field computed, once its outputs are known to be writable. maps: they show shape space."""
-    from geomech.cost import built, price
+    from geomech.study.cost import built, price
 
     scene = _loaded(name, grid, extent)
     scene.require_connection()
@@ -297,8 +299,8 @@ def _is_netcdf(path: Path) -> None:
 
 def _check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
     """SceneError unless the output and the plot can be written and are, like ``more``, no input of the scene."""
-    from geomech import plots
-    from geomech.scenes import inputs
+    from geomech.output import plots
+    from geomech.scene import inputs
 
     if plot:
         plots.check_format(plot)

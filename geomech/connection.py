@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech.errors import is_whole, number, short
 from geomech.field import Field
-from geomech.problem import is_whole, number, short
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 SAMPLES_TOGETHER = 100_000  # velocities asked for in one call

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech import se2
 from geomech.connection import Velocity
+from rft import se2
 
 
 def frame_velocity(h, hdot) -> np.ndarray:

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech import se2
 from geomech.connection import Connection
 from geomech.field import Field
+from rft import se2
 
 
 def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:

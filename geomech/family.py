@@ -21,12 +21,12 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Velocity, evaluate
+from geomech.errors import number, real_array
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
-from geomech.problem import number, real_array
-from geomech.simulate import displacement, turning
+from geomech.reconstruct import displacement, turning
+from rft import se2
 
 
 @dataclass(frozen=True)

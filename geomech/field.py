@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.problem import real_array
+from geomech.errors import real_array
 
 
 @dataclass(frozen=True)

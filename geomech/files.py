@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from geomech.problem import SceneError
+from geomech.errors import SceneError
 
 try:
     import fcntl

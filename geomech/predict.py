@@ -13,12 +13,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech import se2
 from geomech.connection import SAMPLES_TOGETHER, Connection, Velocity, evaluate
+from geomech.errors import number, real_array
 from geomech.field import Field
 from geomech.gaits.base import Gait, checked_gait
-from geomech.problem import number, real_array
-from geomech.simulate import displacement
+from geomech.reconstruct import displacement
+from rft import se2
 
 
 def area(ccf: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:

@@ -6,7 +6,7 @@ import sympy as sp
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
-    """[X, Y] on se(2), columns (x, y, theta), as `geomech.se2.bracket`."""
+    """[X, Y] on se(2), columns (x, y, theta), as `rft.se2.bracket`."""
     return sp.Matrix([Y[2] * X[1] - X[2] * Y[1], X[2] * Y[0] - Y[2] * X[0], 0])
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from figures import cost_scaling, work_precision
-from geomech import accuracy, connection, predict, scenes
+from geomech import connection, predict, scenes
 from geomech.gaits import Circle, Ellipse
+from geomech.study import accuracy
 from rft import Chain, Viscous, body_velocity
 
 
@@ -141,7 +142,7 @@ def test_a_linear_medium_has_no_dry_knobs(viscous):
 
 
 def test_the_diagram_draws(glass, tmp_path):
-    from geomech import plots
+    from geomech.output import plots
 
     plots.save(work_precision.draw(glass), tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 30_000
@@ -149,7 +150,7 @@ def test_the_diagram_draws(glass, tmp_path):
 
 @pytest.mark.benchmark
 def test_cost_is_linear_or_less(tmp_path):
-    from geomech import plots
+    from geomech.output import plots
 
     numbers = cost_scaling.compute()
     for axis, found in numbers.items():

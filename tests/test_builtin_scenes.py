@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from geomech import scenes
+from geomech import scene as scenes
 from rft import CATALOGUE
 
 # Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's own numerics.

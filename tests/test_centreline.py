@@ -12,9 +12,9 @@ import pytest
 from scipy.special import ellipe
 
 from geomech import cli, scenes
+from geomech.errors import SceneError
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.problem import SceneError
 from rft import Backbone
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -255,7 +255,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
 
 
 def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
-    from geomech import sweep
+    from geomech.study import sweep
 
     toml = scene_in(tmp_path, 12)
     write(tmp_path / "data", "points", count=12, places=20)

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import accuracy, cli, curvature, files, plots, report, scenes
+from geomech import cli, curvature, files, scenes
+from geomech.output import plots, report
+from geomech.study import accuracy
 
 SMALL = ["--grid", "9"]
 
@@ -230,7 +232,7 @@ def test_letters_of_any_alphabet_are_kept(tmp_path):
 
 
 def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
-    from geomech import plots
+    from geomech.output import plots
 
     def fail(*args, **kwargs):
         raise ValueError("half way")

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from test_cli import geomech as run
 
-from geomech import accuracy, cli, connection, cost, estimate, harmonics, plots, scenes, sweep
+from geomech import cli, connection, harmonics, scenes
+from geomech.errors import SceneError
 from geomech.field import Field
-from geomech.problem import SceneError
+from geomech.output import plots
+from geomech.study import accuracy, cost, estimate, sweep
 from rft.newton import Balance
 
 GLASS = scenes.load("three-link-glass")
@@ -158,7 +160,7 @@ def test_pieces_change_no_numbers(monkeypatch):
         return [*tiers, *fields, marched, *estimate.direct(fresh, fresh.gait, amplitudes, 32)]
 
     whole = everything()
-    monkeypatch.setattr("geomech.scene.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.scene.model.VALUES_TOGETHER", 1)
     for module in (connection, sys.modules["geomech.predict"], sys.modules["geomech.family"]):
         monkeypatch.setattr(module, "SAMPLES_TOGETHER", 17)
     monkeypatch.setattr(harmonics, "VALUES_TOGETHER", 23)

@@ -7,7 +7,9 @@ import pytest
 import sympy as sp
 import xarray
 
-from geomech import connection, curvature, netcdf, scenes, se2, symbolic
+from geomech import connection, curvature, scenes, symbolic
+from geomech.output import netcdf
+from rft import se2
 
 GLASS = scenes.load("three-link-glass")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from registry import BODIES
 
-from geomech import scenes
+from geomech import scene as scenes
 from geomech.gaits import Sine
 from rft import (
     CATALOGUE,

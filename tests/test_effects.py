@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from registry import EFFECTS
 
-from geomech import scenes
-from geomech.explain import explain
+from geomech import scene as scenes
+from geomech.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
-from geomech.problem import SceneError
+from geomech.output.explain import explain
 from rft import (
     CATALOGUE,
     Backbone,
@@ -325,7 +325,7 @@ def test_what_an_effect_breaks_is_refused_by_name(method):
 
 def test_transients_draw(tmp_path):
     from figures import transients
-    from geomech import plots
+    from geomech.output import plots
 
     numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=40, phases=64)
     assert (np.diff(numbers["net"], axis=1) < 0).all()
@@ -336,7 +336,7 @@ def test_transients_draw(tmp_path):
 
 def test_the_cost_of_effects_draws(tmp_path):
     from figures import effects_cost
-    from geomech import plots
+    from geomech.output import plots
 
     numbers = effects_cost.compute(phases=16, repeats=1)
     assert numbers["none"]["engine"] == numbers["these four"]["engine"] == "algebraic"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks
-from geomech.scenes import load
+from geomech.scene import load
 from rft import Granular
 
 
 def drawn(module, numbers, tmp_path):
-    from geomech import plots
+    from geomech.output import plots
 
     file = tmp_path / "figure.png"
     plots.save(module.draw(numbers), file)
@@ -66,7 +66,7 @@ def test_fig11d(tmp_path):
 def test_fig11e(tmp_path):
     amplitudes = {"circle": [0.5, 1.0, 1.75], "butterfly": [0.5, 1.0]}
     numbers = fig11e_displacement.compute(amplitudes=amplitudes)
-    from geomech import plots
+    from geomech.output import plots
 
     tables = numbers["tables"]
     np.testing.assert_allclose(plots.net(tables["circle"]["direct"]), [0.0121, 0.0638, 0.1378], rtol=0.01)
@@ -88,7 +88,7 @@ def test_kinks(tmp_path):
 def test_figures_load_nothing_when_imported():
     """A figure reads and computes when it is asked to."""
     code = (
-        "import importlib, pathlib, figures, rft, geomech.scenes as s\n"
+        "import importlib, pathlib, figures, rft, geomech.scene as s\n"
         "def refuse(*args, **kwargs): raise AssertionError('loaded on import')\n"
         "s.load = s.parse = rft.body_velocity = refuse\n"
         "[importlib.import_module(f'figures.{p.stem}') for p in pathlib.Path(figures.__file__).parent.glob('*.py')]"

@@ -10,7 +10,7 @@ import time
 import pytest
 
 from geomech import files
-from geomech.problem import SceneError
+from geomech.errors import SceneError
 
 KILLED = """
 import os, signal, sys

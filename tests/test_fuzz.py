@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from geomech import scenes
+from geomech import scene as scenes
 
 VALUES = [
     "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",

@@ -7,10 +7,10 @@ import pytest
 import sympy as sp
 from registry import GAITS, MEDIA
 
-from geomech import connection, coordinates, curvature, predict, se2, simulate, symbolic
+from geomech import connection, coordinates, curvature, predict, reconstruct, symbolic
 from geomech.field import Field
 from geomech.gaits import Circle, Ellipse, Fourier
-from rft import Chain, Serpenoid, Viscous, body_velocity
+from rft import Chain, Serpenoid, Viscous, body_velocity, se2
 from rft.symbolic import viscous_chain
 
 A_MIDDLE, ALPHA = viscous_chain((1, 1, 1), 2, link=2)
@@ -233,10 +233,10 @@ def test_trajectory_ends_where_the_displacement_says():
     steps = stepwise(MIDDLE, gait, 800, end=np.pi), stepwise(MIDDLE, gait, 400, end=np.pi)
     for phases in (50, 51, 200):
         xi = MIDDLE(*gait.cycle(phases))
-        path = simulate.trajectory(xi, [0.0, np.pi, 2 * np.pi])
+        path = reconstruct.trajectory(xi, [0.0, np.pi, 2 * np.pi])
         np.testing.assert_allclose(path[0], 0, atol=1e-15)
         np.testing.assert_allclose(path[1], (4 * steps[0] - steps[1]) / 3, atol=1e-9)
-        np.testing.assert_allclose(path[2], simulate.displacement(xi), atol=1e-13)
+        np.testing.assert_allclose(path[2], reconstruct.displacement(xi), atol=1e-13)
 
 
 @pytest.mark.parametrize("phases", [8, 9])
@@ -244,24 +244,24 @@ def test_a_trajectory_has_the_velocity_it_was_made_from(phases):
     """At every phase of any samples, the highest wave of an even number of them included."""
     xi, h = np.random.default_rng(5).normal(size=(2, phases, 3)), 1e-5
     t = 2 * np.pi * np.arange(phases) / phases
-    before, at, after = (simulate.trajectory(xi, t + k * h) for k in (-1, 0, 1))
+    before, at, after = (reconstruct.trajectory(xi, t + k * h) for k in (-1, 0, 1))
     rate = (after - before) / (2 * h)
     x, y = se2.rotated(-at[..., 2], rate[..., 0], rate[..., 1])
     np.testing.assert_allclose(np.stack([x, y, rate[..., 2]], -1), xi, atol=1e-8)
     theta = at[..., 2] - t * xi[..., 2].mean(1)[:, None]
-    np.testing.assert_allclose(simulate.turning(xi), theta - theta.mean(1)[:, None], atol=1e-13)
+    np.testing.assert_allclose(reconstruct.turning(xi), theta - theta.mean(1)[:, None], atol=1e-13)
 
 
 def test_full_turns_are_integrated_too():
     """A constant turn: circles in closed form, whole turns included."""
     for turn in (0.0, 0.3, 1.0, 2.0, -1.5):
         xi = np.broadcast_to([0.2, -0.1, turn], (8, 3))
-        np.testing.assert_allclose(simulate.displacement(xi), se2.exp(2 * np.pi * xi[0]), atol=1e-14)
+        np.testing.assert_allclose(reconstruct.displacement(xi), se2.exp(2 * np.pi * xi[0]), atol=1e-14)
 
 
 def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match=r"got \(2, 3\)"):
-        simulate.displacement(np.zeros((2, 3)))
+        reconstruct.displacement(np.zeros((2, 3)))
     with pytest.raises(ValueError, match="grid must"):
         connection.grid(2, 3)
     with pytest.raises(ValueError, match="extent must"):
@@ -277,7 +277,7 @@ def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match="amplitudes must be finite"):
         predict.direct(MIDDLE, Circle(), [np.nan])
     with pytest.raises(ValueError, match="xi must be finite"):
-        simulate.displacement(np.full((4, 3), np.inf))
+        reconstruct.displacement(np.full((4, 3), np.inf))
     with pytest.raises(ValueError, match="two joints"):
         curvature.ccf(
             connection.fit(

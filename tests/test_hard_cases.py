@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from registry import BODIES, DRY, MEDIA
 
-from geomech import coordinates, predict, se2
+from geomech import coordinates, predict
 from geomech.gaits import Butterfly, Circle, Fourier
-from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, newton
+from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, newton, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 

@@ -7,12 +7,13 @@ import pytest
 from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 
-from geomech import accuracy, estimate, scenes, swimmers
+from geomech import scene as scenes
+from geomech.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
-from geomech.problem import SceneError
+from geomech.reconstruct import displacement
 from geomech.scene import Scene
-from geomech.simulate import displacement
-from geomech.sweep import beside
+from geomech.study import accuracy, estimate, undulation
+from geomech.study.sweep import beside
 from rft import (
     CATALOGUE,
     Backbone,
@@ -163,8 +164,8 @@ def test_transients_slow_the_sandfish():
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():
     slowed = scenes.load("sandfish-transient")
     assert slowed.engine == "marching"
-    found = swimmers.performance(slowed, [0.15, 0.22])
-    plain = swimmers.performance(SANDFISH, [0.15, 0.22])
+    found = undulation.performance(slowed, [0.15, 0.22])
+    plain = undulation.performance(SANDFISH, [0.15, 0.22])
     assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
     assert (found["cost_of_transport"] > 0).all()
 

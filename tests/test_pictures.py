@@ -6,10 +6,12 @@ from matplotlib.collections import QuadMesh
 from matplotlib.quiver import Quiver
 
 from figures import fig05c_force_law, fig10_neuromechanics
-from geomech import plots, scenes, sweep
+from geomech import scene as scenes
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Ellipse
+from geomech.output import plots
+from geomech.study import sweep
 from rft import CATALOGUE
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)

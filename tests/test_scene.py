@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import rft
-from geomech import scenes
-from geomech.problem import SceneError
+from geomech import scene as scenes
+from geomech.errors import SceneError
 from rft import Chain, Granular, Viscous
 
 GOOD = """

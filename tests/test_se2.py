@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from geomech import se2
+from rft import se2
 
 mp.mp.dps = 50
 reals = st.floats(-3.0, 3.0)

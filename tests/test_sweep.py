@@ -13,8 +13,9 @@ import pytest
 import xarray
 from test_cli import geomech
 
-from geomech import estimate, kept, scenes, sweep
-from geomech.problem import SceneError
+from geomech import scene as scenes
+from geomech.errors import SceneError
+from geomech.study import estimate, kept, sweep
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import connection, estimate, family, harmonics, plots, predict, scenes, se2
+from geomech import connection, family, harmonics, predict, scenes
+from geomech.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Fourier
-from geomech.problem import SceneError
+from geomech.output import plots
 from geomech.scene import METHODS, Numerics, Scene
-from rft import Chain
+from geomech.study import estimate
+from rft import Chain, se2
 
 GLASS = scenes.load("three-link-glass")
 RADII = np.linspace(0.5, 2.0, 13)

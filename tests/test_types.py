@@ -9,10 +9,11 @@ import pytest
 from registry import GAITS
 
 import rft
-from geomech import connection, curvature, estimate, family, predict, scenes, simulate
+from geomech import connection, curvature, family, predict, reconstruct, scenes
+from geomech.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
-from geomech.problem import SceneError
 from geomech.scene import Numerics, Scene
+from geomech.study import estimate
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 
 WRONG = {
@@ -115,8 +116,8 @@ def geometries(value):
     yield "amplitudes of a study", lambda: plain.study(value, ["direct"])
     yield "gait of the scene", lambda: plain.cycle(value)
     yield "shape", lambda: fitted(value)
-    yield "xi", lambda: simulate.displacement(value)
-    yield "times", lambda: simulate.trajectory(np.zeros((4, 3)), value)
+    yield "xi", lambda: reconstruct.displacement(value)
+    yield "times", lambda: reconstruct.trajectory(np.zeros((4, 3)), value)
     yield "scene", lambda: scenes.load(value)
     yield "TOML", lambda: scenes.parse(value)
     yield "tables", lambda: scenes.from_tables(value)

@@ -7,9 +7,11 @@ import pytest
 from scipy.optimize import brentq
 
 from figures import fig09c_efficiency, fig10_neuromechanics
-from geomech import plots, scenes, swimmers
+from geomech import scene as scenes
 from geomech.gaits import Circle, Sine
-from geomech.simulate import displacement
+from geomech.output import plots
+from geomech.reconstruct import displacement
+from geomech.study import undulation
 from rft import (
     CATALOGUE,
     Backbone,
@@ -136,27 +138,27 @@ def test_sawtooth_is_algebra():
     theta = 0.6
     headings = theta * np.array([1.0, -1.0])
     r, c, s = 3.0, np.cos(theta), np.sin(theta)
-    got = swimmers.endless_efficiency(Viscous(r), headings)
+    got = undulation.endless_efficiency(Viscous(r), headings)
     assert got == pytest.approx((r - 1) * s**2 / (c**2 + r * s**2), rel=1e-12)
-    assert swimmers.endless_efficiency(Coulomb(), headings) == pytest.approx(0.0, abs=1e-11)
+    assert undulation.endless_efficiency(Coulomb(), headings) == pytest.approx(0.0, abs=1e-11)
     tan2 = np.tan(GLASS.gamma0) ** 2
     psi = brentq(
         lambda p: (1 + GLASS.C / np.sqrt(tan2 + np.sin(p) ** 2)) * np.tan(p) - 1 / np.tan(theta), 1e-9, 1.5, xtol=1e-15
     )
     # v = (eta c, s) makes the angle psi with the piece at theta.
     eta = s / np.tan(theta + psi) / c
-    assert swimmers.endless_efficiency(GLASS, headings) == pytest.approx(eta, rel=1e-10)
+    assert undulation.endless_efficiency(GLASS, headings) == pytest.approx(eta, rel=1e-10)
 
 
 def test_endless_sine_in_loose_glass():
     """Best progress of the single-period sine near A / lambda = 0.2, efficiency there about 0.7; head drag lowers it
     towards the published 0.5."""
     a = np.linspace(0.1, 0.4, 31)
-    plain = np.array([swimmers.endless_sine(GLASS, x) for x in a])
-    place, _ = swimmers.best(a, plain * Sine().wavelength(a))
+    plain = np.array([undulation.endless_sine(GLASS, x) for x in a])
+    place, _ = undulation.best(a, plain * Sine().wavelength(a))
     assert place == pytest.approx(0.2, abs=0.02)
     assert np.interp(0.2, a, plain) == pytest.approx(0.7, abs=0.01)
-    head = swimmers.endless_sine(GLASS, 0.2, SANDFISH.effects[0])
+    head = undulation.endless_sine(GLASS, 0.2, SANDFISH.effects[0])
     assert 0.5 < head < np.interp(0.2, a, plain) - 0.04
 
 
@@ -173,8 +175,8 @@ ENDLESS = {
 def test_endless_waves_slide_or_go_sideways(name, kinematics):
     """The forces of a wave integrated over x, its points held to their kinematics in the swimmer's frame, vanish."""
     medium, a = CATALOGUE[name].medium, np.linspace(0.15, 0.35, 41)
-    found = np.array([swimmers.endless_sine(medium, x, elements=500, kinematics=kinematics) for x in a])
-    assert swimmers.best(a, found * Sine().wavelength(a)) == pytest.approx(ENDLESS[name, kinematics], abs=2e-4)
+    found = np.array([undulation.endless_sine(medium, x, elements=500, kinematics=kinematics) for x in a])
+    assert undulation.best(a, found * Sine().wavelength(a)) == pytest.approx(ENDLESS[name, kinematics], abs=2e-4)
     assert (np.diff(found) > 0).all()  # over the wavelength there is no optimum
     slope = 2 * np.pi * a[7] * np.cos(2 * np.pi * (np.arange(4000) + 0.5) / 4000)
     root = np.sqrt(1 + slope**2)
@@ -188,7 +190,7 @@ def test_endless_waves_slide_or_go_sideways(name, kinematics):
 def test_an_end_that_goes_sideways_passes_all_of_x_alike():
     """Head drag by the time at each heading: against the mean over x."""
     cap, a = SANDFISH.effects[0], 0.2
-    found = swimmers.endless_sine(GLASS, a, cap, kinematics="sideways")
+    found = undulation.endless_sine(GLASS, a, cap, kinematics="sideways")
     slope = 2 * np.pi * a * np.cos(2 * np.pi * (np.arange(4000) + 0.5) / 4000)
     root = np.sqrt(1 + slope**2)
     v = (found + slope * slope) / root, (slope - slope * found) / root
@@ -196,16 +198,16 @@ def test_an_end_that_goes_sideways_passes_all_of_x_alike():
     body = np.mean(f_t - slope * f_n) / root.mean()  # over the length of the body, one wave of arc
     assert body + np.mean((end_t - slope * end_n) / root) == pytest.approx(0.0, abs=2e-4)
     with pytest.raises(ValueError, match="kinematics must be one of sliding, sideways, got 'swimming'"):
-        swimmers.endless_sine(GLASS, a, kinematics="swimming")
+        undulation.endless_sine(GLASS, a, kinematics="swimming")
 
 
 def test_long_bodies_approach_the_endless_wave():
     """Yaw and ends matter less the more waves the body has."""
-    endless = swimmers.endless_sine(GLASS, 0.2)
+    endless = undulation.endless_sine(GLASS, 0.2)
     off = []
     for waves in (1.0, 3.0, 9.0):
         plain = dataclasses.replace(SANDFISH, gait=Sine(waves=waves, elements=180), body=Backbone(180), effects=())
-        off.append(abs(swimmers.performance(plain, [0.2])["efficiency"][0] - endless))
+        off.append(abs(undulation.performance(plain, [0.2])["efficiency"][0] - endless))
     assert off[0] > off[1] > off[2]
     assert off[2] < 0.03
 
@@ -259,13 +261,13 @@ def test_cost_and_slip(numbers, name):
     found = numbers[name]
     assert found["best"]["cost_of_transport"] == (pytest.approx(place, abs=0.006), pytest.approx(cost, rel=0.015))
     assert np.interp(0.22, found["amplitude"], found["slip"]) == pytest.approx(slip, rel=0.02)
-    fine = [swimmers.performance(fig09c_efficiency.refined(scenes.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
+    fine = [undulation.performance(fig09c_efficiency.refined(scenes.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
     costs, slips = (np.array([f[key][k] for f in fine]) for key, k in (("cost_of_transport", 0), ("slip", 1)))
     assert costs[-1] == pytest.approx(cost, rel=1e-3)
     assert slips[-1] == pytest.approx(slip, rel=1e-3)
     for x in (costs, slips):
         assert abs(x[2] - x[1]) < 0.4 * abs(x[1] - x[0])
-    phases = swimmers.performance(scenes.load(name).with_numerics(phases=128), [place, 0.22])
+    phases = undulation.performance(scenes.load(name).with_numerics(phases=128), [place, 0.22])
     assert phases["cost_of_transport"][0] == pytest.approx(costs[0], rel=1e-3)
     assert phases["slip"][1] == pytest.approx(slips[0], rel=2e-3)
 
@@ -273,7 +275,7 @@ def test_cost_and_slip(numbers, name):
 def test_arc_efficiency_is_progress_over_the_arc_of_a_wave():
     """Of several waves on the body: 1 / waves of its length each."""
     snake = scenes.load("shovel-nosed-snake")
-    found, waves = swimmers.performance(snake, [0.1, 0.3]), snake.gait.waves
+    found, waves = undulation.performance(snake, [0.1, 0.3]), snake.gait.waves
     assert waves > 1.5
     np.testing.assert_allclose(found["arc_efficiency"], found["progress"] / (1 / waves), rtol=1e-12)
     x = 2 * np.pi * (np.arange(2000) + 0.5) / 2000
@@ -299,22 +301,22 @@ def test_efficiency_and_slip_have_no_optimum():
     """They go on improving; what the snake's own elements show at large amplitudes is their coarseness."""
     amplitudes = [0.3, 0.4, 0.5]
     for name, finer in (("sandfish-loose", 1), ("sandfish-close", 1), ("shovel-nosed-snake", 3)):
-        found = swimmers.performance(fig09c_efficiency.refined(scenes.load(name), finer), amplitudes)
+        found = undulation.performance(fig09c_efficiency.refined(scenes.load(name), finer), amplitudes)
         assert fig09c_efficiency.optimum(amplitudes, found["efficiency"], 1) is None
         assert fig09c_efficiency.optimum(amplitudes, found["slip"], -1) is None
-    coarse = swimmers.performance(scenes.load("shovel-nosed-snake"), amplitudes)
+    coarse = undulation.performance(scenes.load("shovel-nosed-snake"), amplitudes)
     assert coarse["efficiency"][2] < coarse["efficiency"][1] < found["efficiency"][1]
 
 
 def test_body_velocity_through_the_cycle():
     """In body lengths whatever the size; half a cycle later the mirror image; integrated, the progress."""
-    found = swimmers.performance(SANDFISH, [0.1, 0.22])
+    found = undulation.performance(SANDFISH, [0.1, 0.22])
     velocity = found["velocity"]
     assert velocity.shape == (2, SANDFISH.numerics.phases, 3)
     np.testing.assert_allclose(np.roll(velocity, velocity.shape[1] // 2, 1), velocity * [1, -1, -1], atol=1e-8)
     np.testing.assert_allclose(np.hypot(*displacement(velocity)[:, :2].T), found["progress"], rtol=1e-12)
     large = dataclasses.replace(SANDFISH, body=Backbone(100, length=20.0))
-    np.testing.assert_allclose(swimmers.performance(large, [0.1, 0.22])["velocity"], velocity, atol=1e-8)
+    np.testing.assert_allclose(undulation.performance(large, [0.1, 0.22])["velocity"], velocity, atol=1e-8)
     assert velocity[1, :, 0].min() > 0  # the sandfish never slides backwards
 
 
@@ -331,7 +333,7 @@ def test_a_sweep_is_one_batch_of_everything():
 @pytest.mark.parametrize(("name", "kind"), [("three-link-glass", "circle"), ("butterfly-glass", "butterfly")])
 def test_performance_is_refused_without_a_wave(name, kind):
     with pytest.raises(ValueError, match=f"^performance is that of a sine wave, got a {kind}$"):
-        swimmers.performance(scenes.load(name), [0.1])
+        undulation.performance(scenes.load(name), [0.1])
 
 
 def waving(waves, elements=50, phases=64, effects=(), **gait):
@@ -344,7 +346,7 @@ def waving(waves, elements=50, phases=64, effects=(), **gait):
 @pytest.mark.parametrize("case", [waving(1.0), waving(1.5), waving(1.0, effects=SANDFISH.effects), SANDFISH])
 def test_onset_and_offset_are_where_the_moment_changes_sign(case):
     """Solved anew just before and after, between the phases that the lines were found from."""
-    found = swimmers.activation(case)
+    found = undulation.activation(case)
     assert (found["changes"] == 2).all()
     joints = np.arange(case.body.joints)
     for key, sign in (("onset", 1.0), ("offset", -1.0)):
@@ -357,7 +359,7 @@ def test_onset_and_offset_are_where_the_moment_changes_sign(case):
 
 def test_lag_counts_from_the_zero_of_curvature():
     """The sine's curvature falls through zero at t = - 2 pi waves s."""
-    found = swimmers.activation(waving(1.5))
+    found = undulation.activation(waving(1.5))
     late = found["lag"] + found["onset"] + 2 * np.pi * 1.5 * found["s"]
     np.testing.assert_allclose(np.exp(1j * late), 1.0, atol=2e-3)
     np.testing.assert_allclose(found["lag"], found["fundamental_lag"], atol=0.25)
@@ -377,7 +379,7 @@ ACTIVATION = {
 def test_the_speed_ratio_converges():
     """With order 2 in elements and in phases, to the pinned numbers."""
     for waves, grids in ((1.5, [(n, 64) for n in (30, 60, 120)]), (0.5, [(60, n) for n in (64, 128, 256)])):
-        coarse, middle, fine = (swimmers.activation(waving(waves, *grid))["speed_ratio"] for grid in grids)
+        coarse, middle, fine = (undulation.activation(waving(waves, *grid))["speed_ratio"] for grid in grids)
         assert np.log2((coarse - middle) / (middle - fine)) == pytest.approx(2.0, abs=0.35)
         limit = fine + (fine - middle) / 3
         assert limit == pytest.approx(ACTIVATION[waves][0], abs=2e-3)
@@ -412,20 +414,20 @@ def test_fig10(tmp_path):
 
 def test_the_speed_ratio_dips_before_it_falls():
     """Between 1.15 and 1.35 waves it rises a little, against the trend; converged: 2.084 and 2.166."""
-    low, high = (swimmers.activation(waving(w, 100))["speed_ratio"] for w in (1.15, 1.35))
+    low, high = (undulation.activation(waving(w, 100))["speed_ratio"] for w in (1.15, 1.35))
     assert (low, high) == (pytest.approx(2.084, abs=0.006), pytest.approx(2.166, abs=0.006))
 
 
 def test_a_wave_run_backwards_is_activated_alike():
     """A body alike fore and aft: s becomes 1 - s."""
-    forth, back = (swimmers.activation(waving(1.0, reverse=r)) for r in (False, True))
+    forth, back = (undulation.activation(waving(1.0, reverse=r)) for r in (False, True))
     assert back["speed_ratio"] == pytest.approx(forth["speed_ratio"], rel=1e-5)
     np.testing.assert_allclose(back["lag"][::-1], forth["lag"], atol=1e-4)
 
 
 def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
     """Two waves on the body nearly leave its middle without a moment: it changes sign six times there."""
-    found = swimmers.activation(waving(2.0, 120, 128))
+    found = undulation.activation(waving(2.0, 120, 128))
     odd = found["changes"] != 2
     assert 0 < odd.sum() < 10
     assert np.abs(found["s"][odd] - 0.5).max() < 0.05
@@ -437,6 +439,6 @@ def test_extra_changes_of_sign_are_not_passed_off_as_onsets():
 
 def test_activation_is_refused_without_a_wave():
     with pytest.raises(ValueError, match="activation is that of a sine wave, got a butterfly"):
-        swimmers.activation(scenes.load("butterfly-glass"))
+        undulation.activation(scenes.load("butterfly-glass"))
     with pytest.raises(ValueError, match="amplitude > 0"):
-        swimmers.activation(waving(1.0, amplitude=0.0))
+        undulation.activation(waving(1.0, amplitude=0.0))

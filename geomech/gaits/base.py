@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.problem import is_whole, number, real_array, short
+from geomech.errors import is_whole, number, real_array, short
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 

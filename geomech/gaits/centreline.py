@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from geomech.errors import number, short
 from geomech.gaits import frames, midline
 from geomech.gaits.base import Gait
-from geomech.problem import number, short
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geomech.errors import short
 from geomech.gaits.base import Gait, finite_array
-from geomech.problem import short
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geomech.errors import number, real_array
 from geomech.gaits.base import Gait
-from geomech.problem import number, real_array
 
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:

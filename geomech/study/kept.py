@@ -8,8 +8,8 @@ import math
 import os
 from pathlib import Path
 
+from geomech.errors import SceneError
 from geomech.files import hidden, note, read, sweep_strays, whole_file, why
-from geomech.problem import SceneError
 
 LARGEST = 1_000_000_000  # bytes: ten times what a million rows take
 WIDTH = 5  # numbers in a row: x, y, theta and the errors of position and heading

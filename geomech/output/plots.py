@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from geomech.connection import Connection
+from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.files import whole_file
 from geomech.gaits import Gait
-from geomech.problem import SceneError
 
 STYLE = {
     "font.size": 9,

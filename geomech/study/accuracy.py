@@ -14,10 +14,10 @@ from functools import partial
 
 import numpy as np
 
-from geomech import cost as foretold
-from geomech import estimate
-from geomech.cost import Cost
-from geomech.scene import Scene
+from geomech.scene.model import Scene
+from geomech.study import cost as foretold
+from geomech.study import estimate
+from geomech.study.cost import Cost
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)

@@ -14,16 +14,17 @@ import numpy as np
 
 import rft
 from geomech import connection as conn
-from geomech import estimate, predict
 from geomech import family as fam
 from geomech import harmonics as harm
+from geomech import predict
 from geomech.curvature import ccf
 from geomech.curvature import error as ccf_error
+from geomech.errors import SceneError, choose, real_array, short
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
-from geomech.problem import SceneError, choose, real_array, short
-from geomech.simulate import displacement
+from geomech.reconstruct import displacement
+from geomech.study import estimate
 from rft.balance import checked_body
 from rft.bodies.base import halves
 from rft.bodies.pieces import PIECES
@@ -33,7 +34,7 @@ from rft.media import is_linear
 from rft.media.base import check_ranges, in_range
 
 if TYPE_CHECKING:
-    from geomech.cost import Cost
+    from geomech.study.cost import Cost
 
 METHODS = ("area", "adapted", "path", "harmonic", "direct")  # cheapest look-up first
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
@@ -393,7 +394,7 @@ class Scene:
         """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "estimate_heading":
         {method: [...]}, "seconds": {...}}.
 
-        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.estimate`). Fields
+        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.study.estimate`). Fields
         are timed on their own.
         """
         gait, amplitudes = checked_gait(self.gait if gait is None else gait), real_array("amplitudes", amplitudes)
@@ -423,8 +424,8 @@ class Scene:
         return {"amplitude": out["amplitude"], **ordered, **estimates, "seconds": seconds}
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> Cost:
-        """What `study` would take: force balances, seconds on this machine and memory; see `geomech.cost`."""
-        from geomech import cost
+        """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""
+        from geomech.study import cost
 
         return cost.price(cost.study(self, methods, len(amplitudes), gait))
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech import plots
-from geomech.cost import Cost, price, study
+from geomech.errors import SceneError
 from geomech.files import read, refuse_inputs
 from geomech.gaits import Butterfly, Circle, Gait
-from geomech.netcdf import save_connection
-from geomech.problem import SceneError
-from geomech.scene import Scene
+from geomech.output import plots
+from geomech.output.netcdf import save_connection
+from geomech.scene.model import Scene
+from geomech.study.cost import Cost, price, study
 
 AMPLITUDES = 10  # in the study that `run` makes of each gait
 SCENE, TABLES = "scene.toml", "displacement.json"

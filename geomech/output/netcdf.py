@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.files import whole_file
-from geomech.scene import Scene
+from geomech.scene.model import Scene
 
 COMPONENTS = ("x", "y", "theta")
 

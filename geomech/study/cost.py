@@ -1,6 +1,6 @@
 """What a request costs, foretold: force balances, seconds and memory, from a pilot of the very scene on this machine.
 
-A request is a list of jobs, counted as the tiers ask for them (`geomech.estimate`); `price` solves a few balances of each
+A request is a list of jobs, counted as the tiers ask for them (`geomech.study.estimate`); `price` solves a few balances of each
 kind, then more, until it can tell what one takes. Jobs too small to matter are not piloted. Seconds are of computing, so
 that other work on the machine does not count. From Python nothing is refused: ask `Scene.cost`, and decide.
 """
@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import rft
-from geomech import estimate
+from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.harmonics import Harmonics
-from geomech.problem import SceneError
+from geomech.study import estimate
 from rft.loads import parse
 from rft.newton import ELEMENTS_TOGETHER
 
 if TYPE_CHECKING:
-    from geomech.scene import Scene
+    from geomech.scene.model import Scene
 
 LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise

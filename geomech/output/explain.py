@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
+from geomech.errors import short
 from geomech.gaits import KINDS as GAITS
-from geomech.problem import short
-from geomech.scene import ALGEBRAIC, Scene
+from geomech.scene.model import ALGEBRAIC, Scene
 from rft.bodies import KINDS as BODIES
 from rft.effects import ENGINES, KINDS, PREMISES
 from rft.media import LAWS

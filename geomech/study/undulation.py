@@ -10,7 +10,7 @@ import numpy as np
 from geomech.gaits import Sine
 
 if TYPE_CHECKING:
-    from geomech.scene import Scene
+    from geomech.scene.model import Scene
 
 MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: at its ends the moment vanishes
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.problem import real_array, short
+from geomech.errors import real_array, short
 
 
 def turning(xi) -> np.ndarray:

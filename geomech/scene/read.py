@@ -1,4 +1,4 @@
-"""The scenes that ship with the toolkit, one TOML file each, and how such a file is read."""
+"""How the TOML file of a scene is read; those that ship with the toolkit are in builtin/."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pathlib import Path
 import msgspec
 
 import rft
+from geomech.errors import SceneError, choose, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
-from geomech.problem import SceneError, choose, short
-from geomech.scene import Numerics, Scene
+from geomech.scene.model import Numerics, Scene
 from rft.bodies import KINDS as BODIES
 from rft.effects import KINDS as EFFECTS
 from rft.media import LAWS
@@ -29,7 +29,7 @@ def builtin_names() -> list[str]:
 
 
 def _folder():
-    return resources.files(__name__)
+    return resources.files("geomech.scene") / "builtin"
 
 
 def load(scene: str | Path) -> Scene:

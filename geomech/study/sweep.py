@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 
 import rft
-from geomech import __version__, estimate, kept
-from geomech.cost import Cost, direct, price
+from geomech import __version__
+from geomech.errors import SceneError
 from geomech.files import note, whole_file
 from geomech.gaits import Gait
-from geomech.netcdf import COMPONENTS, attribute
-from geomech.problem import SceneError
-from geomech.scene import Scene
-from geomech.scenes import from_tables
+from geomech.output.netcdf import COMPONENTS, attribute
+from geomech.scene.model import Scene
+from geomech.scene.read import from_tables
+from geomech.study import estimate, kept
+from geomech.study.cost import Cost, direct, price
 from rft.effects import broken, together
 
 LARGEST = 1_000_000  # points
@@ -59,7 +60,7 @@ def sweep(
     by the direct tier; estimates as in `estimate.direct`.
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
-    solver together. partial: a file that keeps what is done (`geomech.kept`) and is taken up again when the same sweep is
+    solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
     asked for; it is the caller's to remove, once the results are saved. SceneError if a point of the grid makes no scene.
     """
     tables, names, values, points = _grid(scene, over)
@@ -264,7 +265,7 @@ def save(path: Path, scene: Scene, results: dict) -> None:
 
 def draw(scene: Scene, results: dict):
     """Net displacement against one parameter, or a map over two; SceneError for more."""
-    from geomech import plots
+    from geomech.output import plots
 
     over = results["over"]
     if len(over) > 2:

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geomech.errors import SceneError, is_number, short
 from geomech.gaits import Gait
-from geomech.problem import SceneError, is_number, short
-from geomech.simulate import displacement
+from geomech.reconstruct import displacement
 
 if TYPE_CHECKING:
-    from geomech.scene import Scene
+    from geomech.scene.model import Scene
 
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
@@ -157,9 +157,9 @@ def cheapest(
     most ``tol`` body lengths.
 
     Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
-    come (`geomech.cost`) before each is done. SceneError if no tier gets there.
+    come (`geomech.study.cost`) before each is done. SceneError if no tier gets there.
     """
-    from geomech import cost
+    from geomech.study import cost
 
     if not (is_number(tol) and 0 < tol <= 1e300):
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
@@ -198,7 +198,7 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
     """The direct tier at twice the phases, or the pieces of body where these leave more, again and again, for the
     amplitudes that need it, until all positions are within ``tol`` or doubling stops helping. Returns (poses, errors) and
     {"phases": ..., "pieces": ... where there are any}."""
-    from geomech import cost
+    from geomech.study import cost
 
     ask(cost.direct(scene, gait, len(amplitudes), phases))
     poses, error, of_pieces = _in_groups(scene, gait, amplitudes, phases)
