@@ -12,6 +12,7 @@ from rft.bodies.pieces import PIECES
 from rft.effects.base import Effect, broken, engine, pieced
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
 from rft.newton import Balance
+from rft.premise import not_so
 
 
 class Solution(NamedTuple):
@@ -60,8 +61,8 @@ def body_velocity(
     ValueError for shapes or values that make no sense, and for a medium that pushes.
     """
     if engine(effects) != "algebraic":
-        lost = ", ".join(sorted(broken(effects)))
-        raise ValueError(f"no body velocity follows from shape alone where effects break {lost}: use rft.march")
+        lost = not_so(broken(effects))
+        raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.march")
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require_drag(medium)
     if threads is not None:

@@ -22,6 +22,7 @@ from rft.effects.base import Effect, Here, broken, pieced
 from rft.inertia import Mass
 from rft.media.base import Medium, in_range, require, require_drag
 from rft.newton import Balance
+from rft.premise import Premise
 from rft.settling import Approach, HeavyApproach
 from rft.work import Work, done_by
 
@@ -92,7 +93,7 @@ def march(
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
     if 0 in batch:
         return _nothing(batch, phases)
-    if cycles is None and "symmetry" in broken(effects):
+    if cycles is None and broken(effects) & Premise.SE2_SYMMETRIC:
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
     steps = _Steps(medium, body, pieced(body, effects, pieces), *shapes, effects, loads, regularisation, tolerance)
@@ -168,7 +169,7 @@ class _Steps:
         usual = np.sqrt((speed**2).mean(0))
         usual = np.where(usual > 0, usual, 1.0)
         self.mass, self.scales = None, np.where(speed > PAUSE * usual, speed, usual)
-        if "no inertia" in broken(effects):  # a heavy body moves while its joints pause
+        if broken(effects) & Premise.QUASI_STATIC:  # a heavy body moves while its joints pause
             self.mass = Mass(sum(np.asarray(e.inertia, float) for e in effects), self.dt)
             self.scales = np.broadcast_to(usual, speed.shape)
         self.step, self.pose = 0, np.zeros((3, samples))
@@ -195,7 +196,7 @@ class _Steps:
         guess, pose = self.foreseen()
         scale, first = self.scales[self.step % self.phases], not self.xi
         here = self._here(pose, scale)
-        active = [(e, m) for e, m in zip(self.effects, self.memories) if not (first and "no memory" in e.breaks)]
+        active = [(e, m) for e, m in zip(self.effects, self.memories) if not (first and e.breaks & Premise.MEMORYLESS)]
         now = [e.at(m, here) for e, m in active]
         loads, regularisation, tolerance = self.how
         balance = Balance(self.medium, self.body, loads, regularisation, tolerance, now)

@@ -11,6 +11,7 @@ from rft import Granular
 from rft.effects.base import Here, applied
 from rft.inertia import Mass
 from rft.loads import Known, element_load
+from rft.premise import Premise
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -40,7 +41,7 @@ def at_one_step(effects, body, medium, samples, rng):
     """(load, body) of effects within a march whose ground, place and past are not those of its start."""
     alpha, alphadot = rng.uniform(-1, 1, (2, body.joints, samples))
     for effect in effects:
-        if effect.breaks & {"no memory", "symmetry"}:
+        if effect.breaks & (Premise.MEMORYLESS | Premise.SE2_SYMMETRIC):
             body = effect.body(body)
     motion = body.motion(alpha, alphadot)
     turn = np.exp(1j * rng.uniform(-0.5, 0.5, samples))

@@ -6,10 +6,11 @@ import dataclasses
 
 from geomech.errors import short
 from geomech.gaits import KINDS as GAITS
-from geomech.scene.model import ALGEBRAIC, Scene
+from geomech.scene.model import Scene
 from rft.bodies import KINDS as BODIES
-from rft.effects import ENGINES, KINDS, PREMISES
+from rft.effects import ENGINES, KINDS
 from rft.media import LAWS
+from rft.premise import SHAPE_ALONE, not_so
 
 
 def explain(scene: Scene) -> str:
@@ -17,9 +18,9 @@ def explain(scene: Scene) -> str:
     medium, body = said(_kind(LAWS, scene.medium), scene.medium), said(_kind(BODIES, scene.body), scene.body)
     lines = [f"{scene.name}: {medium}, {body}, {_kind(GAITS, scene.gait)} gait"]
     for effect in scene.effects:
-        broken = ", ".join(sorted(effect.breaks)) or "nothing"
+        broken = not_so(effect.breaks) or "keeps every premise"
         lines.append(
-            f"on:  {said(effect.kind, effect)}; breaks {broken}; costs {effect.cost}; gone at {effect.limit}, "
+            f"on:  {said(effect.kind, effect)}; {broken}; costs {effect.cost}; gone at {effect.limit}, "
             f"order {effect.order}"
         )
         if assumed := effect.assumes(scene.medium):
@@ -32,7 +33,7 @@ def explain(scene: Scene) -> str:
         lost = "connection, CCF, area, path and harmonic tiers"
         if scene.engine != "algebraic":
             lost += ", adapted tier, velocity at a single shape"
-        lines.append(f"not available: {lost}: {blame} breaks what they rest on")
+        lines.append(f"not available: {lost}: {blame} takes away what they rest on")
     elif scene.body.joints != 2:
         lines.append(
             f"not available: CCF maps, area and harmonic tiers: they take two joints, this body has {scene.body.joints}"
@@ -54,8 +55,6 @@ def _kind(kinds: dict, thing) -> str:
 def _why(scene: Scene) -> str:
     """What makes the scene's engine necessary."""
     reasons = [
-        f"with {e.kind} {PREMISES[premise].split(':')[0]}"
-        for e in scene.effects
-        for premise in sorted(e.breaks & ALGEBRAIC)
+        f"with {e.kind} the scene is {not_so(e.breaks & SHAPE_ALONE)}" for e in scene.effects if e.breaks & SHAPE_ALONE
     ]
     return "; ".join(reasons) or "nothing remembers, places are alike, no mass"

@@ -32,6 +32,7 @@ from rft.effects.base import MOST_PIECES, pieced
 from rft.loads import element_load, parse
 from rft.media import is_linear
 from rft.media.base import check_ranges, in_range
+from rft.premise import ALL, SHAPE_ALONE, Premise, not_so
 
 if TYPE_CHECKING:
     from geomech.study.cost import Cost
@@ -41,7 +42,6 @@ LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 VALUES_TOGETHER = (
     1 << 22
 )  # of a gait run side by side, angles and velocities: some 500 MB with all that is made of them
-ALGEBRAIC = {"symmetry", "no memory", "no inertia"}  # premises of a body velocity that follows from shape alone
 
 
 WHOLE = {  # numbers of [numerics], from and to
@@ -162,7 +162,7 @@ class Scene:
     def solve(self, alpha, alphadot) -> rft.Solution:
         """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. SceneError
         if shape alone does not settle them."""
-        self._refuse("body velocity from shape alone", ALGEBRAIC, "run a whole gait by the direct tier")
+        self._refuse("body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
         n = self.numerics
         return rft.body_velocity(
             self.medium, self.body, alpha, alphadot,
@@ -207,7 +207,7 @@ class Scene:
             loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance, pieces=n.pieces,
         ).checked()  # fmt: skip
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
-        repeats = "symmetry" not in rft.effects.broken(self.effects) and (march.status == "settled").all()
+        repeats = not rft.effects.broken(self.effects) & Premise.SE2_SYMMETRIC and (march.status == "settled").all()
         net = displacement(march.xi) if repeats else march.displacement
         to_come = march.drift if self.settles else 0.0 * speed
         return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles, to_come)
@@ -215,7 +215,7 @@ class Scene:
     @property
     def settles(self) -> bool:
         """Whether its cycles are run until they repeat."""
-        place_matters = "symmetry" in rft.effects.broken(self.effects)
+        place_matters = rft.effects.broken(self.effects) & Premise.SE2_SYMMETRIC
         return self.engine != "algebraic" and self.numerics.cycles is None and not place_matters
 
     @property
@@ -364,14 +364,14 @@ class Scene:
 
     def require_connection(self) -> None:
         """SceneError naming the effect if one that is on breaks what a connection and its CCF rest on."""
-        self._refuse("connection or CCF", set(rft.effects.PREMISES), "use the direct tier")
+        self._refuse("connection or CCF", ALL, "use the direct tier")
 
-    def _refuse(self, what: str, premises: set[str], instead: str) -> None:
+    def _refuse(self, what: str, premises: Premise, instead: str) -> None:
         for effect in self.effects:
             if effect.breaks & premises:
                 raise SceneError(
-                    f"{self.name}: no {what} with the effect {effect.kind}, which breaks "
-                    f"{', '.join(sorted(effect.breaks))}: {instead}, or drop the effect"
+                    f"{self.name}: no {what} with the effect {effect.kind}, which is "
+                    f"{not_so(effect.breaks)}: {instead}, or drop the effect"
                 )
 
     def _allow(self, method: str) -> None:
@@ -382,7 +382,7 @@ class Scene:
         if method in ("area", "harmonic") and self.body.joints != 2:
             raise SceneError(f"{self.name}: the {method} tier takes a body of two joints: use path, adapted or direct")
         if method == "adapted":
-            self._refuse("adapted tier", ALGEBRAIC, "use the direct tier")
+            self._refuse("adapted tier", SHAPE_ALONE, "use the direct tier")
 
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""

@@ -201,7 +201,7 @@ def _kind(scene: Scene) -> str:
     effects = [
         (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched]) for e in scene.effects
     ]
-    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, sorted(broken(scene.effects)), effects))
+    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, broken(scene.effects), effects))
 
 
 def beside(scenes: list[Scene], amplitudes=None) -> Scene:

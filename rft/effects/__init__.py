@@ -1,6 +1,6 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import ENGINES, PREMISES, Effect, applied, broken, engine, pieced, repeated, together
+from rft.effects.base import ENGINES, Effect, applied, broken, engine, pieced, repeated, together
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -15,7 +15,6 @@ KINDS = {effect.kind: effect for effect in ALL}
 __all__ = [
     "ENGINES",
     "KINDS",
-    "PREMISES",
     "BodyInertia",
     "DepthProfile",
     "DisturbedGround",

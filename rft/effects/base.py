@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import functools
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -12,16 +14,10 @@ import numpy as np
 from rft.bodies.base import Body, Motion
 from rft.bodies.pieces import PIECES, cut
 from rft.media.base import in_range, require, shown
+from rft.premise import NONE, SHAPE_ALONE, Premise
 
 MOST_PIECES = 10_000  # to a body length
 
-# What an effect may break. Each premise lost takes an engine, or a result, with it.
-PREMISES = {
-    "rate independence": "speed along the gait matters",
-    "symmetry": "place and heading matter: no connection, no CCF",
-    "no memory": "the past matters: marching in time",
-    "no inertia": "mass matters: an equation of motion",
-}
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
     "marching": "the balance of forces phase after phase, place and past carried along",
@@ -47,7 +43,8 @@ class Here(NamedTuple):
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects. kind: its name in scenes and messages. breaks: premises of `PREMISES` it takes away. An effect
+    """Base of all effects. kind: its name in scenes and messages. breaks: premises it takes away; each takes an
+    engine, or a result, with it. An effect
     changes the load of an element, the elements of the body, or both; as its parameter goes to ``limit`` the scene without
     it comes back at ``order``.
 
@@ -59,7 +56,7 @@ class Effect:
     """
 
     kind = "effect"
-    breaks = frozenset()
+    breaks = NONE
     limit = ""
     order = 1
     cost = ""
@@ -125,19 +122,19 @@ def _with(effect: Effect, values: dict) -> Effect:
     return changed
 
 
-def broken(effects: Sequence[Effect]) -> frozenset:
+def broken(effects: Sequence[Effect]) -> Premise:
     """All that the effects break; ValueError for what is no effect."""
     good = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
     require(good, f"effects must be a list of effects such as EndCaps(radius=0.06), got {shown(effects)}")
-    return frozenset().union(*(e.breaks for e in effects))
+    return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 
 def engine(effects: Sequence[Effect]) -> str:
     """The cheapest of ENGINES that is right with these effects."""
     lost = broken(effects)
-    if "no inertia" in lost:
+    if lost & Premise.QUASI_STATIC:
         return "dynamic"
-    return "marching" if lost & {"no memory", "symmetry"} else "algebraic"
+    return "marching" if lost & SHAPE_ALONE else "algebraic"
 
 
 def pieced(body: Body, effects: Sequence[Effect], pieces: int = PIECES) -> Body:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rft.effects.base import Effect
 from rft.media.base import check_ranges, require
+from rft.premise import Premise
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class BodyInertia(Effect):
     drag: float
 
     kind = "body-inertia"
-    breaks = frozenset({"no inertia", "rate independence"})
+    breaks = Premise.QUASI_STATIC | Premise.RATE_INDEPENDENT
     limit = "mass = 0"
     cost = "a step at a time in place of all phases at once; a dozen operations a sample"
     batched = ("mass", "frequency", "length", "drag")

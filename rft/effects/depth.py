@@ -10,6 +10,7 @@ from rft.bodies.base import Body, stations
 from rft.effects.base import Effect, Here
 from rft.loads import ALONE
 from rft.media.base import check_ranges, real_array, require, shown
+from rft.premise import NONE, Premise
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,8 @@ class DepthProfile(Effect):
         check_ranges(self, slope=(0, 1000), towards=(-1e6, 1e6))
 
     @property
-    def breaks(self) -> frozenset:
-        return frozenset({"symmetry"}) if np.any(self.slope) else frozenset()
+    def breaks(self) -> Premise:
+        return Premise.SE2_SYMMETRIC if np.any(self.slope) else NONE
 
     def load(self, load, medium, body: Body):
         depth = _depths(self.along, body)

@@ -9,6 +9,7 @@ import numpy as np
 from rft.effects.base import Effect, Here
 from rft.effects.sides import weakened
 from rft.media.base import check_ranges
+from rft.premise import Premise
 
 PATCH = 4.0  # body lengths: the ground is remembered on a square of this size that goes with the body
 CELLS = 2.0  # cells of that square to a radius
@@ -30,7 +31,7 @@ class DisturbedGround(Effect):
     weakening: float
 
     kind = "disturbed-ground"
-    breaks = frozenset({"no memory"})
+    breaks = Premise.MEMORYLESS
     limit = "weakening = 0"
     cost = "a map of the ground, two look-ups and some thirty marks an element and step"
     rank = 1

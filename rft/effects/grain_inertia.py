@@ -11,6 +11,7 @@ from rft.effects.base import Effect
 from rft.loads import ALONE
 from rft.media.base import check_ranges, require
 from rft.media.catalogue import GRAVITY
+from rft.premise import Premise
 
 ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed of grains of unknown k
 
@@ -33,7 +34,7 @@ class GrainInertia(Effect):
     k: float | None = None
 
     kind = "grain-inertia"
-    breaks = frozenset({"rate independence"})
+    breaks = Premise.RATE_INDEPENDENT
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
     cost = "a dozen operations an element"

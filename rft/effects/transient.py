@@ -9,6 +9,7 @@ import numpy as np
 from rft.effects.base import Effect, Here
 from rft.effects.sides import parts, weakened
 from rft.media.base import check_ranges
+from rft.premise import Premise
 
 SHORTEST = 1e-6  # body lengths: a travel of an element at rest, which creeps at the regularisation
 SIGN = np.array([1.0, -1.0])[:, None, None]  # of motion to the left, for the shares to the left and to the right
@@ -31,7 +32,7 @@ class Transient(Effect):
     travel: float
 
     kind = "transient"
-    breaks = frozenset({"no memory"})
+    breaks = Premise.MEMORYLESS
     limit = "travel = 0"
     cost = "two shares an element, one link integral more where its pivot lies inside"
     rank = 2  # outside disturbed ground: its memory is that of whole elements
