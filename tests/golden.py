@@ -120,14 +120,26 @@ def commands():
             yield f"command, displacement, {tier}, estimate", errors
 
 
-def compute() -> dict[str, list[float]]:
-    """Every entry's numbers as the code gives them now."""
-    every = itertools.chain(velocities(), tiers(), marches(), commands())
+# The quick ones first, each with what the names of its entries begin with.
+PARTS = {
+    velocities: ("velocity", "work"),
+    commands: ("connection", "sweep", "command"),
+    tiers: ("tier",),
+    marches: ("march",),
+}
+
+
+def compute(*parts) -> dict[str, list[float]]:
+    """Every entry's numbers as the code gives them now, of all parts if none is named."""
+    every = itertools.chain.from_iterable(part() for part in parts or PARTS)
     return {name: [float(f"{x:.15g}") for x in np.ravel(values)] for name, values in every}
 
 
-def kept() -> dict[str, list[float]]:
-    return json.loads(FILE.read_text()) if FILE.exists() else {}
+def kept(*parts) -> dict[str, list[float]]:
+    """What is recorded, of all parts if none is named."""
+    every = json.loads(FILE.read_text()) if FILE.exists() else {}
+    begin = tuple(b for part in parts for b in PARTS[part]) or ""
+    return {name: x for name, x in every.items() if name.startswith(begin)}
 
 
 def change(old: list[float] | None, new: list[float] | None) -> float:
