@@ -215,6 +215,19 @@ def test_a_quarter_of_the_period_without_a_frame_is_too_much(share, tmp_path):
             gait(path, period=1.0)
 
 
+@pytest.mark.parametrize(
+    ("first", "last", "good"),
+    [(1e-6, 1, True), (1.001e-6, 1, False), (-1.001e-6, 1, False), (0, 1 + 9.99e-7, True), (0, 1 - 1.001e-6, False)],
+)
+def test_ends_of_the_body_may_be_off_by_a_millionth(first, last, good, tmp_path):
+    path = write(tmp_path, "curvature", [(t, {0: first, 1: last}.get(s, s), k) for t, s, k in rows("curvature")])
+    if good:
+        assert off(path) < 1e-3
+    else:
+        with pytest.raises(ValueError, match="s must run from 0"):
+            gait(path)
+
+
 SCENE = """
 [medium]
 name = "glass-0.3mm-loose"

@@ -7,10 +7,11 @@ import pytest
 from registry import BODIES
 
 from geomech import scene as scenes
-from geomech.gaits import Sine
+from geomech.gaits import Circle, Sine
 from rft import (
     CATALOGUE,
     Backbone,
+    BodyInertia,
     Chain,
     DepthProfile,
     DisturbedGround,
@@ -20,6 +21,7 @@ from rft import (
     Viscous,
     body_velocity,
     march,
+    work,
 )
 from rft.bodies.base import stations
 from rft.bodies.pieces import Pieces, cut
@@ -277,3 +279,13 @@ def test_depth_along_a_straight_chain_in_closed_form():
     errors = np.abs(np.array(xi) - [0, *wanted]).max(1)  # pieces count as their centres
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2, abs=0.05)
     assert errors[-1] < 2e-5
+
+
+def test_the_first_step_of_a_march_knows_no_inertia():
+    """Before it nothing is known to have moved: its moments are those that hold against the medium alone."""
+    body, gait = Chain((1, 1.4, 0.8)), Circle(amplitude=0.8, centre=(0.2, -0.1))
+    alpha, alphadot = gait.cycle(16)
+    found = march(GLASS, body, alpha, alphadot, effects=(BodyInertia(2.0, 0.5, 1.0, 1.0),), cycles=1, with_work=True)
+    alone = work(GLASS, body, alpha, alphadot, found.xi)
+    np.testing.assert_allclose(found.work.moment[0], alone.moment[0], atol=1e-7)
+    assert np.abs(found.work.moment[1:] - alone.moment[1:]).max() > 0.1

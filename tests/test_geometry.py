@@ -72,6 +72,33 @@ def test_fit_residual_is_the_rms_misfit():
     np.testing.assert_allclose(fitted.A[0, 0], 0.75, atol=1e-14)
     np.testing.assert_allclose(fitted.residual[0], np.sqrt(1 / 32), atol=1e-14)
     np.testing.assert_allclose(fitted.residual[1], 0, atol=1e-14)
+    np.testing.assert_allclose(fitted.speed[:, 2, 3], np.sqrt([5 / 16, 1 / 2, 0]), atol=1e-14)
+
+
+def test_scattered_directions_are_always_the_same_and_all_round():
+    unit = connection.directions(3, 200)
+    np.testing.assert_array_equal(connection.directions(3, 200), unit)
+    np.testing.assert_array_equal(connection.directions(3, 50), unit[:50])
+    np.testing.assert_allclose(unit.T @ unit / 200, np.eye(3) / 3, atol=0.02)
+    np.testing.assert_allclose(unit.mean(0), 0, atol=0.02)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.0, 3.0), (0.5, 0.9)])
+def test_angles_may_leave_the_grid_by_rounding_only(low, high):
+    field = Field((np.linspace(low, high, 9),), np.linspace(0, 1, 9))
+    slack = 1e-9 * (high - low)
+    assert field([[low - 0.99 * slack], [high + 0.99 * slack]]) == pytest.approx([0, 1], abs=1e-8)
+    for out in (low - 1.01 * slack, high + 1.01 * slack):
+        with pytest.raises(ValueError, match="lies outside the field's"):
+            field([out])
+
+
+def test_values_off_the_grid_are_refused():
+    axes = connection.grid(2, 5)
+    with pytest.raises(ValueError, match=r"values \(3, 5, 4\) do not end in the grid's shape \(5, 5\)"):
+        Field(axes, np.zeros((3, 5, 4)))
+    with pytest.raises(ValueError, match="degree 5 needs more than that many grid points"):
+        Field(axes, np.zeros((3, 5, 5)), 5)
 
 
 def test_ccf_at_the_straight_pose_for_any_ratio():
@@ -195,6 +222,15 @@ def test_connections_change_frame_like_velocities():
     changed = coordinates.change_connection(A, poses[0][0], np.stack([p[1] for p in poses], -1))
     np.testing.assert_allclose(changed, np.stack([viscous("link-3")(alpha, e) for e in np.eye(2)], -1), atol=1e-12)
     assert body.frame_pose("mean", alpha, alpha)[0] == pytest.approx(0.0)
+
+
+def test_connections_at_many_shapes_change_frame_one_by_one():
+    rng = np.random.default_rng(6)
+    A, h, dh = rng.normal(size=(4, 5, 3, 2)), rng.normal(size=(4, 5, 3)), rng.normal(size=(4, 5, 3, 2))
+    changed = coordinates.change_connection(A, h, dh)
+    for at in np.ndindex(4, 5):
+        np.testing.assert_allclose(changed[at], coordinates.change_connection(A[at], h[at], dh[at]), rtol=1e-14)
+    assert coordinates.frame_velocity([9.0, 7.0, np.pi / 2], [1.0, 2.0, 3.0]) == pytest.approx([2.0, -1.0, 3.0])
 
 
 @pytest.mark.parametrize("name", GAITS)

@@ -99,3 +99,12 @@ def test_every_dry_law_is_homogeneous():
         change = (load(*v, eps + h)[:, 0] - load(*v, eps - h)[:, 0]) / (2 * h)
         along = np.einsum("ijnb,jnb->inb", load(*v, eps)[:, 1:], v)
         np.testing.assert_allclose(eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name)
+
+
+def test_a_load_alone_takes_velocities_as_they_are():
+    """Its speed is 1 and it has all samples, where a law has parts that know them."""
+    rng = np.random.default_rng(6)
+    v, eps = rng.normal(size=(3, 2, 30)), np.full(30, 0.1)
+    load = element_load(Mud())
+    np.testing.assert_array_equal(load(*v, eps), load(*v, eps, Known(1.0, np.arange(30))))
+    assert np.abs(load(*v, eps, Known(2.0)) - load(*v, eps)).max() > 0.1

@@ -12,7 +12,7 @@ from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.output import plots
 from geomech.scene import METHODS, Numerics, Scene
 from geomech.study import estimate
-from rft import Chain, se2
+from rft import BodyInertia, Chain, se2
 
 GLASS = scenes.load("three-link-glass")
 RADII = np.linspace(0.5, 2.0, 13)
@@ -262,6 +262,38 @@ def test_impossible_tolerances_are_refused():
         estimate.cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
     with pytest.raises(SceneError, match="--tol must be"):
         estimate.cheapest(GLASS, [1.0], 0.0)
+
+
+def test_the_map_of_a_family_gives_each_shape_its_own_value():
+    """Where nothing turns: the derivative of the velocity along the curve across the curves, at the shape it is told for."""
+    gait, h = Circle(centre=(0.3, -0.2)), 1e-4
+    pull = lambda alpha, rate: (alpha[..., 0] ** 2 + 0.5 * alpha[..., 0] * alpha[..., 1]) * rate[..., 1]
+    fitted = family.fit(lambda *x: pull(*x)[..., None] * np.array([1.0, 0.0, 0.0]), gait, 1.0, 16, 24)
+    alpha, ccf = fitted.ccf()
+    off = alpha - gait.centre
+    a = np.hypot(off[..., 0], off[..., 1])[..., None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        out = off / a
+        along = np.stack([-out[..., 1], out[..., 0]], -1)
+        up, down = (pull(gait.centre + b * out, b * along) for b in (a + h, a - h))
+        wanted = (up - down) / (2 * h) / a[..., 0]
+    known = np.isfinite(ccf[..., 0])
+    assert known.mean() > 0.9
+    np.testing.assert_allclose(ccf[known][:, 0], wanted[known], atol=1e-6)
+    np.testing.assert_allclose(ccf[known][:, 1:], 0, atol=1e-12)
+
+
+def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
+    """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
+    monkeypatch.setattr(estimate, "MOST_PHASES", 128)
+    with pytest.raises(SceneError, match="no tier gets to 1e-09 body lengths .* at 128 phases"):
+        estimate.cheapest(GLASS, [0.0, 1.0], 1e-9)
+
+
+@pytest.mark.parametrize(("effects", "phases"), [((), 32), ((BodyInertia(0.1, 1.0, 1.0, 1.0),), 64)])
+def test_the_search_for_a_tier_starts_with_few_phases(effects, phases):
+    scene = dataclasses.replace(GLASS, effects=effects).with_numerics(cycles=1)
+    assert estimate.cheapest(scene, [0.5], 10.0)["settings"] == {"phases": phases}
 
 
 def test_estimates_are_in_body_lengths():

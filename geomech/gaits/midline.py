@@ -12,7 +12,7 @@ LENGTH_SPREAD = 0.2  # of a frame's length about the mean of all; beyond it the 
 PASSES = 3  # of making a spline's parameter its own arc length; 1e-7 rad is left at 30 points along a sandfish
 
 
-def bends(frames: Frames, elements: int, modes: int = 0) -> np.ndarray:
+def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     """Heading of each element minus that of the one before, (F, elements - 1), rad. modes: Legendre modes of the
     curvature along the body that are kept, by least squares; 0: splines through the data."""
     _check_modes(frames, modes)
