@@ -289,3 +289,12 @@ def test_the_first_step_of_a_march_knows_no_inertia():
     alone = work(GLASS, body, alpha, alphadot, found.xi)
     np.testing.assert_allclose(found.work.moment[0], alone.moment[0], atol=1e-7)
     assert np.abs(found.work.moment[1:] - alone.moment[1:]).max() > 0.1
+
+
+def test_drift_counts_all_of_a_cycle():
+    """What two cycles differ by, and as much again that is to come as long as no ratio is known."""
+    body, gait = Chain((1, 1.4, 0.8)), Circle(amplitude=0.8, centre=(0.2, -0.1))
+    one, two = (march(GLASS, body, *gait.cycle(16), effects=(Transient(travel=0.3),), cycles=n) for n in (1, 2))
+    changed = np.abs(two.displacement - one.displacement).max()
+    assert changed > 1e-4
+    assert two.drift == pytest.approx(2 * changed, rel=1e-6)
