@@ -3,6 +3,8 @@
 import ast
 import pathlib
 
+import mutants
+
 ROOT = pathlib.Path(__file__).parents[1]
 KNOW_MECHANICS = {"scene/model.py", "scene/read.py", "cli.py", "study/cost.py", "study/sweep.py", "output/explain.py"}
 
@@ -30,3 +32,20 @@ def test_pure_geometry_knows_planar_motions_alone():
         if any(x.partition(".")[0] == "rft" and not x.startswith("rft.se2") for x in imports(p))
     }
     assert users == KNOW_MECHANICS
+
+
+def test_mutants_are_made_of_files_that_exist_and_watched_by_tests_that_do():
+    files = [p.relative_to(ROOT).as_posix() for top in ("rft", "geomech") for p in (ROOT / top).rglob("*.py")]
+    assert [key for key in mutants.TABLE["tests"] if not any(f.startswith(key) for f in files)] == []
+    text = {p.stem[5:]: p.read_text() for p in (ROOT / "tests").glob("test_*.py")}
+    assert {name for names in mutants.TABLE["tests"].values() for name in names} <= set(text)
+    slow = [(name, x.partition("[")[0]) for name, some in mutants.TABLE["slow"].items() for x in some]
+    assert [(name, x) for name, x in slow if f"def test_{x}" not in text[name]] == []
+
+
+def test_mutants_are_programs_that_differ():
+    made = mutants.mutants_of(ROOT / "rft" / "se2.py")
+    assert len(made) > 100
+    for m in made:
+        assert ast.dump(ast.parse(m.mutated)) != ast.dump(ast.parse(m.source))
+        assert m.change().startswith("- ")
