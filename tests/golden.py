@@ -25,7 +25,8 @@ from registry import BODIES, EFFECTS, MEDIA
 from scipy.io import netcdf_file
 
 import rft
-from geomech import cli, scenes
+from geomech import cli
+from geomech import scene as scenes
 from geomech.gaits import Ellipse
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"

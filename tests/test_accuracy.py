@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from figures import cost_scaling, work_precision
-from geomech import connection, predict, scenes
+from geomech import connection, predict
+from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.study import accuracy
 from rft import Chain, Viscous, body_velocity

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from geomech import cli, scenes
+from geomech import cli
+from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import cli, curvature, files, scenes
+from geomech import cli, curvature, files
+from geomech import scene as scenes
 from geomech.output import plots, report
 from geomech.study import accuracy
 

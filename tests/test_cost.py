@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from test_cli import geomech as run
 
-from geomech import cli, connection, harmonics, scenes
+from geomech import cli, connection, harmonics
+from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.output import plots

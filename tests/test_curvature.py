@@ -7,7 +7,8 @@ import pytest
 import sympy as sp
 import xarray
 
-from geomech import connection, curvature, scenes, symbolic
+from geomech import connection, curvature, symbolic
+from geomech import scene as scenes
 from geomech.output import netcdf
 from rft import se2
 

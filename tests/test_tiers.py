@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import connection, family, harmonics, predict, scenes
+from geomech import connection, family, harmonics, predict
+from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.output import plots

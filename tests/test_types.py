@@ -9,7 +9,8 @@ import pytest
 from registry import GAITS
 
 import rft
-from geomech import connection, curvature, family, predict, reconstruct, scenes
+from geomech import connection, curvature, family, predict, reconstruct
+from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.scene import Numerics, Scene
