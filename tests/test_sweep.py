@@ -370,7 +370,8 @@ def test_a_sweep_killed_in_the_middle_is_taken_up(tmp_path):
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "--over", "body.length=1:4:4", "-o", "s.nc"]
     script = """
 import os, signal, sys
-from geomech import cli, files, sweep
+from geomech import cli, files
+from geomech.study import sweep
 sweep.SAVE_EVERY = sweep.PATIENCE = 0
 sweep.SAMPLES_TOGETHER = 2
 replace, done = os.replace, []
