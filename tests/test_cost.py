@@ -285,6 +285,7 @@ def test_what_was_ignored_stays_ignored():
     try:
         with cli.stoppable():
             os.kill(os.getpid(), signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
 

@@ -137,6 +137,8 @@ def test_the_velocity_at_which_it_pushes_is_named():
 @pytest.mark.parametrize("name", MEDIA)
 def test_media_that_drag_pass(name):
     require_drag(MEDIA[name])
+    v = 10.0 ** np.random.default_rng(0).uniform(-9, 9, 200) * np.random.default_rng(1).normal(size=(2, 200))
+    assert (np.multiply(MEDIA[name].traction(*v), v).sum(0) > 0).all()
 
 
 def test_residuals_are_magnitudes():
