@@ -38,9 +38,11 @@ SETS = {
 COLOURS = {"algebraic": "#0072B2", "marching": "#D55E00", "dynamic": "#009E73"}
 
 
-def compute(phases: int = 64, repeats: int = 5) -> dict:
-    """{name: {"ratio": median over rounds of time over the plain time of that round, "engine", "cycles"}}."""
-    fish = load("sandfish-loose")
+def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> dict:
+    """{name: {"ratio": median over rounds of time over the plain time of that round, "engine", "cycles"}}.
+
+    cycles: of a march; None: as many as it takes to settle."""
+    fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: dataclasses.replace(fish, effects=effects) for name, effects in SETS.items()}
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
     for again in range(repeats + 1):  # the first round warms up

@@ -25,6 +25,19 @@ def pytest_sessionfinish(session):
     truths = session.config.stash[TRUTHS]
     if truths.renew:
         truths.write()
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["missing"] = truths.missing
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    node.config.stash[TRUTHS].missing += getattr(node, "workeroutput", {}).get("missing", [])
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if missing := config.stash[TRUTHS].missing:
+        files = ", ".join(sorted({f"{name}.json" for name in missing}))
+        terminalreporter.write_line(f"{len(missing)} truths were computed, {files} lacks them: pytest --renew-truths")
 
 
 def pytest_collection_modifyitems(items):

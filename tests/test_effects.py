@@ -116,11 +116,11 @@ def test_effects_vanish_at_their_limit(name):
     travel of a transient are few, but they feel all of it."""
     make, order = EFFECTS[name]
     fine = name == "transient"  # elements and steps must be short against the travel
-    elements, phases = (80, 256) if fine else (20, 32)
+    elements, phases = (60, 128) if fine else (20, 32)
     sizes = np.array([0.04, 0.02, 0.01, 0.0] if fine else [0.04, 0.02, 0.01, 0.005, 0.0])
     body, (alpha, alphadot) = Backbone(elements), Sine(elements=elements).cycle(phases)
     plain = body_velocity(GLASS, body, alpha, alphadot).xi
-    cycles = 2 if name == "disturbed-ground" else None
+    cycles = 2 if name == "disturbed-ground" or fine else None
 
     def off(effect, count=1):
         many = (np.broadcast_to(x, (count, *x.shape)) for x in (alpha, alphadot))
@@ -329,7 +329,7 @@ def test_transients_draw(tmp_path):
     from figures import transients
     from geomech.output import plots
 
-    numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=40, phases=64)
+    numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=20, phases=32)
     assert (np.diff(numbers["net"], axis=1) < 0).all()
     assert numbers["net"][1] == pytest.approx([1, 0.902, 0.70], abs=0.01)
     plots.save(transients.draw(numbers), tmp_path / "f.png")
@@ -340,7 +340,7 @@ def test_the_cost_of_effects_draws(tmp_path):
     from figures import effects_cost
     from geomech.output import plots
 
-    numbers = effects_cost.compute(phases=16, repeats=1)
+    numbers = effects_cost.compute(phases=16, repeats=1, cycles=2)
     assert numbers["none"]["engine"] == numbers["these four"]["engine"] == "algebraic"
     assert numbers["transient"]["engine"] == "marching"
     assert numbers["body inertia"]["engine"] == "dynamic"

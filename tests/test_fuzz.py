@@ -64,7 +64,7 @@ def outcome(text):
         read = scenes.parse(text)
         read = read.with_numerics(phases=max(16, 2 * read.gait.harmonics + 1), loads="exact")
         if read.engine != "algebraic":
-            run = read.with_numerics(cycles=1).cycle(phases=16)
+            run = read.with_numerics(cycles=1).cycle(phases=8)
             assert np.isfinite(run.xi).all()
             return "marched"
         solution = read.solve(*read.gait.cycle(16 if read.gait.harmonics < 8 else 64))

@@ -39,6 +39,7 @@ class Truths:
 
     def __init__(self, renew: bool = False, folder: pathlib.Path = DATA):
         self.renew, self.folder, self.kept, self.asked = renew, folder, {}, {}
+        self.missing = []  # names of files that had no answer
 
     def __call__(self, name: str, compute: Callable, *question) -> np.ndarray:
         """The answer kept in ``name``.json for the question; ``compute(*question)`` if there is none."""
@@ -46,6 +47,8 @@ class Truths:
         asked = self.asked.setdefault(name, {})
         if key not in asked:
             kept = None if self.renew else self._read(name).get(key)
+            if kept is None and not self.renew:
+                self.missing.append(name)
             asked[key] = np.array(compute(*question) if kept is None else kept)
         return asked[key].copy()
 
