@@ -239,7 +239,7 @@ def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
         raise ValueError("half way")
 
     monkeypatch.setattr(plots, "displacement", fail)
-    small = scenes.load("three-link-glass").with_numerics(grid=5)
+    small = scenes.load("three-link-viscous").with_numerics(grid=5)
     with pytest.raises(ValueError, match="half way"), files.whole_folder(tmp_path / "out") as folder:
         report.write(small, folder, None)
     assert list(tmp_path.iterdir()) == []

@@ -126,7 +126,7 @@ def test_a_body_in_almost_nothing_keeps_its_momentum():
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
 def test_massless_comes_back_at_order_one(medium):
     """Net displacement: quasi-static as the mass goes to zero, at order 1."""
-    alpha, alphadot = Sine(elements=30).cycle(64)
+    alpha, alphadot = Sine(elements=30).cycle(32)
     plain = march(medium, Backbone(30), alpha, alphadot, cycles=1).xi
     sizes = np.array([0.04, 0.02, 0.01])
     off = [np.abs(march(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi - plain).max() for m in sizes]
@@ -182,12 +182,12 @@ def test_work_is_done_by_the_joints_in_a_march_too():
     assert found.work.moment.shape == (32, 2)
 
 
-@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
-def test_work_moves_the_mass(medium):
+@pytest.mark.parametrize(("medium", "phases"), [(GLASS, 128), (Viscous(2.0), 64)])
+def test_work_moves_the_mass(medium, phases):
     """With mass the joints put in what the ground takes in the mean over a cycle, and it does not matter from which end
     the links are counted: the moments include what moves them."""
     gait, effects = Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3)), (heavy(3.0),)
-    alpha, alphadot = gait.cycle(128)
+    alpha, alphadot = gait.cycle(phases)
     found = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True).checked().work
     assert (found.moment * alphadot).sum(-1).mean() == pytest.approx(found.power.mean(), rel=1e-3)
     turned = march(medium, Chain((1.5, 2, 1)), alpha[:, ::-1], alphadot[:, ::-1], effects=effects, with_work=True).work
@@ -253,7 +253,7 @@ HARD = {
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):
     """Links that stick, joints that pause, straight bodies and kinks, phase after phase."""
-    t = 2 * np.pi * np.arange(24) / 24
+    t = 2 * np.pi * np.arange(16) / 16
     gaits = {
         "both joints alike": np.stack([np.cos(t), np.cos(t)], -1),
         "one joint": np.stack([1.5 * np.sin(t), 0 * t], -1),
@@ -440,6 +440,7 @@ def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
     left = march(scene.medium, scene.body, *shapes, effects=scene.effects).drift
     assert scene.run(*shapes).to_come == left > 0
     assert (scene.with_numerics(cycles=3).run(*shapes).to_come == 0).all()
+    scene = scene.with_numerics(cycles=1)
     of_steps = estimate.direct(scene, HEAVY, a, 64)[1]
     monkeypatch.setattr(
         Scene, "run", lambda *args, run=Scene.run: (c := run(*args))._replace(to_come=c.to_come + 0.125)
