@@ -7,7 +7,7 @@ from rft.march import March, march
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
 from rft.work import Work, work
 
-SOLVER = 2  # raised with every change that moves a number: what was computed before is not taken up after it
+SOLVER = 3  # raised with every change that moves a number: what was computed before is not taken up after it
 
 __all__ = [
     "CATALOGUE",

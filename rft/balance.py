@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body
+from rft.bodies.base import Body, Motion
 from rft.bodies.pieces import PIECES
-from rft.effects.base import Effect, broken, engine, pieced
+from rft.effects.base import Effect, broken, engine, folded, pieced
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
 from rft.newton import Balance
 from rft.premise import not_so
@@ -71,15 +71,18 @@ def body_velocity(
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = np.sqrt((alphadot * alphadot).sum(0))
     moving = speed > 0
-    problem = Balance(medium, pieced(body, effects, pieces), loads, regularisation, tolerance, effects)
+    body = pieced(body, effects, pieces)
+    problem = Balance.of(folded(effects, medium, body, loads), body, regularisation, tolerance)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
-        shape, rate = alpha[:, moving], alphadot[:, moving] / speed[moving]
-        which = np.flatnonzero(moving)
-        solved = problem.solve(lambda i: problem.body.motion(shape[:, i], rate[:, i]), speed[moving], threads, which)
-        scale = np.array([[body.length], [body.length], [1.0]]) * speed[moving]
-        xi[:, moving] = solved.xi * scale
+        shape, rate, model = alpha[:, moving], alphadot[:, moving], problem.model.take(moving)
+
+        def motion(index):
+            return Motion.stacked(list(model.motions(body.motion(shape[:, index], rate[:, index])).values()))
+
+        solved = problem.solve(motion, speed[moving], threads, model=model)
+        xi[:, moving] = solved.xi * [[body.length], [body.length], [1.0]]
         residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
     status = np.where(residual <= problem.limit, np.where(stuck, "stuck", "sliding"), "unconverged")
     return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))

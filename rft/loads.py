@@ -21,7 +21,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,24 +31,7 @@ SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses a
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
-class Known(NamedTuple):
-    """What a law may ask beside the velocities of the elements it is given.
-
-    speed: (B,) or a number, by which all velocities were divided, rad per unit time. index: which samples of the whole
-    batch these are.
-    """
-
-    speed: np.ndarray | float = 1.0
-    index: np.ndarray | slice = slice(None)
-
-    def of(self, x):
-        """A parameter or memory of these samples, from one with the whole batch on its last axis; a number as it is."""
-        return x[..., self.index] if isinstance(x, np.ndarray) and x.ndim else x
-
-
-ALONE = Known()
-
-# (a, m, w, eps, known) -> (3, 4, n, B)
+# (a, m, w, eps) -> (3, 4, n, B)
 LoadLaw = Callable[..., np.ndarray]
 
 
@@ -106,21 +88,16 @@ def exact(medium: Medium) -> LoadLaw:
     q, k_t, k_n = np.array(terms).reshape(-1, 3).T
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
-    def load(a, m, w, eps, known=ALONE):
+    def load(a, m, w, eps):
         out = np.zeros((3, 4, *a.shape))
         if any(medium.viscous):
-            _add_viscous(out, _weighted(medium, known), a, m, w)
+            _add_viscous(out, medium.viscous, a, m, w)
         if terms:
             ends = Ends.of(q2 * (a * a) + eps * eps, m, w)
             _add_dry(out, ends, a, q2 * a, k_t, k_n)
         return out
 
     return load
-
-
-def _weighted(medium: Medium, known: Known):
-    """(c_t, c_n) for velocities over the samples' speed: beside dry terms, which do not know it, times that speed."""
-    return [c * known.speed for c in medium.viscous] if medium.dry else medium.viscous
 
 
 def _add_viscous(out, coefficients, a, m, w) -> None:
@@ -163,7 +140,7 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
     if medium.dry and any(medium.viscous):
         return _sum(quadrature(_dry_part(medium), nodes, weights), medium)
 
-    def load(a, m, w, eps, known=ALONE):
+    def load(a, m, w, eps):
         u = m + w * s
         a = np.broadcast_to(a, u.shape)
         (f_t, f_n), slopes = _pointwise(medium, a, u, eps)
@@ -187,9 +164,9 @@ def _dry_part(medium: Medium) -> Medium:
 def _sum(dry: LoadLaw, medium: Medium) -> LoadLaw:
     """The load of dry terms with the medium's viscous ones, which are polynomials in s and need no rule."""
 
-    def load(a, m, w, eps, known=ALONE):
-        out = dry(a, m, w, eps, known)
-        _add_viscous(out, _weighted(medium, known), a, m, w)
+    def load(a, m, w, eps):
+        out = dry(a, m, w, eps)
+        _add_viscous(out, medium.viscous, a, m, w)
         return out
 
     return load

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Motion
+from rft.bodies.base import Body, Motion, halves
 from rft.bodies.pieces import PIECES
-from rft.effects.base import Effect, Here, broken, pieced
-from rft.inertia import Mass
+from rft.contact import Model
+from rft.effects.base import Effect, Site, broken, folded, pieced, under_way
 from rft.media.base import Medium, in_range, require, require_drag
 from rft.newton import Balance
 from rft.premise import Premise
@@ -96,7 +96,9 @@ def march(
     if cycles is None and broken(effects) & Premise.SE2_SYMMETRIC:
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
-    steps = _Steps(medium, body, pieced(body, effects, pieces), *shapes, effects, loads, regularisation, tolerance)
+    cut = pieced(body, effects, pieces)
+    problem = Balance.of(folded(effects, medium, cut, loads), cut, regularisation, tolerance)
+    steps = _Steps(problem, cut, halves(body), *shapes, effects)
     found = _round_and_round(steps, phases, cycles, with_work)
     return _shaped(found, batch, body.length)
 
@@ -112,7 +114,7 @@ def _nothing(batch: tuple, phases: int) -> March:
 def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> March:
     """Cycles until they repeat, or as many as asked for; samples on the last axis."""
     enough = max([1e-6, *(e.settles for e in steps.effects)])
-    approach = (Approach if steps.mass is None else HeavyApproach)(steps.pose.shape[1])
+    approach = (HeavyApproach if steps.heavy else Approach)(steps.pose.shape[1])
     for done in itertools.count(1):
         start = steps.xi[-1] if steps.xi else None
         rows = [steps.next(with_work) for _ in range(phases)]
@@ -123,7 +125,7 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
         settled = drift <= enough
         if done == (cycles or MOST_CYCLES) or (cycles is None and settled.all()):
             break
-        if cycles is None and steps.mass:
+        if cycles is None and steps.heavy:
             steps.kick(approach.kick(~settled))
     worst = np.max(residual, 0)
     status = np.where(settled, "settled", "unsettled" if cycles is None else "running")
@@ -158,29 +160,23 @@ def _shaped(found: March, batch: tuple, length: float) -> March:
 
 
 class _Steps:
-    """The march itself: `next` takes one step. All lengths in body lengths, samples on the last axis."""
+    """The march itself: `next` takes one step. All lengths in body lengths, samples on the last axis. whole: (n,), half
+    lengths of the body's elements, of which ``body`` may be pieces."""
 
-    def __init__(self, medium, whole, body, alpha, alphadot, effects, loads, regularisation, tolerance):
-        self.medium, self.whole, self.body, self.alpha, self.alphadot = medium, whole, body, alpha, alphadot
-        self.effects, self.how = effects, (loads, regularisation, tolerance)
+    def __init__(self, problem: Balance, body: Body, whole: np.ndarray, alpha, alphadot, effects):
+        self.balance, self.body, self.whole, self.alpha, self.alphadot = problem, body, whole, alpha, alphadot
+        self.model, self.effects, self.processes = problem.model, effects, under_way(effects)
         self.phases, samples = len(alpha), alpha.shape[-1]
         self.dt = 2 * np.pi / self.phases
+        self.heavy = bool(broken(effects) & Premise.QUASI_STATIC)
         speed = np.sqrt((alphadot**2).sum(1))
         usual = np.sqrt((speed**2).mean(0))
         usual = np.where(usual > 0, usual, 1.0)
-        self.mass, self.scales = None, np.where(speed > PAUSE * usual, speed, usual)
-        if broken(effects) & Premise.QUASI_STATIC:  # a heavy body moves while its joints pause
-            self.mass = Mass(sum(np.asarray(e.inertia, float) for e in effects), self.dt)
+        self.scales = np.where(speed > PAUSE * usual, speed, usual)
+        if self.heavy:  # a heavy body moves while its joints pause
             self.scales = np.broadcast_to(usual, speed.shape)
-        self.step, self.pose = 0, np.zeros((3, samples))
-        self.xi, self.velocity = [], None
-        self.memories = [e.start(len(self._motion().half), samples) for e in effects]
+        self.step, self.pose, self.xi = 0, np.zeros((3, samples)), []
         self.limit = 0.0
-
-    def _motion(self) -> Motion:
-        """Of this step's shape, over its scale; the plain body's, without end caps."""
-        k = self.step % self.phases
-        return self.body.motion(self.alpha[k], self.alphadot[k] / self.scales[k])
 
     def foreseen(self):
         """(velocity, pose) at the step to come, the velocity by straight extrapolation."""
@@ -193,41 +189,39 @@ class _Steps:
 
     def next(self, with_work: bool):
         """Take a step: (xi, pose, residual, work) at it."""
+        k, first = self.step % self.phases, not self.xi
         guess, pose = self.foreseen()
-        scale, first = self.scales[self.step % self.phases], not self.xi
-        here = self._here(pose, scale)
-        active = [(e, m) for e, m in zip(self.effects, self.memories) if not (first and e.breaks & Premise.MEMORYLESS)]
-        now = [e.at(m, here) for e, m in active]
-        loads, regularisation, tolerance = self.how
-        balance = Balance(self.medium, self.body, loads, regularisation, tolerance, now)
-        k = self.step % self.phases
-        motion = balance.body.motion(self.alpha[k], self.alphadot[k] / scale)
-        if self.mass and not first:
-            balance.weigh(self.mass.term(motion, scale, balance.unit, balance.linear))
-        self.limit = max(self.limit, balance.limit)
-        solved = balance.solve(motion.take, scale, 1, guess=None if first else guess / scale)
-        xi = solved.xi * scale
+        motions = self.model.motions(self.body.motion(self.alpha[k], self.alphadot[k]))
+        if first:
+            self.v = {name: np.zeros_like(m.v) for name, m in motions.items()}
+        site = Site(0.0 if first else self.dt, pose, motions, self.v)
+        if first:
+            self.states = [p.begin(site) for p in self.processes]
+        model = self._model(site)
+        solved = self.balance.solve(
+            Motion.stacked(list(motions.values())).take, self.scales[k], 1, guess=None if first else guess, model=model
+        )
+        self.limit = max(self.limit, self.balance.limit)
+        xi = solved.xi
         if not first:
             self.pose = _moved(self.pose, (self.xi[-1] + xi) / 2, self.dt)
-        v = (motion.v + motion.carried(solved.xi)) * scale
-        n = len(here.place)
-        self.memories = [m if first else e.after(m, here, v[:, :n]) for e, m in zip(self.effects, self.memories)]
-        self.xi, self.velocity, self.motion = [*self.xi[-1:], xi], v[:, :n], motion
-        moved = self.mass.moved(motion, solved.xi, scale, self.pose[2]) if self.mass else None
-        self.step += 1
-        work = done_by(balance, self.whole, motion, solved.xi, scale, moved) if with_work else None
+        v = {name: m.v + m.carried(xi) for name, m in motions.items()}
+        self.states = [p.after(state, site, v) for p, state in zip(self.processes, self.states)]
+        self.xi, self.v, self.site, self.step = [*self.xi[-1:], xi], v, site, self.step + 1
+        eps = self.balance.regularisation * self.scales[k]
+        work = done_by(model, self.whole, motions, xi, eps) if with_work else None
         return xi, self.pose, solved.residual, work
+
+    def _model(self, site: Site) -> Model:
+        """What holds at one step; at the first nothing has passed yet, and mass does not act."""
+        model, past = self.model, Premise.MEMORYLESS | Premise.QUASI_STATIC
+        for process, state in zip(self.processes, self.states):
+            if site.dt > 0 or not process.breaks & past:
+                model = process.at(state, site).apply(model)
+        return model
 
     def kick(self, change: np.ndarray) -> None:
         """Go on as if the body had been moving faster by so much, (3, B), for the last steps; the ground does not notice."""
+        self.states = [p.kicked(s, self.site, self.xi[-1], change) for p, s in zip(self.processes, self.states)]
         self.xi = [x + change for x in self.xi]
-        self.velocity = self.velocity + self.motion.carried(change)[:, : self.velocity.shape[1]]
-        self.mass.kick(change)
-
-    def _here(self, pose: np.ndarray, scale: np.ndarray) -> Here:
-        motion = self._motion()
-        turn = np.exp(1j * pose[2])
-        along = motion.c + 1j * motion.s
-        place = pose[0] + 1j * pose[1] + turn * motion.place
-        before = np.zeros_like(motion.v) if self.velocity is None else self.velocity
-        return Here(self.dt, place, turn * along, motion, before, scale)
+        self.v = {name: v + self.site.motions[name].carried(change) for name, v in self.v.items()}

@@ -20,11 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion
-from rft.effects.base import applied, broken
-from rft.inertia import Inertia
-from rft.loads import Known, element_load, parse
+from rft.bodies.base import Body
+from rft.contact import SIDE, Model, rows
 from rft.path import follow
+from rft.samples import Samples
 
 LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
@@ -68,7 +67,7 @@ DIFFERENCE = 1e-6  # of eps, for the derivative with respect to it
 
 
 class Solved(NamedTuple):
-    """xi: (3, B), velocities over the sample's scale; the others (B,)."""
+    """xi: (3, B), body velocities; the others (B,)."""
 
     xi: np.ndarray
     residual: np.ndarray
@@ -80,9 +79,7 @@ class Solved(NamedTuple):
 class _State:
     """Samples under way. Every array has them on its last axis."""
 
-    index: np.ndarray
-    motion: Motion
-    centre: np.ndarray  # (2, B) the body's mean place
+    of: Samples
     xi: np.ndarray  # (3, B)
     dx: np.ndarray  # (3, B) the step to try
     v: np.ndarray  # (3, n, B) element velocities at xi
@@ -94,44 +91,46 @@ class _State:
 
     def take(self, keep: np.ndarray) -> _State:
         parts = {f.name: getattr(self, f.name) for f in fields(self)}
-        return _State(**{k: x.take(keep) if k == "motion" else x[..., keep] for k, x in parts.items()})
+        return _State(**{k: x.take(keep) if k == "of" else x[..., keep] for k, x in parts.items()})
 
     @staticmethod
-    def join(states: list[_State]) -> _State:
-        parts = {f.name: [getattr(s, f.name) for s in states] for f in fields(_State) if f.name != "motion"}
-        motion = Motion.join([s.motion for s in states])
-        return _State(motion=motion, **{k: np.concatenate(x, -1) for k, x in parts.items()})
+    def join(states: list[_State], model: Model) -> _State:
+        parts = {f.name: [getattr(s, f.name) for s in states] for f in fields(_State)}
+        of = Samples.join(parts.pop("of"), model)
+        return _State(of=of, **{k: np.concatenate(x, -1) for k, x in parts.items()})
 
 
 class Balance:
-    """A medium, a body and how finely to solve; `solve` takes the motion of samples under a scale of their velocities."""
+    """How finely to solve the balance of forces of a `rft.contact.Model`; one serves for a whole march.
 
-    inertia: Inertia | None = None
+    Within, velocities are over a scale of each sample, so that they, and the rounding, are of size 1; what laws and terms
+    are given, and `solve` takes and returns, are true ones. rows: of each contact's elements among all of them.
+    """
 
-    def __init__(self, medium, body: Body, loads: str, regularisation: float, tolerance: float, effects=()):
-        self.regularisation = regularisation
-        self.load, self.body = applied(effects, element_load(medium, loads), medium, body)
-        self.nodes = parse(loads)[1]
-        axial, lateral = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
-        self.unit = axial or lateral  # residuals are magnitudes
+    def __init__(self, model: Model, rows: list[slice], regularisation: float, tolerance: float):
+        self.model, self.rows, self.regularisation = model, rows, regularisation
+        self.nodes = model.contacts[SIDE].law.nodes
+        medium = model.medium
+        lateral = abs(float(medium.traction(0.0, 1.0)[1]))
         self.viscous_unit = medium.viscous[0] if medium.dry and medium.viscous else 0.0
-        self.limit = tolerance + 1e-14 * max(1.0, lateral / self.unit)  # rounding of the largest forces
-        self.linear = medium.dry == ()
-        self.homogeneous = bool(medium.dry) and not any(medium.viscous) and not broken(effects)
+        self.base = tolerance + 1e-14 * max(1.0, lateral / model.unit)  # rounding of the largest forces
+        self.limit, self.linear = self.base, medium.dry == ()
 
-    def weigh(self, inertia: Inertia) -> None:
-        """Let mass take part."""
-        self.inertia = inertia
-        self.limit += 1e-14 * inertia.rate * float(np.max(inertia.weight)) / self.unit
+    @classmethod
+    def of(cls, model: Model, body: Body, regularisation: float, tolerance: float) -> Balance:
+        """That of a model on a body."""
+        zero = np.zeros((body.joints, 1))
+        return cls(model, rows(model.motions(body.motion(zero, zero))), regularisation, tolerance)
 
-    def solve(self, motion: Callable, speed, threads=None, which=None, guess=None) -> Solved:
-        """Velocities over ``speed`` (B,), the samples' scale. motion(index): `Motion` of those samples at velocities over
-        their scale. which: (B,), their places in the batch that effects know. guess: (3, B), tried first."""
-        self.motion, self.speed, self.guess = motion, speed, guess
-        self.which = np.arange(speed.size) if which is None else which
-        # The unit of the residual: beside dry terms viscous ones count as much as the samples are fast.
-        self.units = self.unit + self.viscous_unit * np.maximum(speed - 1.0, 0.0)
-        size = speed.size
+    def solve(self, motion: Callable, scale, threads=None, guess=None, model: Model | None = None) -> Solved:
+        """Body velocities of B samples. motion(index): `Motion` of all contacts' elements of those samples. scale: (B,), the
+        size of their velocities. guess: (3, B), tried first. model: of this batch, if it is not the balance's own."""
+        self.motion, self.scale, self.guess = motion, scale, None if guess is None else guess / scale
+        self.model = self.model if model is None else model
+        self.scaled = not self.model.rate_independent
+        self.unit = self._units(scale)
+        self.limit = self.base + sum(1e-14 * np.max(term.size * scale / self.unit) for term in self.model.terms)
+        size = scale.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
         for way in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
@@ -142,7 +141,22 @@ class Balance:
             todo = np.flatnonzero(out.residual > self.limit)
             if not todo.size:
                 break
-        return out
+        return out._replace(xi=out.xi * scale)
+
+    def _units(self, scale) -> np.ndarray:
+        """(B,): of residuals, which are magnitudes: drag at the samples' speeds, in dry media not below that at unit speed."""
+        unit, medium = self.model.unit, self.model.medium
+        if self.linear:
+            return unit * scale
+        if medium.dry is None:
+            return np.maximum(*(np.abs(x) for x in medium.traction(scale, 0.0 * scale)[:1] * 2))
+        return unit + self.viscous_unit * np.maximum(scale - 1.0, 0.0)
+
+    def samples(self, index: np.ndarray) -> Samples:
+        """Those of the batch."""
+        scale, motion = self.scale[index], self.motion(index)
+        motion = motion._replace(v=motion.v / scale)
+        return Samples(index, motion, motion.centre, scale, self.unit[index], self.model.take(index))
 
     def _follow(self, todo, wanted: float, budget: int, out: Solved) -> None:
         """Solve the samples ``todo`` along their curves."""
@@ -158,7 +172,7 @@ class Balance:
         return max(1, ELEMENTS_TOGETHER // (self.motion(todo[:1]).half.shape[0] * self.nodes))
 
     def _stuck(self, v: np.ndarray) -> np.ndarray:
-        """(B,): whether some element is at rest, from (a, m, w) as (3, n, B)."""
+        """(B,): whether some element is at rest, from velocities (3, n, B)."""
         slowest = _slowest(v)
         return np.zeros(slowest.shape, bool) if self.linear else slowest < STUCK_BELOW * self.regularisation
 
@@ -169,52 +183,52 @@ class Balance:
         def work(share, stop):
             queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
             while (queue or state is not None) and not stop.is_set():
-                while queue and (state is None or state.index.size <= batch // 2):
-                    index = queue.pop()
-                    fresh = self._start(descent, index, self.motion(index))
-                    state = fresh if state is None else _State.join([state, fresh])
+                while queue and (state is None or state.of.size <= batch // 2):
+                    fresh = self._start(descent, self.samples(queue.pop()))
+                    state = fresh if state is None else _State.join([state, fresh], self.model)
                 state = self._advance(state, descent, out)
 
         _map(work, np.array_split(todo, _workers(threads, todo.size // (2 * batch))))
 
-    def _start(self, descent: Descent, index, motion: Motion) -> _State:
+    def _start(self, descent: Descent, of: Samples) -> _State:
         """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
-        size = index.size
+        size = of.size
         at_rest, worst = np.zeros((3, size)), np.full(size, np.inf)
         first = self.regularisation if self.linear else max(descent.widest, self.regularisation)
         eps = np.full(size, first)
-        if descent is WARM:
-            dx = self.guess[:, index]
-        else:
-            dx = self.viscous(motion, index)
-        count = np.zeros(size, int)
-        return _State(index, motion, motion.centre, at_rest, dx, motion.v, eps, eps, np.ones(size), worst, count)
+        dx = self.guess[:, of.index] if descent is WARM else self.viscous(of)
+        return _State(of, at_rest, dx, of.motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
 
-    def viscous(self, motion: Motion, index) -> np.ndarray:
+    def viscous(self, of: Samples) -> np.ndarray:
         """(3, B): the solution with kinks rounded off almost without end."""
-        net = self._net(motion, motion.v, np.zeros((3, index.size)), np.full(index.size, 1e3), index)[1]
+        net = self._net(of, of.motion.v, np.zeros((3, of.size)), np.full(of.size, 1e3))[1]
         return -_solve3(net[:, 1:], net[:, 0])
 
-    def with_slope(self, motion: Motion, xi, v, eps, index) -> tuple[np.ndarray, np.ndarray, int]:
+    def with_slope(self, of: Samples, xi, v, eps) -> tuple[np.ndarray, np.ndarray, int]:
         """What comes to the frame, (3, 4, B), its derivative with respect to log eps, (3, B), and the evaluations taken."""
-        load, net = self._net(motion, v, xi, eps, index)
-        if self.homogeneous:
-            return net, -motion.total(_along(load, v)), 1
-        more = self._net(motion, v, xi, (1.0 + DIFFERENCE) * eps, index)[1]
+        load, net = self._net(of, v, xi, eps)
+        if not self.scaled:
+            return net, -of.motion.total(_along(load, v)), 1
+        more = self._net(of, v, xi, (1.0 + DIFFERENCE) * eps)[1]
         return net, (more[:, 0] - net[:, 0]) / DIFFERENCE, 2
 
-    def residual(self, net: np.ndarray, centre: np.ndarray, index) -> np.ndarray:
+    def residual(self, net: np.ndarray, of: Samples) -> np.ndarray:
         """(B,): the larger of force and moment about the mean place, from those on the frame (3, B)."""
         force = np.sqrt(net[0] * net[0] + net[1] * net[1])
-        moment = net[2] - centre[0] * net[1] + centre[1] * net[0]
-        return np.maximum(force, np.abs(moment)) / self.units[index]
+        moment = net[2] - of.centre[0] * net[1] + of.centre[1] * net[0]
+        return np.maximum(force, np.abs(moment)) / of.unit
 
-    def _net(self, motion: Motion, v, xi, eps, index) -> tuple[np.ndarray, np.ndarray]:
-        """Element loads (3, 4, n, B) and what they, and the mass, come to on the frame, (3, 4, B)."""
-        load = self.load(*v, eps, Known(self.speed[index], self.which[index]))
-        net = motion.assembled(load)
-        if self.inertia is not None:
-            net += self.inertia(xi, index)
+    def _net(self, of: Samples, v, xi, eps) -> tuple[np.ndarray, np.ndarray]:
+        """Element loads (3, 4, n, B) and what they, and the terms, come to on the frame, (3, 4, B); its tangent with respect
+        to velocities over the scale. Where drag does not depend on speed, the scale makes no difference."""
+        if not self.scaled:
+            load = of.model.load(v, self.rows, eps)
+            return load, of.motion.assembled(load)
+        load = of.model.load(v * of.scale, self.rows, eps * of.scale)
+        net = of.motion.assembled(load)
+        for term in of.model.terms:
+            net += term(xi * of.scale)
+        net[:, 1:] *= of.scale
         return load, net
 
     def _advance(self, s: _State, descent: Descent, out: Solved) -> _State | None:
@@ -225,13 +239,13 @@ class Balance:
         if ended.any():
             self._write(s, ended, out)
             s = s.take(np.flatnonzero(~ended))
-        return s if s.index.size else None
+        return s if s.of.size else None
 
     def _step(self, s: _State, descent: Descent) -> np.ndarray:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
-        v = s.v + s.motion.carried(s.dx)
-        load, net = self._net(s.motion, v, s.xi + s.dx, s.eps_next, s.index)
-        residual = self.residual(net[:, 0], s.centre, s.index)
+        v = s.v + s.of.motion.carried(s.dx)
+        load, net = self._net(s.of, v, s.xi + s.dx, s.eps_next)
+        residual = self.residual(net[:, 0], s.of)
         kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
         s.iterations = s.iterations + 1
         s.xi = np.where(kept, s.xi + s.dx, s.xi)
@@ -256,18 +270,18 @@ class Balance:
             s.eps_next[d] = np.maximum(ratio * s.eps[d], self.regularisation)
             # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v. An element at rest creeps
             # in proportion to eps; one that slides feels eps^2.
-            slope = _along(load[..., d], s.v[..., d])
+            slope = _along(load[..., d], s.v[..., d]) * (s.of.scale[d] if self.scaled else 1.0)
             change = s.eps_next[d] / s.eps[d]
-            right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.motion.take(d).total(slope)
+            right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.of.motion.take(d).total(slope)
         dx = _solve3(net[:, 1:], right)
         if np.abs(dx).max(initial=0.0) <= 1.0:  # then no place within a body length moves by LARGEST_STEP
             return dx
         x, y, turn = dx
-        size2 = (x - s.centre[1] * turn) ** 2 + (y + s.centre[0] * turn) ** 2 + turn * turn
+        size2 = (x - s.of.centre[1] * turn) ** 2 + (y + s.of.centre[0] * turn) ** 2 + turn * turn
         return dx * (LARGEST_STEP / np.sqrt(np.maximum(size2, LARGEST_STEP**2)))
 
     def _write(self, s: _State, ended: np.ndarray, out: Solved) -> None:
-        i = s.index[ended]
+        i = s.of.index[ended]
         there = s.eps <= self.regularisation  # a balance with wider rounding is not the one that was asked for
         out.xi[:, i], out.residual[i] = s.xi[:, ended], np.where(there, s.residual, np.inf)[ended]
         out.iterations[i] += s.iterations[ended]
@@ -275,7 +289,7 @@ class Balance:
 
 
 def _slowest(v: np.ndarray) -> np.ndarray:
-    """(B,): the speed of the slowest element, each by its faster end, from (a, m, w) as (3, n, B)."""
+    """(B,): the speed of the slowest element, each by its faster end, from velocities (3, n, B)."""
     a, m, w = v
     return np.sqrt((a * a + (np.abs(m) + np.abs(w)) ** 2).min(0))
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Motion
+from rft.samples import Samples
 
 WIDE = 10.0  # rounding to start from, body lengths per radian: no element is that fast
 FIRST = 2.0  # the first step
@@ -64,9 +65,7 @@ class _Point(NamedTuple):
 class _Walk:
     """Samples on their curves. Every array has them on its last axis."""
 
-    index: np.ndarray
-    motion: Motion
-    centre: np.ndarray
+    of: Samples
     evaluations: np.ndarray
     foot: _Point  # on the curve
     tangent: np.ndarray  # (4, B) there, of size 1
@@ -83,7 +82,7 @@ class _Walk:
 
     def take(self, keep: np.ndarray) -> _Walk:
         parts = {f.name: getattr(self, f.name) for f in fields(self)}
-        moves = ("motion", "foot", "point")
+        moves = ("of", "foot", "point")
         return _Walk(**{k: x.take(keep) if k in moves else x[..., keep] for k, x in parts.items()})
 
 
@@ -91,33 +90,32 @@ def follow(problem, index: np.ndarray, wanted: float, budget: int):
     """Solve the samples ``index`` (B,) of a `rft.newton.Balance` under way. Yields (their places in the batch, xi (3, b),
     element velocities, residual (b,), evaluations (b,)) as they end, with residual inf where the budget is spent.
     wanted: the size of a step's first correction, by which the next step is chosen."""
-    s = _start(problem, index)
-    while s.index.size:
-        new = s.point.moved(s.motion, s.change)
+    s = _start(problem, problem.samples(index))
+    while s.of.size:
+        new = s.point.moved(s.of.motion, s.change)
         new = new._replace(eps=np.where(s.last, problem.regularisation, new.eps))
-        net, slope, cost = problem.with_slope(s.motion, *new, s.index)
+        net, slope, cost = problem.with_slope(s.of, *new)
         s.evaluations = s.evaluations + cost
-        residual = problem.residual(net[:, 0], s.centre, s.index)
+        residual = problem.residual(net[:, 0], s.of)
         done = s.last & (residual <= problem.limit)
         _correct(s, new, net, slope, wanted, problem.regularisation)
         ended = done | (s.evaluations >= budget)
         if ended.any():
             i = np.flatnonzero(ended)
             residual = np.where(done, residual, np.inf)[i]
-            yield s.index[i], new.xi[:, i], new.v[..., i], residual, s.evaluations[i]
+            yield s.of.index[i], new.xi[:, i], new.v[..., i], residual, s.evaluations[i]
             s = s.take(np.flatnonzero(~ended))
 
 
-def _start(problem, index: np.ndarray) -> _Walk:
+def _start(problem, of: Samples) -> _Walk:
     """At the viscous solution, on the way to less rounding."""
-    motion = problem.motion(index)
-    size = index.size
-    xi = problem.viscous(motion, index)
+    motion, size = of.motion, of.size
+    xi = problem.viscous(of)
     foot = _Point(xi, motion.v + motion.carried(xi), np.full(size, max(WIDE, problem.regularisation)))
     down = np.zeros((4, size))
     down[3] = -1.0
     zero, one, count = np.zeros(size), np.ones(size), np.zeros(size, int)
-    s = _Walk(index, motion, motion.centre, count + 1, foot, down, down, FIRST * one, foot, down, one, zero,
+    s = _Walk(of, count + 1, foot, down, down, FIRST * one, foot, down, one, zero,
               np.zeros((4, 4, size)), count, zero, count > 0)  # fmt: skip
     _predict(s, np.ones(size, bool), problem.regularisation)
     return s
@@ -142,14 +140,14 @@ def _predict(s: _Walk, who: np.ndarray, target: float) -> None:
 def _correct(s: _Walk, new: _Point, net, slope, wanted: float, target: float) -> None:
     """Judge the points that were tried, and choose what to try next."""
     matrix = _bordered(s, net, slope)
-    right = np.zeros((4, 2, s.index.size))
+    right = np.zeros((4, 2, s.of.size))
     right[:3, 0], right[3, 1] = -net[:, 0], 1.0
     correction, tangent = np.moveaxis(_solve4(matrix, right), 1, 0)
-    size = new.size(s.motion, correction)
+    size = new.size(s.of.motion, correction)
     first, fine = s.tries == 0, s.step < FINE
     s.miss = np.where(first, size, s.miss)
     # With the matrix of the point before, a correction must be smaller by about half the part that was taken.
-    before = s.point.size(s.motion, _solve4(np.where(first, np.eye(4)[..., None], s.matrix), right[:, :1])[:, 0])
+    before = s.point.size(s.of.motion, _solve4(np.where(first, np.eye(4)[..., None], s.matrix), right[:, :1])[:, 0])
     smaller = first | (before <= (1.0 - 0.5 * s.part) * s.size) | (s.part <= LEAST)
     most = np.where(fine, PATIENCE, np.where(s.last, AT_THE_END, CORRECTIONS))
     failed = ~np.isfinite(size) | (first & (size > LONGEST)) | ~(smaller | fine) | (s.tries >= most)
@@ -172,7 +170,7 @@ def _correct(s: _Walk, new: _Point, net, slope, wanted: float, target: float) ->
 
 def _bordered(s: _Walk, net, slope) -> np.ndarray:
     """(4, 4, B): the tangent with respect to (xi, log eps) over the border; over eps itself in the last step."""
-    matrix = np.empty((4, 4, s.index.size))
+    matrix = np.empty((4, 4, s.of.size))
     matrix[:3, :3], matrix[:3, 3] = net[:, 1:], slope
     matrix[3] = np.where(s.last, np.eye(4)[3][:, None], s.border)
     return matrix
@@ -180,9 +178,9 @@ def _bordered(s: _Walk, net, slope) -> np.ndarray:
 
 def _stand(s: _Walk, who: np.ndarray, new: _Point, correction, tangent) -> None:
     """Take the corrected points of the samples ``who`` for points of the curve, and the tangents there."""
-    foot = new.moved(s.motion, np.where(who, correction, 0.0))
-    tangent = tangent / foot.size(s.motion, tangent)
-    border = s.motion.total(s.motion.carried(tangent[:3]) / foot.speed2())
+    foot = new.moved(s.of.motion, np.where(who, correction, 0.0))
+    tangent = tangent / foot.size(s.of.motion, tangent)
+    border = s.of.motion.total(s.of.motion.carried(tangent[:3]) / foot.speed2())
     s.foot = foot.where(who, s.foot)
     s.tangent = np.where(who, tangent, s.tangent)
     s.border = np.where(who, np.concatenate([border, tangent[3:]]), s.border)

@@ -8,6 +8,7 @@ from registry import BODIES, DRY, LINEAR, MEDIA
 
 from geomech import cli, symbolic
 from rft import Chain, Coulomb, GrainInertia, Granular, Viscous, body_velocity
+from rft.contact import Model
 from rft.media.base import TermLaw
 from rft.newton import QUICK, Balance
 from rft.symbolic import viscous_chain
@@ -189,12 +190,12 @@ def test_curves_lead_to_what_the_descent_finds(medium, body, monkeypatch):
 def test_the_slope_in_the_rounding(medium, cost):
     """d(net)/d(log eps), exactly or by a difference, against a wider one."""
     alpha, alphadot = (x.T for x in samples(THREE, 20))
-    balance, speed, index = Balance(medium, THREE, "exact", 1e-6, 1e-10), np.full(20, 0.7), np.arange(20)
+    balance, speed = Balance.of(Model.of(medium), THREE, 1e-6, 1e-10), np.full(20, 0.7)
     balance.solve(THREE.motion(alpha, alphadot).take, speed, 1)
-    motion, xi, eps = THREE.motion(alpha, alphadot), np.full((3, 20), 0.1), np.full(20, 0.05)
-    v = motion.v + motion.carried(xi)
-    slope, evaluations = balance.with_slope(motion, xi, v, eps, index)[1:]
-    up, down = (balance.with_slope(motion, xi, v, eps * np.exp(h), index)[0][:, 0] for h in (1e-4, -1e-4))
+    some, xi, eps = balance.samples(np.arange(20)), np.full((3, 20), 0.1), np.full(20, 0.05)
+    v = some.motion.v + some.motion.carried(xi)
+    slope, evaluations = balance.with_slope(some, xi, v, eps)[1:]
+    up, down = (balance.with_slope(some, xi, v, eps * np.exp(h))[0][:, 0] for h in (1e-4, -1e-4))
     np.testing.assert_allclose(slope, (up - down) / 2e-4, rtol=1e-4, atol=1e-6)
     assert np.abs(slope).max() > 0.01
     assert evaluations == cost

@@ -23,13 +23,13 @@ from rft import (
     march,
     work,
 )
-from rft.bodies.base import stations
 from rft.bodies.pieces import Pieces, cut
-from rft.effects.base import Here
+from rft.contact import Averages, Contact, Model
+from rft.effects.base import Site, folded
 from rft.effects.disturbed import Ground
-from rft.effects.sides import parts, weakened
 from rft.effects.transient import SIGN, _developed
 from rft.loads import element_load
+from rft.sides import parts, sided
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
@@ -49,8 +49,8 @@ def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():
     a, m, w = np.random.default_rng(6).normal(size=(3, 3, 40))
     a += 0.01 * np.sign(a)
     eps, plain = np.full(40, 1e-3), element_load(GLASS)
-    skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25).load(plain, GLASS, Chain())
-    found, without = skin(a, m, w, eps), plain(a, m, w, eps)
+    skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25).apply(Model.of(GLASS)).contacts["side"]
+    found, without = skin.load(a, m, w, eps), plain(a, m, w, eps)
     np.testing.assert_allclose(found[0], without[0] * np.where(a > 0, 0.12, 0.31) / 0.25, rtol=1e-14)
     np.testing.assert_array_equal(found[1:], without[1:])
 
@@ -88,7 +88,8 @@ def test_sides_are_parts_of_the_whole():
     eps, load = np.full(50, 1e-3), element_load(GLASS)
 
     def side(share):
-        return weakened(load, lambda m, w, known: (np.stack([share + 0 * m, 1 - share + 0 * m]), None, None))
+        one = lambda m, w: (np.stack([share + 0 * m, 1 - share + 0 * m]), None, None)
+        return lambda *v: sided(load, (one,), *v)
 
     left, right = (side(share)(a, m, w, eps) for share in (1.0, 0.0))
     np.testing.assert_allclose((left + right)[1:], load(a, m, w, eps)[1:], atol=1e-12)
@@ -166,11 +167,11 @@ def test_a_piece_that_turns_remembers_both_of_its_sides():
     """About its middle for a long way: each half has built up its own side, so that the piece has half of either."""
     effect, chain = Transient(travel=0.01), Chain((1, 1))
     motion = chain.motion(np.zeros((1, 1)), np.ones((1, 1)))
-    here = Here(1.0, motion.place, motion.c + 1j * motion.s, motion, np.zeros((3, 2, 1)), np.ones(1))
+    site = Site(1.0, np.zeros((3, 1)), {"side": motion}, {"side": np.zeros((3, 2, 1))})
     v = np.array(
         [[[0.0], [0.0]], [[0.0], [0.5]], [[1.0], [1.0]]]
     )  # the second has its pivot at a quarter of its length
-    memory = effect.after(np.ones((2, 2, 1)), here, v)[..., 0]
+    memory = effect.after(np.ones((2, 2, 1)), site, {"side": v})[..., 0]
     np.testing.assert_allclose(memory, [[0.5, 0.75], [0.5, 0.25]], atol=1e-12)
 
 
@@ -192,25 +193,26 @@ def test_a_body_that_finds_fresh_ground_is_not_weakened():
     effect = DisturbedGround(radius=0.03, weakening=1.0)
     body = cut(Chain((1, 1, 1)), 40)
     motion = body.motion(np.zeros((2, 1)), np.ones((2, 1)))
-    here = Here(0.1, motion.place, motion.c + 1j * motion.s, motion, motion.v, np.ones(1))
-    memory = effect.start(len(motion.half), 1)
-    memory = effect.after(memory, here, motion.v)
-    now = effect.at(memory, here)
-    np.testing.assert_allclose([now.left, now.right], 1.0, atol=1e-12)
-    aside = here._replace(place=motion.place + 0.06j)
-    assert effect.at(memory, aside).right.max() < 0.1  # the track it left
-    assert effect.at(memory, aside).left.min() == 1.0
+    site = Site(0.1, np.zeros((3, 1)), {"side": motion}, {})
+    untouched = effect.after(effect.begin(site), site._replace(dt=0.0), {"side": motion.v})
+    aside = site._replace(pose=np.array([[0.0], [0.06], [0.0]]))
+    assert (effect.at(untouched, aside).left == 1.0).all()  # where a march starts there is no track
+    ground = effect.after(untouched, site, {"side": motion.v})
+    np.testing.assert_allclose(effect.at(ground, site).left, 1.0, atol=1e-12)
+    left, right = effect.at(ground, aside).left
+    assert right.max() < 0.1  # the track it left
+    assert left.min() == 1.0
 
 
 def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
     """A track beside one half of an element takes half of that side's drag: the mean along it, not the most."""
     effect, body = DisturbedGround(radius=0.03, weakening=1.0), Chain((1, 1))
     motion = body.motion(np.zeros((1, 1)), np.ones((1, 1)))
-    here = Here(0.1, motion.place, motion.c + 1j * motion.s, motion, motion.v, np.ones(1))
-    ground = effect.start(2, 1)
+    site = Site(0.1, np.zeros((3, 1)), {"side": motion}, {})
+    ground = effect.begin(site)
     track = np.linspace(-0.5, -0.25, 40)[:, None, None] + 0.06j  # along the tail half of the tail's link, to its left
     ground.mark(track, 0.03)
-    left, right = effect.at(ground, here).left[:, 0], effect.at(ground, here).right[:, 0]
+    left, right = effect.at(ground, site).left[..., 0]
     assert left[0] == pytest.approx(0.5, abs=0.08)
     assert [left[1], *right] == [1, 1, 1]
 
@@ -242,24 +244,34 @@ def test_depth_along_the_body():
 
 
 def test_a_slope_rises_where_it_says():
-    """Towards pi / 2 it is deeper where y > 0, so what lies there weighs more: a straight body whose drag grows
-    from tail to head, standing along y, turns about a point nearer to its head."""
-    chain, rate = Chain((1, 1)), np.array([1.0])
-    motion = chain.motion(np.zeros((1, 1)), rate[:, None])
-    here = Here(0.1, np.array([[0.3j], [-0.2j]]), np.full((2, 1), 1j), motion, motion.v, np.ones(1))
-    there = DepthProfile(slope=0.5, towards=np.pi / 2).at(None, here)
-    np.testing.assert_allclose(there.added[:2, 0], [0.15, -0.1], atol=1e-15)
-    askew = DepthProfile(slope=0.5, towards=np.pi / 6).at(None, here._replace(place=np.array([[1.0 + 0j], [1j]])))
-    np.testing.assert_allclose(askew.added[:2, 0], [0.5 * np.cos(np.pi / 6), 0.25], atol=1e-15)
+    """Towards pi / 2 it is deeper where y > 0, so what lies there weighs more; every buried contact at its own place."""
+    body, effects = Chain((1, 1)), (EndCaps(radius=0.05), DepthProfile(slope=0.5, towards=np.pi / 2))
+    model = folded(effects, GLASS, body).touching("sledge", Contact(Averages(GLASS), buried=False))
+    motions = model.motions(body.motion(np.zeros((1, 1)), np.ones((1, 1))))
+
+    def depths(effect, pose):
+        deep = effect.at(None, Site(0.1, np.array(pose)[:, None], motions, {})).apply(model)
+        assert deep.contacts["sledge"].factors == ()
+        return [deep.contacts[name].factors[0](None, None, None)[0][:, 0] for name in ("side", "ends")]
+
+    side, ends = depths(effects[1], (0.4, 0.1, np.pi / 2))  # standing along y, its middle at 0.1
+    np.testing.assert_allclose(side, 1 + 0.5 * np.array([-0.15, 0.35]), atol=1e-15)
+    np.testing.assert_allclose(ends, 1 + 0.5 * np.array([-0.4, 0.6]), atol=1e-15)
+    side, _ = depths(DepthProfile(along=(1.0, 3.0), slope=0.5, towards=np.pi / 6), (1.0, 0.0, 0.0))
+    np.testing.assert_allclose(side, [1.5 + 0.375 * np.cos(np.pi / 6), 2.5 + 0.625 * np.cos(np.pi / 6)], atol=1e-15)
 
 
-def test_stations_run_from_the_tails_cap_to_the_heads():
-    body = EndCaps(radius=0.05).body(Chain((1, 3)))
-    np.testing.assert_allclose(stations(body), [1 / 8, 5 / 8, 0, 1], atol=1e-15)
-    motion = body.motion(np.zeros((1, 1)), np.zeros((1, 1)))
-    np.testing.assert_allclose(motion.place[-2:, 0], [-0.5, 0.5], atol=1e-15)  # on which places they are
-    tail = EndCaps(radius=0.05, tail=4.0, head=0.0).body(Chain((1, 3))).motion(np.zeros((1, 1)), np.zeros((1, 1)))
-    assert tail.weight[-2] > tail.weight[-1] == 0
+def test_places_run_from_the_tail_to_the_head():
+    body = Chain((1, 3))
+    caps = EndCaps(radius=0.05, tail=4.0, head=0.0)
+    model = folded((caps,), GLASS, body)
+    motions = model.motions(body.motion(np.zeros((1, 1)), np.zeros((1, 1))))
+    places = {name: model.contacts[name].places(motions[name]) for name in motions}
+    np.testing.assert_allclose(places["side"], [1 / 8, 5 / 8], atol=1e-15)
+    np.testing.assert_allclose(places["ends"], [0, 1], atol=1e-15)
+    np.testing.assert_allclose(motions["ends"].place[:, 0], [-0.5, 0.5], atol=1e-15)  # on which places they are
+    tail, head = motions["ends"].weight[:, 0]
+    assert tail > head == 0
 
 
 def test_depth_along_a_straight_chain_in_closed_form():

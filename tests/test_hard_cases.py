@@ -9,6 +9,7 @@ from registry import BODIES, DRY, MEDIA
 from geomech import coordinates, predict
 from geomech.gaits import Butterfly, Circle, Fourier
 from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, newton, se2
+from rft.contact import Model
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
@@ -255,7 +256,7 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch
     found = np.zeros((0, 3))
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
         monkeypatch.setattr("rft.newton.WARM", newton.Descent(widest, 0.1, 1e-4, np.inf, 100))
-        balance = newton.Balance(medium, body, "exact", regularisation, 1e-10)
+        balance = newton.Balance.of(Model.of(medium), body, regularisation, 1e-10)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         solved = balance.solve(body.motion(alpha, alphadot).take, np.ones(starts), 1, guess=guess)
         for xi in solved.xi[:, solved.residual <= balance.limit].T:

@@ -29,9 +29,12 @@ from rft import (
     Viscous,
     body_velocity,
     march,
+    work,
 )
 from rft.bodies.base import halves
+from rft.effects import folded
 from rft.march import _Steps
+from rft.newton import Balance
 from rft.settling import Approach
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -451,8 +454,10 @@ def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
 def test_a_kicked_body_coasts():
     """In almost nothing, a kick that turns the frame changes the momentum over the ground once, not step by step after."""
     alpha, alphadot = (x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64))
-    steps = _Steps(Viscous(2.0), Chain(), Chain(), alpha, alphadot, (heavy(1e6),), "exact", 1e-6, 1e-10)
-    over_ground = lambda: complex(*steps.mass.momenta[-1][:2, 0]) * np.exp(1j * steps.pose[2, 0])
+    body, effects = Chain(), (heavy(1e6),)
+    problem = Balance.of(folded(effects, Viscous(2.0), body), body, 1e-6, 1e-10)
+    steps = _Steps(problem, body, halves(body), alpha, alphadot, effects)
+    over_ground = lambda: complex(*steps.states[0][-1][:2, :, 0].sum(1)) * np.exp(1j * steps.pose[2, 0])
     for _ in range(5):
         steps.next(False)
     before, change = over_ground(), np.array([[0.3], [-0.2], [0.4]])
@@ -461,6 +466,30 @@ def test_a_kicked_body_coasts():
     assert abs(kicked - before) > 0.3
     after = [steps.next(False) and over_ground() for _ in range(12)]
     assert np.abs(np.array(after) - kicked).max() < 0.01 * abs(kicked - before)
+
+
+@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
+def test_moments_of_a_heavy_body_move_its_elements(medium):
+    """Beside what the medium asks for, at a joint: the moment of d(momentum)/dt of all on the tail's side, by hand in the
+    body frame, with the differences in time of the march."""
+    body, inertia, N = Chain((1, 1.4, 0.8), frame="link-1"), 3.0, 32
+    alpha, alphadot = HEAVY.cycle(N)
+    found = march(medium, body, alpha, alphadot, effects=(heavy(inertia),), cycles=1, tolerance=1e-13, with_work=True)
+    medium_alone = work(medium, body, alpha, alphadot, found.xi).moment
+    motion, (x, y, turn) = body.motion(alpha.T, alphadot.T), found.xi.T
+    along, half, place, xi = motion.c + 1j * motion.s, motion.half, motion.place, x + 1j * y
+    velocity = (motion.v[0] + 1j * motion.v[1]) * along + xi + 1j * turn * place
+    spin = motion.v[2] / half + turn
+    p = 2 * half * velocity
+    L = (place.conj() * p).imag + 2 * half * half**2 / 3 * spin
+    rate = lambda q: (1.5 * q[:, 2:] - 2 * q[:, 1:-1] + 0.5 * q[:, :-2]) / (2 * np.pi / N)
+    force = inertia * (rate(p) + 1j * (turn * p)[:, 2:])
+    torque = inertia * (rate(L) + (xi.conj() * p).imag[:, 2:])
+    joints = (place + half * along)[:-1, 2:]
+    wanted = (joints.conj() * np.cumsum(force, 0)[:-1]).imag - np.cumsum(torque, 0)[:-1]
+    got = (found.work.moment - medium_alone)[2:].T
+    np.testing.assert_allclose(got, wanted, atol=1e-7 * np.abs(wanted).max())
+    assert np.abs(wanted).max() > 0.01
 
 
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])

@@ -9,6 +9,7 @@ from registry import DRY, MEDIA
 
 from geomech.gaits import Circle
 from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, march
+from rft.contact import Model
 from rft.media.base import TermLaw, require_drag
 from rft.newton import Balance
 
@@ -143,10 +144,10 @@ def test_media_that_drag_pass(name):
 
 def test_residuals_are_magnitudes():
     """Whatever the sign of the law: the solver below the check has no negative residual."""
-    solved = Balance(Law((1.0, -1.0, -3.0)), Chain(), "exact", 1e-6, 1e-10)
+    solved = Balance.of(Model.of(Law((1.0, -1.0, -3.0))), Chain(), 1e-6, 1e-10)
     alpha, alphadot = np.array([[0.4], [-0.7]]), np.array([[1.0], [0.2]])
     assert (solved.solve(Chain().motion(alpha, alphadot).take, np.ones(1), 1).residual >= 0).all()
-    assert solved.unit == 1.0
+    assert solved.model.unit == 1.0
 
 
 def test_a_law_without_axial_drag():

@@ -8,10 +8,10 @@ from test_balance import Mud
 from test_loads import CubicDrag
 
 from rft import Granular
-from rft.effects.base import Here, applied
-from rft.inertia import Mass
-from rft.loads import Known, element_load
-from rft.premise import Premise
+from rft.bodies.base import Motion
+from rft.contact import rows
+from rft.effects.base import Process, Site, folded
+from rft.loads import element_load
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -32,28 +32,26 @@ def assert_is_slope(load, v, rtol=2e-6):
 @pytest.mark.parametrize(("law", "how"), [r for r in RULES if r != ("no closed form", "exact")])
 def test_laws(law, how):
     rng = np.random.default_rng(2)
-    v, eps, speed = rng.normal(size=(3, 2, 30)), rng.uniform(0.05, 0.2, 30), rng.uniform(0.5, 3, 30)
+    v, eps = rng.normal(size=(3, 2, 30)), rng.uniform(0.05, 0.2, 30)
     load = element_load(LAWS[law], how)
-    assert_is_slope(lambda v: load(*v, eps, Known(speed)), v)
+    assert_is_slope(lambda v: load(*v, eps), v)
 
 
 def at_one_step(effects, body, medium, samples, rng):
-    """(load, body) of effects within a march whose ground, place and past are not those of its start."""
-    alpha, alphadot = rng.uniform(-1, 1, (2, body.joints, samples))
-    for effect in effects:
-        if effect.breaks & (Premise.MEMORYLESS | Premise.SE2_SYMMETRIC):
-            body = effect.body(body)
-    motion = body.motion(alpha, alphadot)
-    turn = np.exp(1j * rng.uniform(-0.5, 0.5, samples))
-    scale = rng.uniform(0.5, 2.0, samples)
-    here = Here(0.2, motion.place * turn, (motion.c + 1j * motion.s) * turn, motion, 0.4 * motion.v, scale)
-    memories = [e.start(len(motion.half), samples) for e in effects]
-    for step in (0.12j, -0.12j, 0.0):
-        there = here._replace(place=here.place + step)
-        memories = [e.after(m, there, rng.normal(size=motion.v.shape)) for e, m in zip(effects, memories)]
-    now = [e.at(m, here) for e, m in zip(effects, memories)]
-    load, body = applied(now, element_load(medium), medium, body)
-    return load, body, scale
+    """(model, motions) of effects within a march whose ground, place and past are not those of its start."""
+    model = folded([e for e in effects if not isinstance(e, Process)], medium, body)
+    processes = [e for e in effects if isinstance(e, Process)]
+    motions = model.motions(body.motion(*rng.uniform(-1, 1, (2, body.joints, samples))))
+    pose = np.stack([*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)])
+    site = Site(0.2, pose, motions, {name: 0.4 * m.v for name, m in motions.items()})
+    states = [p.begin(site) for p in processes]
+    for step in (0.12, -0.12, 0.0):
+        there = site._replace(pose=pose + np.array([0, step, 0])[:, None])
+        v = {name: rng.normal(size=m.v.shape) for name, m in motions.items()}
+        states = [p.after(state, there, v) for p, state in zip(processes, states)]
+    for process, state in zip(processes, states):
+        model = process.at(state, site).apply(model)
+    return model, motions
 
 
 @pytest.mark.parametrize("medium", [GLASS, Mud()], ids=["glass", "mud"])
@@ -65,29 +63,34 @@ def test_effects(name, medium):
         effects = [e for k, e in enumerate(effects) if type(e) not in {type(x) for x in effects[:k]}]
     if not isinstance(medium, Granular):
         effects = [e for e in effects if type(e).__name__ != "EndCaps"]
-    load, body, scale = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
-    n = len(body.motion(np.zeros((2, 1)), np.zeros((2, 1))).half)
+    model, motions = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
+    n = len(Motion.stacked(list(motions.values())).half)
     v, eps = rng.normal(size=(3, n, samples)), rng.uniform(0.05, 0.2, samples)
     v[0] = np.sign(v[0]) * (0.01 + np.abs(v[0]))  # skin friction steps where an element slides neither way
-    assert_is_slope(lambda v: load(*v, eps, Known(scale)), v)
-    # Samples in another order have their own memories, places and scales.
+    load = lambda v: model.load(v, rows(motions), eps)
+    assert_is_slope(load, v)
+    # Samples in another order have their own memories and places.
     other = rng.permutation(samples)[:7]
-    picked = load(*v[..., other], eps[other], Known(scale[other], other))
-    np.testing.assert_allclose(picked, load(*v, eps, Known(scale))[..., other], rtol=1e-13, atol=1e-13)
+    picked = model.take(other).load(v[..., other], rows(motions), eps[other])
+    np.testing.assert_allclose(picked, load(v)[..., other], rtol=1e-13, atol=1e-13)
+    twice = (
+        model.take(np.arange(samples)[::-1]).take(samples - 1 - other).load(v[..., other], rows(motions), eps[other])
+    )
+    np.testing.assert_array_equal(twice, picked)
 
 
-@pytest.mark.parametrize("linear", [False, True])
-def test_mass(linear):
-    rng, body, samples = np.random.default_rng(4), BODIES["uneven"], 12
-    mass = Mass(rng.uniform(0.5, 3.0, samples), 0.3)
-    scale = rng.uniform(0.5, 2.0, samples)
-    motion = body.motion(*rng.normal(size=(2, 2, samples)))
-    for _ in range(2):
-        mass.moved(motion, rng.normal(size=(3, samples)), scale, rng.normal(size=samples))
-    term = mass.term(motion, scale, 1.7, linear)
-    index = np.array([3, 0, 7, 11])
-    xi = rng.normal(size=(3, samples))[:, index]
-    assert_is_slope(lambda x: term(x[:, 0], index)[:, :, None], xi[:, None])
+@pytest.mark.parametrize("name", ["body-inertia", "body-inertia, frequency"])
+def test_mass(name):
+    """Its tangent; what its elements bear adds up to it; a few samples have their own."""
+    rng, samples = np.random.default_rng(4), 12
+    mass = EFFECTS[name][0](0.5).having(mass=rng.uniform(0.5, 3.0, samples))
+    model, motions = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
+    (term,), motion = model.terms, motions["side"]
+    index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
+    assert_is_slope(lambda x: term(x[:, 0])[:, :, None], xi[:, None])
+    np.testing.assert_allclose(term.take(index)(xi[:, index]), term(xi)[..., index], rtol=1e-14)
+    borne = term.on_elements(xi, motion, motion.v + motion.carried(xi))
+    np.testing.assert_allclose(borne.sum(1), term(xi)[:, 0], rtol=1e-12, atol=1e-13)
 
 
 def test_every_dry_law_is_homogeneous():
@@ -101,10 +104,12 @@ def test_every_dry_law_is_homogeneous():
         np.testing.assert_allclose(eps * change, -along, atol=1e-6 * np.abs(along).max(), err_msg=name)
 
 
-def test_a_load_alone_takes_velocities_as_they_are():
-    """Its speed is 1 and it has all samples, where a law has parts that know them."""
-    rng = np.random.default_rng(6)
+@pytest.mark.parametrize("how", ["exact", "gauss:5", "midpoint:4"])
+def test_loads_take_velocities_as_they_are(how):
+    """Of a yield stress with viscosity, doubled velocities leave the first as it is and double the second."""
+    rng, mud = np.random.default_rng(6), Mud()
     v, eps = rng.normal(size=(3, 2, 30)), np.full(30, 0.1)
-    load = element_load(Mud())
-    np.testing.assert_array_equal(load(*v, eps), load(*v, eps, Known(1.0, np.arange(30))))
-    assert np.abs(load(*v, eps, Known(2.0)) - load(*v, eps)).max() > 0.1
+    load = element_load(mud, how)
+    c_t, c_n = mud.viscous
+    viscous = np.array([c_t, c_n, c_n / 3])[:, None, None] * v
+    np.testing.assert_allclose(load(*(2 * v), 2 * eps)[:, 0] - load(*v, eps)[:, 0], viscous, rtol=1e-9, atol=1e-12)

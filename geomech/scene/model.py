@@ -28,6 +28,7 @@ from geomech.study import estimate
 from rft.balance import checked_body
 from rft.bodies.base import halves
 from rft.bodies.pieces import PIECES
+from rft.contact import Model
 from rft.effects.base import MOST_PIECES, pieced
 from rft.loads import element_load, parse
 from rft.media import is_linear
@@ -129,7 +130,7 @@ class Scene:
             if kinds.count(type(effect)) > 1:
                 raise SceneError(f"{self.name}: [[effects]] {effect.kind} is asked for twice: keep one")
             try:
-                effect.load(None, self.medium, self.body)
+                effect.apply(Model.of(self.medium))
             except ValueError as error:
                 raise SceneError(f"{self.name}: [[effects]] {error}: drop it, or change the medium") from None
 
@@ -198,7 +199,8 @@ class Scene:
         n = self.numerics
         speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
         if self.engine == "algebraic":
-            each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
+            samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
+            each = dataclasses.replace(self, effects=tuple(e.take(samples) for e in self.effects))
             solution = each.solve(alpha, alphadot).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
             return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
@@ -230,9 +232,9 @@ class Scene:
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
         body = pieced(self.body, self.effects, self.numerics.pieces)
-        for effect in self.effects:
-            body = effect.body(body)
-        return len(halves(body))
+        motion = body.motion(*np.zeros((2, body.joints, 1)))
+        model = rft.effects.folded(self.effects, self.medium, body)
+        return sum(len(m.half) for m in model.motions(motion).values())
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""

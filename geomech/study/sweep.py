@@ -21,7 +21,7 @@ from geomech.scene.model import Scene
 from geomech.scene.read import from_tables
 from geomech.study import estimate, kept
 from geomech.study.cost import Cost, direct, price
-from rft.effects import broken, together
+from rft.effects import broken, side_by_side
 
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
@@ -208,7 +208,7 @@ def beside(scenes: list[Scene], amplitudes=None) -> Scene:
     """One scene with the gaits and effects of several side by side, each for all amplitudes or its own one."""
     count = 1 if amplitudes is None else len(amplitudes)
     gaits = Beside(tuple(s.gait for s in scenes), amplitudes)
-    effects = tuple(together(same, [count] * len(scenes)) for same in zip(*(s.effects for s in scenes)))
+    effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.effects for s in scenes)))
     return dataclasses.replace(scenes[0], gait=gaits, effects=effects)
 
 

@@ -45,6 +45,27 @@ class Motion(NamedTuple):
         x, y = self.r_t * self.s + self.r_n * self.c, self.r_n * self.s - self.r_t * self.c
         return np.stack([(part * x).sum(0), (part * y).sum(0)])
 
+    def points(self, elements: list[int], ahead: np.ndarray, weight: np.ndarray) -> Motion:
+        """Of points (k,) that are fixed to some of the elements, so far ahead of their centres, (k, 1) each."""
+        at = np.array(elements)
+        v_t, v_n, spin = self.v[:, at]
+        v = np.stack([v_t, v_n + spin * ahead / self.half[at], np.zeros_like(v_t)])
+        return Motion(self.c[at], self.s[at], self.r_t[at], self.r_n[at] + ahead, np.zeros_like(ahead), weight, v)
+
+    @staticmethod
+    def stacked(motions: list[Motion]) -> Motion:
+        """The elements of several motions of the same samples, one after the other."""
+        if len(motions) == 1:
+            return motions[0]
+        *parts, v = zip(*motions)
+        return Motion(*(np.concatenate(x) for x in parts), np.concatenate(v, 1))
+
+    def wrenches(self, force: np.ndarray) -> np.ndarray:
+        """(3, n, B): force and moment on the frame of each element, from its averages; `total` is their sum."""
+        f_t, f_n, f_s = self.weight * force
+        c, s = self.c, self.s
+        return np.stack([c * f_t - s * f_n, s * f_t + c * f_n, self.r_t * f_t + self.r_n * f_n + self.half * f_s])
+
     def take(self, keep: np.ndarray) -> Motion:
         """The samples that ``keep`` (an index or mask over B) selects."""
         c, s, r_t, r_n, half, weight, v = self
@@ -114,15 +135,6 @@ class Wrapped:
 
 
 def halves(body: Body) -> np.ndarray:
-    """(n,): half lengths of a body's elements in body lengths, 0 for points, which come last."""
+    """(n,): half lengths of a body's elements in body lengths."""
     zero = np.zeros((body.joints, 1))
     return body.motion(zero, zero).half[:, 0]
-
-
-def stations(body: Body) -> np.ndarray:
-    """(n,): places of the elements' centres along the body, 0 at the tail, 1 at the head; points are its two ends."""
-    half = halves(body)
-    pieces = half > 0
-    s = np.cumsum(2 * half) - half
-    s[~pieces] = np.linspace(0, 1, np.count_nonzero(~pieces))
-    return s

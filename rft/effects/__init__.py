@@ -1,6 +1,6 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import ENGINES, Effect, applied, broken, engine, pieced, repeated, together
+from rft.effects.base import ENGINES, Effect, Process, Site, broken, engine, folded, pieced, side_by_side, under_way
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -21,12 +21,14 @@ __all__ = [
     "Effect",
     "EndCaps",
     "GrainInertia",
+    "Process",
+    "Site",
     "SkinFriction",
     "Transient",
-    "applied",
     "broken",
     "engine",
+    "folded",
     "pieced",
-    "repeated",
-    "together",
+    "side_by_side",
+    "under_way",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import operator
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ import numpy as np
 
 from rft.bodies.base import Body, Motion
 from rft.bodies.pieces import PIECES, cut
+from rft.contact import Model, PerSample
 from rft.media.base import in_range, require, shown
 from rft.premise import NONE, SHAPE_ALONE, Premise
 
@@ -25,31 +25,36 @@ ENGINES = {
 }
 
 
-class Here(NamedTuple):
-    """One step of a march, as an effect may ask for it; n elements by B samples, lengths in body lengths.
+class Site(NamedTuple):
+    """Where and when a step takes place, as a process may ask for it, in body lengths; B samples.
 
-    dt: phase since the step before, rad. place, along: (n, B) complex, centres and headings of the elements on the
-    ground, as foreseen. motion: of the elements while the frame is held. before: (3, n, B), their velocities (a, m, w) one
-    step earlier, body lengths per rad. scale: (B,), what the velocities of this step are divided by.
+    dt: phase since the step before, rad, 0 at the first. pose: (3, B), of the frame on the ground, as foreseen. motions: of
+    every contact's elements while the frame is held. before: (3, n, B), their velocities one step earlier.
     """
 
     dt: float
-    place: np.ndarray
-    along: np.ndarray
-    motion: Motion
-    before: np.ndarray
-    scale: np.ndarray
+    pose: np.ndarray
+    motions: dict[str, Motion]
+    before: dict[str, np.ndarray]
+
+    def place(self, name: str) -> np.ndarray:
+        """(n, B), complex: centres of a contact's elements on the ground."""
+        x, y, heading = self.pose
+        return x + 1j * y + np.exp(1j * heading) * self.motions[name].place
+
+    def along(self, name: str) -> np.ndarray:
+        """(n, B), complex: their headings on the ground."""
+        motion = self.motions[name]
+        return np.exp(1j * self.pose[2]) * (motion.c + 1j * motion.s)
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(PerSample):
     """Base of all effects. kind: its name in scenes and messages. breaks: premises it takes away; each takes an
-    engine, or a result, with it. An effect
-    changes the load of an element, the elements of the body, or both; as its parameter goes to ``limit`` the scene without
-    it comes back at ``order``.
+    engine, or a result, with it. An effect changes a `Model`, and effects commute; as its parameter goes to ``limit`` the
+    scene without it comes back at ``order``.
 
-    rank: effects act in this order, whatever the scene's. batched: parameters that may be arrays (B,), one for each
-    sample of a batch. inertia: mass of the body x length x (rad/s of phase)^2 over its axial drag. settles: change of
+    batched: parameters that may be arrays (B,), one for each sample of a batch. settles: change of
     displacement from cycle to cycle, body lengths, below which a march with this effect has settled. held: numbers that a
     march remembers for each sample, beside some for each element. varies: along an element, of which it takes means:
     longer elements are cut into pieces (`pieced`).
@@ -60,41 +65,64 @@ class Effect:
     limit = ""
     order = 1
     cost = ""
-    rank = 0
     batched = ()
-    inertia = 0.0
     settles = 1e-6
     held = 0
     varies = False
 
-    def load(self, load, medium, body: Body):
-        """The load law (`rft.loads`) of the body's elements with this effect; the same one by default."""
-        return load
+    def apply(self, model: Model) -> Model:
+        """The model with what always holds of this effect; ValueError for a medium it does not take."""
+        return model
 
     def assumes(self, medium) -> str:
         """What the effect takes for granted because neither it nor the medium says; nothing by default."""
         return ""
 
-    def body(self, body: Body) -> Body:
-        """The body with this effect; the same one by default."""
-        return body
 
-    def start(self, elements: int, samples: int):
-        """What the effect remembers before a march; nothing by default."""
+@dataclass(frozen=True)
+class Process(Effect):
+    """An effect with a past, or a place on the body or on the ground: what holds of it differs from site to site."""
+
+    def begin(self, site: Site):
+        """What is remembered before the first step; nothing by default."""
         return None
 
-    def at(self, memory, here: Here) -> Effect:
-        """The effect at one step of a march, its memory known; the same one by default."""
-        return self
+    def at(self, state, site: Site):
+        """What holds at one step: something with `apply`, as an effect has."""
+        raise NotImplementedError
 
-    def after(self, memory, here: Here, v: np.ndarray):
-        """What is remembered after a step that ended with element velocities v (3, n, B), body lengths per rad."""
-        return memory
+    def after(self, state, site: Site, v: dict[str, np.ndarray]):
+        """What is remembered after a step that ended with velocities v (3, n, B) of every contact's elements."""
+        return state
+
+    def kicked(self, state, site: Site, xi, change):
+        """What is remembered as if the body had moved faster by ``change`` than with xi, (3, B) each, after the last steps,
+        of which that at ``site`` was the last; the ground does not notice."""
+        return state
 
 
-def together(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
-    """One effect with the parameters of several of its kind, each for ``count`` samples of a batch, side by side.
-    ValueError if they differ in a parameter that cannot differ within a batch."""
+def folded(effects: Sequence[Effect], medium, body: Body, rule: str = "exact") -> Model:
+    """The model of a body in a medium, with all that effects do wherever and whenever it is."""
+    model = Model.of(medium, rule)
+    for effect in effects:
+        model = effect.apply(model)
+    still = [e for e in effects if isinstance(e, Process) and not e.breaks & SHAPE_ALONE]
+    if still:
+        zero = np.zeros((body.joints, 1))
+        site = Site(0.0, np.zeros((3, 1)), model.motions(body.motion(zero, zero)), {})
+        for process in still:
+            model = process.at(process.begin(site), site).apply(model)
+    return model
+
+
+def under_way(effects: Sequence[Effect]) -> list[Process]:
+    """The processes that differ from step to step of a march."""
+    return [e for e in effects if isinstance(e, Process) and e.breaks & SHAPE_ALONE]
+
+
+def side_by_side(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
+    """One effect with the parameters of several of its kind, each for ``count`` samples of a batch. ValueError if they differ
+    in a parameter that cannot differ within a batch."""
     first = effects[0]
     joined = {}
     for field in fields(first):
@@ -103,23 +131,7 @@ def together(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
             if field.name not in first.batched:
                 raise ValueError(f"{first.kind}: {field.name} cannot differ within a batch")
             joined[field.name] = np.repeat(np.array(values, float), counts)
-    return _with(first, joined)
-
-
-def repeated(effects: Sequence[Effect], times: int) -> list[Effect]:
-    """Effects for a batch in which each sample is ``times`` samples, one after the other."""
-    arrays = [{f.name: getattr(e, f.name) for f in fields(e) if np.ndim(getattr(e, f.name))} for e in effects]
-    return [_with(e, {k: np.repeat(x, times) for k, x in a.items() if k in e.batched}) for e, a in zip(effects, arrays)]
-
-
-def _with(effect: Effect, values: dict) -> Effect:
-    """The effect with some parameters set to arrays; its own checks are for single numbers, and were made."""
-    if not values:
-        return effect
-    changed = copy.copy(effect)
-    for name, value in values.items():
-        object.__setattr__(changed, name, value)
-    return changed
+    return first.having(**joined)
 
 
 def broken(effects: Sequence[Effect]) -> Premise:
@@ -141,10 +153,3 @@ def pieced(body: Body, effects: Sequence[Effect], pieces: int = PIECES) -> Body:
     """The body as finely cut as its effects need. ValueError for no number of pieces."""
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
     return cut(body, pieces) if any(e.varies for e in effects) else body
-
-
-def applied(effects: Sequence[Effect], load, medium, body: Body):
-    """(load, body) with the effects on, in the order of their rank."""
-    for effect in sorted(effects, key=lambda e: e.rank):
-        load, body = effect.load(load, medium, body), effect.body(body)
-    return load, body

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Body, stations
-from rft.effects.base import Effect, Here
-from rft.loads import ALONE
+from rft.contact import Model, PerSample
+from rft.effects.base import Process, Site
 from rft.media.base import check_ranges, real_array, require, shown
 from rft.premise import NONE, Premise
 
 
 @dataclass(frozen=True)
-class DepthProfile(Effect):
+class DepthProfile(Process):
     """Drag times |z| over the depth that the medium's drag is for: 2 k rho g r |z| of Eq. 2, its other factors the same.
 
     along: |z| over that depth at equally spaced places from tail to head, linear between them; (1, 1) is level. slope:
@@ -30,7 +29,6 @@ class DepthProfile(Effect):
     kind = "depth-profile"
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
-    rank = 4
     batched = ("slope", "towards")
     angles = ("towards",)
     varies = True
@@ -48,41 +46,41 @@ class DepthProfile(Effect):
     def breaks(self) -> Premise:
         return Premise.SE2_SYMMETRIC if np.any(self.slope) else NONE
 
-    def load(self, load, medium, body: Body):
-        depth = _depths(self.along, body)
-        return _scaled(load, lambda known: depth)
+    def at(self, state, site: Site) -> Deep:
+        return Deep(self, site)
 
-    def at(self, memory, here: Here) -> Effect:
+    def depths(self, stations: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """(n, B), relative, at stations along the body (n,) that are at complex places (n, B) on the ground."""
+        level = np.interp(stations, np.linspace(0, 1, len(self.along)), self.along)[:, None]
         if not self.breaks:
-            return self
-        reach = here.motion.half * here.along
-        place = np.concatenate([here.place, here.place[:1] - reach[:1], here.place[-1:] + reach[-1:]])  # and both ends
-        return _There(self.along, self.slope * (place * np.exp(-1j * self.towards)).real)
-
-
-@dataclass(frozen=True, eq=False)
-class _There(Effect):
-    """The effect at one place: added (n + 2, B), relative depth that the ground adds at the elements and both ends."""
-
-    along: tuple[float, ...]
-    added: np.ndarray
-    rank = DepthProfile.rank
-
-    def load(self, load, medium, body: Body):
-        depth = _depths(self.along, body)
-        depth = depth + self.added[: len(depth)]  # the ends count where they have caps
+            return level
+        depth = level + self.slope * (place * np.exp(-1j * self.towards)).real
         if not (depth > 0).all():
             raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
-        return _scaled(load, lambda known: known.of(depth))
+        return depth
 
 
-def _depths(along, body: Body) -> np.ndarray:
-    """(n, 1): depth of the elements' centres on a level ground."""
-    return np.interp(stations(body), np.linspace(0, 1, len(along)), along)[:, None]
+@dataclass(frozen=True)
+class Deep:
+    """A depth profile at one site: it acts on all that is buried."""
+
+    profile: DepthProfile
+    site: Site
+
+    def apply(self, model: Model) -> Model:
+        for name, contact in model.contacts.items():
+            if contact.buried:
+                stations = contact.places(self.site.motions[name])
+                depth = self.profile.depths(stations, self.site.place(name))
+                model = model.changed(name, factors=(Multiplied(depth),))
+        return model
 
 
-def _scaled(load, depth):
-    def law(a, m, w, eps, known=ALONE):
-        return load(a, m, w, eps, known) * depth(known)
+@dataclass(frozen=True)
+class Multiplied(PerSample):
+    """Drag times a number of each element and sample, (n, B)."""
 
-    return law
+    by: np.ndarray
+
+    def __call__(self, v_t, v_n, spin):
+        return self.by, self.by

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.effects.base import Effect, Here
-from rft.effects.sides import weakened
+from rft.contact import SIDE, Model, PerSample
+from rft.effects.base import Process, Site
 from rft.media.base import check_ranges
 from rft.premise import Premise
 
@@ -17,7 +17,7 @@ AHEAD = 2.0  # radii from the body's axis at which the ground it will meet is lo
 
 
 @dataclass(frozen=True)
-class DisturbedGround(Effect):
+class DisturbedGround(Process):
     """Drag across times 1 - weakening x disturbance of the ground on the side an element moves to.
 
     The body leaves a track of half width ``radius`` (body lengths), fully disturbed up to half a radius from its axis,
@@ -34,7 +34,6 @@ class DisturbedGround(Effect):
     breaks = Premise.MEMORYLESS
     limit = "weakening = 0"
     cost = "a map of the ground, two look-ups and some thirty marks an element and step"
-    rank = 1
     batched = ("weakening",)
     varies = True
     settles = 1e-3  # the map has cells, and no two cycles meet them alike
@@ -46,41 +45,37 @@ class DisturbedGround(Effect):
     def held(self) -> int:
         return 2 * _cells(self.radius / CELLS) ** 2
 
-    def start(self, elements: int, samples: int) -> Ground:
-        return Ground(self.radius / CELLS, samples)
+    def begin(self, site: Site) -> Ground:
+        return Ground(self.radius / CELLS, site.pose.shape[1])
 
-    def at(self, memory: Ground, here: Here) -> Effect:
-        side = 1j * AHEAD * self.radius * here.along
-        left, right = (self._drag(memory, here, offset) for offset in (side, -side))
-        return _Now(left, right)
+    def at(self, state: Ground, site: Site) -> Weakened:
+        points, side = self._points(site), 1j * AHEAD * self.radius * site.along(SIDE)
+        found = [state.at(points + offset).mean(0) for offset in (side, -side)]  # averaged over each element
+        return Weakened(1 - self.weakening * np.stack(found))
 
-    def _drag(self, memory: Ground, here: Here, offset: np.ndarray) -> np.ndarray:
-        """(n, B): what is left of the drag across, the disturbance being averaged over each element."""
-        found = memory.at(_points(here, self.radius) + offset)
-        return 1 - self.weakening * found.mean(0)
+    def after(self, state: Ground, site: Site, v) -> Ground:
+        if site.dt > 0:  # a march starts on untouched ground
+            state.mark(self._points(site), self.radius)
+        return state
 
-    def after(self, memory: Ground, here: Here, v: np.ndarray) -> Ground:
-        memory.mark(_points(here, self.radius), self.radius)
-        return memory
-
-
-def _points(here: Here, radius: float) -> np.ndarray:
-    """(k, n, B): points along every element, at most half a radius apart."""
-    half = here.motion.half[: len(here.place)]
-    k = int(np.ceil(4 * half.max() / radius))
-    return here.place + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * half * here.along
+    def _points(self, site: Site) -> np.ndarray:
+        """(k, n, B): points along every element, at most half a radius apart."""
+        half = site.motions[SIDE].half
+        k = int(np.ceil(4 * half.max() / self.radius))
+        return site.place(SIDE) + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * half * site.along(SIDE)
 
 
-@dataclass(frozen=True, eq=False)
-class _Now(Effect):
-    """The effect at one step: what is left of the drag to the left and right, (n, B) each."""
+@dataclass(frozen=True)
+class Weakened(PerSample):
+    """What is left of the drag across at one step, to the left and to the right, (2, n, B)."""
 
     left: np.ndarray
-    right: np.ndarray
-    rank = DisturbedGround.rank
 
-    def load(self, load, medium, body):
-        return weakened(load, lambda m, w, known: (np.stack([known.of(self.left), known.of(self.right)]), None, None))
+    def apply(self, model: Model) -> Model:
+        return model.changed(SIDE, shares=(self,))
+
+    def __call__(self, v_n, spin):
+        return self.left, None, None
 
 
 def _cells(cell: float) -> int:

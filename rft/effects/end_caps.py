@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion, Wrapped
+from rft.bodies.base import Motion
+from rft.contact import Contact, Model, PerSample
 from rft.effects.base import Effect
-from rft.loads import ALONE
 from rft.media.base import TermLaw, check_ranges, require
 from rft.media.granular import Granular
 
@@ -30,6 +30,17 @@ class _CapLaw(TermLaw):
 
 
 @dataclass(frozen=True)
+class _Caps(PerSample):
+    """The caps' law as a contact takes it."""
+
+    medium: Granular
+    rate_independent = True
+
+    def __call__(self, v_t, v_n, spin, eps):
+        return _CapLaw(self.medium).at(v_t, v_n, eps)
+
+
+@dataclass(frozen=True)
 class EndCaps(Effect):
     """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)), lateral e pi r^2 C_F sin psi.
 
@@ -45,44 +56,23 @@ class EndCaps(Effect):
     kind = "end-caps"
     limit = "radius = 0"
     cost = "one point load an end"
-    rank = 3
 
     def __post_init__(self):
         check_ranges(self, radius=(0, 1), head=(0, 100), tail=(0, 100))
 
-    def load(self, load, medium, body):
+    def apply(self, model: Model) -> Model:
+        medium = model.medium
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
-        cap = _CapLaw(medium)
+        return model.touching("ends", Contact(_Caps(medium), self.ends, (0.0, 1.0)))
 
-        def with_caps(a, m, w, eps, known=ALONE):
-            return np.concatenate([load(a[:-2], m[:-2], w[:-2], eps, known), cap.at(a[-2:], m[-2:], eps)], 2)
-
-        return with_caps
+    def ends(self, motion: Motion) -> Motion:
+        """Two points, at the tail and at the head of a body whose `Motion` is given."""
+        # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
+        weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
+        return motion.points([0, -1], motion.half[[0, -1]] * [[-1.0], [1.0]], weight)
 
     def traction(self, medium: Granular, v_t, v_n, eps=0.0):
         """(along, across) force of both ends together at velocity (v_t, v_n), in units of the body's axial drag."""
         across, along = _CapLaw(medium).traction(v_n, v_t, eps)
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * along, factor * across
-
-    def body(self, body: Body) -> Body:
-        # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
-        factor = math.pi * self.radius / 2
-        return _Capped(body, np.array([[self.tail * factor], [self.head * factor]]))
-
-
-@dataclass(frozen=True, eq=False)
-class _Capped(Wrapped):
-    """A body with two points more, at its tail and its head."""
-
-    weight: np.ndarray
-
-    def motion(self, alpha, alphadot) -> Motion:
-        m = self.inner.motion(alpha, alphadot)
-        ends, sign = [0, -1], np.array([[-1.0], [1.0]])
-        points = m.c[ends], m.s[ends], m.r_t[ends], m.r_n[ends] + sign * m.half[ends]
-        a, across, w = m.v[:, ends]
-        v = np.stack([a, across + sign * w, np.zeros_like(a)])
-        joined = (np.concatenate(x) for x in zip((m.c, m.s, m.r_t, m.r_n), points))
-        half, weight = np.concatenate([m.half, np.zeros((2, 1))]), np.concatenate([m.weight, self.weight])
-        return Motion(*joined, half, weight, np.concatenate([m.v, v], 1))

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import halves
+from rft.contact import SIDE, Model, PerSample
 from rft.effects.base import Effect
-from rft.loads import ALONE
 from rft.media.base import check_ranges, require
 from rft.media.catalogue import GRAVITY
 from rft.premise import Premise
@@ -38,7 +37,6 @@ class GrainInertia(Effect):
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1
     cost = "a dozen operations an element"
-    rank = 5  # the flux of grains does not know the ground's pressure
     batched = ("frequency", "length", "depth", "strength", "k")
 
     def __post_init__(self):
@@ -52,28 +50,33 @@ class GrainInertia(Effect):
     def assumes(self, medium) -> str:
         return f"k = {ASSUMED_K:g}, that of loose glass" if self._known_k(medium) is None else ""
 
-    def load(self, load, medium, body):
+    def apply(self, model: Model) -> Model:
+        medium = model.medium
         require(medium.dry != (), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         k = self._known_k(medium)
         beta = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
-
-        pieces = slice(np.count_nonzero(halves(body)))  # an end cap sweeps up grains that its neighbour has counted
-
-        def with_inertia(a, m, w, eps, known=ALONE):
-            out = load(a, m, w, eps, known)
-            scale = known.of(beta) * np.square(known.speed)
-            out[1:, :, pieces] += scale * squared_speed_load(m[pieces], w[pieces])
-            return out
-
-        return with_inertia
+        return model.changed(SIDE, additions=(Flux(beta),))  # of the grains, which does not know the ground's pressure
 
 
-def squared_speed_load(m: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """(2, 4, ...): <|u| u>, <s |u| u> over u = m + w s and their derivatives with respect to (a, m, w), exactly.
+@dataclass(frozen=True)
+class Flux(PerSample):
+    """Drag beta |v_n| v_n across the body's sides; beta: a number or (B,)."""
+
+    beta: np.ndarray | float
+
+    def __call__(self, v_t, v_n, spin, eps):
+        out = np.zeros((3, 4, *v_n.shape))
+        np.multiply(self.beta, squared_speed_load(v_n, spin), out=out[1:])
+        return out
+
+
+def squared_speed_load(v_n: np.ndarray, spin: np.ndarray) -> np.ndarray:
+    """(2, 4, ...): <|u| u>, <s |u| u> over u = v_n + s spin and their derivatives with respect to (v_t, v_n, spin), exactly.
 
     The parts on either side of the pivot s0, where u changes sign, are polynomials in s.
     """
+    m, w = v_n, spin
     inside = np.abs(w) > np.abs(m)
     pivot = np.where(inside, -m / np.where(inside, w, 1.0), -1.0)
     beyond = np.sign(np.where(inside, w, m))  # sign of u for s > s0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.contact import SIDE, Model
 from rft.effects.base import Effect
-from rft.loads import ALONE
 from rft.media.base import check_ranges
 
 
@@ -33,12 +33,8 @@ class SkinFriction(Effect):
     def __post_init__(self):
         check_ranges(self, forward=(1e-3, 100), backward=(1e-3, 100), reference=(1e-3, 100))
 
-    def load(self, load, medium, body):
-        ahead, astern = self.forward / self.reference, self.backward / self.reference
+    def apply(self, model: Model) -> Model:
+        return model.changed(SIDE, factors=(self,))
 
-        def scaled(a, m, w, eps, known=ALONE):
-            out = load(a, m, w, eps, known)
-            out[0] *= np.where(a >= 0, known.of(ahead), known.of(astern))
-            return out
-
-        return scaled
+    def __call__(self, v_t, v_n, spin):
+        return np.where(v_t >= 0, self.forward / self.reference, self.backward / self.reference), None

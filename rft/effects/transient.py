@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.effects.base import Effect, Here
-from rft.effects.sides import parts, weakened
+from rft.contact import SIDE, Model, PerSample
+from rft.effects.base import Process, Site
 from rft.media.base import check_ranges
 from rft.premise import Premise
+from rft.sides import parts
 
 SHORTEST = 1e-6  # body lengths: a travel of an element at rest, which creeps at the regularisation
 SIGN = np.array([1.0, -1.0])[:, None, None]  # of motion to the left, for the shares to the left and to the right
@@ -17,7 +18,7 @@ DEVELOPED = 3.0  # e-foldings: 95 % of the steady drag is there after the travel
 
 
 @dataclass(frozen=True)
-class Transient(Effect):
+class Transient(Process):
     """Each element remembers how far the ground's response to motion to its left and to its right has developed, 0 to 1.
 
     Travel x one way brings that side's share h nearer to 1, dh/dx = 3 (1 - h) / travel, and takes the other side's away,
@@ -35,48 +36,45 @@ class Transient(Effect):
     breaks = Premise.MEMORYLESS
     limit = "travel = 0"
     cost = "two shares an element, one link integral more where its pivot lies inside"
-    rank = 2  # outside disturbed ground: its memory is that of whole elements
     batched = ("travel",)
     varies = True
 
     def __post_init__(self):
         check_ranges(self, travel=(0, 10))
 
-    def start(self, elements: int, samples: int) -> np.ndarray:
+    def begin(self, site: Site) -> np.ndarray:
         """(2, n, B): shares to the left and right; a march starts where the ground resists fully either way."""
-        return np.ones((2, elements, samples))
+        return np.ones((2, *site.motions[SIDE].c.shape))
 
-    def at(self, memory: np.ndarray, here: Here) -> Effect:
-        return _Now(self.travel, memory, here.before[1], here.dt, here.scale)
+    def at(self, state: np.ndarray, site: Site) -> Developed:
+        return Developed(state, site.before[SIDE][1], site.dt, _rate(self.travel))
 
-    def after(self, memory: np.ndarray, here: Here, v: np.ndarray) -> np.ndarray:
-        velocity, left, _ = parts(v[1], v[2])
-        ends = [_developed(memory, SIGN * here.before[1], SIGN * u, here.dt, _rate(self.travel))[0] for u in velocity]
+    def after(self, state: np.ndarray, site: Site, v) -> np.ndarray:
+        velocity, left, _ = parts(*v[SIDE][1:])
+        ends = [
+            _developed(state, SIGN * site.before[SIDE][1], SIGN * u, site.dt, _rate(self.travel))[0] for u in velocity
+        ]
         return left * ends[0] + (1 - left) * ends[1]
 
 
-@dataclass(frozen=True, eq=False)
-class _Now(Effect):
-    """The effect at one step, with memory (2, n, B), normal velocities before (n, B) and the scale (B,) of those now."""
+@dataclass(frozen=True)
+class Developed(PerSample):
+    """The shares at one step: those before (2, n, B), velocities across before (n, B), the step and e-foldings to a body
+    length."""
 
-    travel: float
-    memory: np.ndarray
+    shares: np.ndarray
     before: np.ndarray
     dt: float
-    scale: np.ndarray
-    rank = Transient.rank
+    rate: np.ndarray
 
-    def load(self, load, medium, body):
-        def shares(m, w, known):
-            scale, rate = known.of(self.scale), known.of(_rate(self.travel))
-            velocity, _, inside = parts(scale * m, w * scale)
-            before = SIGN * known.of(self.before)
-            values, slopes = _developed(known.of(self.memory), before, SIGN * velocity, self.dt, rate)
-            slopes = SIGN * scale * slopes
-            by_w = np.where(inside, 0.5 * np.sign(w), 0.0) * slopes * SIGN
-            return values, np.where(inside, 0.5, 1.0) * slopes, by_w
+    def apply(self, model: Model) -> Model:
+        return model.changed(SIDE, shares=(self,))
 
-        return weakened(load, shares)
+    def __call__(self, v_n, spin):
+        velocity, _, inside = parts(v_n, spin)
+        values, slopes = _developed(self.shares, SIGN * self.before, SIGN * velocity, self.dt, self.rate)
+        slopes = SIGN * slopes
+        return values, np.where(inside, 0.5, 1.0) * slopes, np.where(inside, 0.5 * np.sign(spin), 0.0) * SIGN * slopes
 
 
 def _rate(travel):

@@ -51,11 +51,11 @@ class TermLaw:
         for q, k_t, k_n in self.dry:
             R2 = (q * v_t) ** 2 + v_n**2 + eps**2
             inverse = 1.0 / np.sqrt(np.where(R2 == 0.0, np.inf, R2))
-            cube = inverse**3
-            tt = tt + k_t * (v_n**2 + eps**2) * cube
-            tn = tn - k_t * v_t * v_n * cube
-            nt = nt - k_n * q * q * v_t * v_n * cube
-            nn = nn + k_n * ((q * v_t) ** 2 + eps**2) * cube
+            e_t, e_n, e = v_t * inverse, v_n * inverse, eps * inverse
+            tt = tt + k_t * (e_n**2 + e**2) * inverse
+            tn = tn - k_t * e_t * e_n * inverse
+            nt = nt - k_n * q * q * e_t * e_n * inverse
+            nn = nn + k_n * ((q * e_t) ** 2 + e**2) * inverse
         return tuple(np.broadcast_arrays(x, v_t * v_n)[0] for x in (tt, tn)), tuple(
             np.broadcast_arrays(x, v_t * v_n)[0] for x in (nt, nn)
         )
