@@ -2,7 +2,16 @@
 
 from rft.balance import Solution, body_velocity
 from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
-from rft.effects import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
+from rft.effects import (
+    BodyInertia,
+    DepthProfile,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    SkinFriction,
+    TowedSled,
+    Transient,
+)
 from rft.march import March, march
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
 from rft.work import Work, work
@@ -28,6 +37,7 @@ __all__ = [
     "Serpenoid",
     "SkinFriction",
     "Solution",
+    "TowedSled",
     "Transient",
     "Viscous",
     "Work",

@@ -16,6 +16,7 @@ from rft import (
     Granular,
     Serpenoid,
     SkinFriction,
+    TowedSled,
     Transient,
     Viscous,
 )
@@ -57,6 +58,7 @@ GAITS = {
 EFFECTS = {
     "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1),
     "end-caps": (lambda x: EndCaps(radius=0.1 * x, tail=4.0), 1),
+    "towed-sled": (lambda x: TowedSled(pull=x, distance=0.3), 1),
     "depth-profile": (lambda x: DepthProfile(along=(1, 1 + x)), 1),
     "depth-profile, slope": (lambda x: DepthProfile(slope=x, towards=1.0), 1),
     "grain-inertia": (lambda x: GrainInertia(frequency=x, length=0.7, depth=0.07, strength=1.5), 2),

@@ -17,6 +17,7 @@ from rft import (
     DisturbedGround,
     EndCaps,
     SkinFriction,
+    TowedSled,
     Transient,
     Viscous,
     body_velocity,
@@ -310,3 +311,57 @@ def test_drift_counts_all_of_a_cycle():
     changed = np.abs(two.displacement - one.displacement).max()
     assert changed > 1e-4
     assert two.drift == pytest.approx(2 * changed, rel=1e-6)
+
+
+@pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
+def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
+    """Every force on the ground, from headings and places by hand and velocities by differences, and the sled's against the
+    way it goes: they and their moments add up to nothing, and the joints put in what friction takes."""
+    lengths, sled = (1.0, 1.4, 0.8), TowedSled(pull=0.7, distance=0.3)
+    body = Chain(lengths, length=0.4, frame=frame)
+    alpha, alphadot, h = np.array([0.9, -0.4]), np.array([0.8, 0.5]), 1e-6
+    xi = body_velocity(GLASS, body, alpha, alphadot, effects=(sled,)).checked().xi
+    plain = body_velocity(GLASS, body, alpha, alphadot).xi
+    assert np.abs(xi - plain).max() > 0.02
+    share = np.array(lengths) / sum(lengths)
+
+    def places(t):
+        """The sled, then many points of every link, body lengths, and headings, with the frame moving along xi."""
+        moved = alpha + t * alphadot
+        heading = np.concatenate([[0], np.cumsum(moved)])
+        joints = np.concatenate([[0], np.cumsum(share * np.exp(1j * heading))])
+        s = (np.arange(4000) + 0.5) / 4000
+        links = joints[:-1, None] + s * share[:, None] * np.exp(1j * heading)[:, None]
+        counts = share if frame == "mean" else np.arange(1, 4) == int(frame[-1])
+        origin, turn = (counts * (joints[1:] + joints[:-1]) / 2).sum(), (counts * heading).sum()
+        onto = np.exp(1j * (t * xi[2] - turn))
+        at = lambda z: (z - origin) * onto + t * (xi[0] + 1j * xi[1]) / body.length
+        return at(np.array(-sled.distance)), at(links), np.exp(1j * heading) * onto
+
+    (ahead, links_ahead, _), (before, links_before, _), (place, links, along) = places(h), places(-h), places(0.0)
+    v, u = (ahead - before) / (2 * h), (links_ahead - links_before) / (2 * h) / along[:, None]
+    f_t, f_n = GLASS.traction(u.real, u.imag)
+    force = (f_t + 1j * f_n) * along[:, None] * share[:, None] / 4000
+    pull = sled.pull * v / abs(v)
+    assert abs(force.sum() + pull) < 2e-4
+    assert abs((links.conj() * force).imag.sum() + (place.conj() * pull).imag) < 2e-4
+    done = work(GLASS, body, alpha, alphadot, xi, effects=(sled,))
+    assert done.moment @ alphadot * body.length == pytest.approx(done.power, rel=1e-6)
+    assert done.power / body.length == pytest.approx(
+        (force.conj() * (u * along[:, None])).real.sum() + sled.pull * abs(v), rel=1e-4
+    )
+
+
+def test_a_sled_far_heavier_than_the_drag_stays_where_it_is():
+    sled, rng = TowedSled(pull=1000.0), np.random.default_rng(8)
+    body = Chain((1, 1.4, 0.8), frame="link-1")
+    alpha, alphadot = rng.uniform(-1, 1, (10, 2)), rng.normal(size=(10, 2))
+    x, y, turn = body_velocity(GLASS, body, alpha, alphadot, effects=(sled,)).checked().xi.T
+    tail = -0.5 / 3.2
+    assert np.abs([x, y + tail * turn]).max() < 1e-5
+    assert np.abs(turn).min() > 0.01
+
+
+def test_a_sled_takes_no_viscous_medium():
+    with pytest.raises(ValueError, match="a towed sled takes a medium without viscous drag, got Viscous"):
+        body_velocity(Viscous(2.0), Chain(), [0.1, 0.2], [1.0, 0.0], effects=(TowedSled(pull=0.1),))

@@ -468,8 +468,10 @@ def test_a_kicked_body_coasts():
     assert np.abs(np.array(after) - kicked).max() < 0.01 * abs(kicked - before)
 
 
-@pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
-def test_moments_of_a_heavy_body_move_its_elements(medium):
+@pytest.mark.parametrize(
+    ("medium", "off"), [(GLASS, 1e-3), (Viscous(2.0), 1e-7)]
+)  # work rounds kinks as at its own speed
+def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     """Beside what the medium asks for, at a joint: the moment of d(momentum)/dt of all on the tail's side, by hand in the
     body frame, with the differences in time of the march."""
     body, inertia, N = Chain((1, 1.4, 0.8), frame="link-1"), 3.0, 32
@@ -488,7 +490,7 @@ def test_moments_of_a_heavy_body_move_its_elements(medium):
     joints = (place + half * along)[:-1, 2:]
     wanted = (joints.conj() * np.cumsum(force, 0)[:-1]).imag - np.cumsum(torque, 0)[:-1]
     got = (found.work.moment - medium_alone)[2:].T
-    np.testing.assert_allclose(got, wanted, atol=1e-7 * np.abs(wanted).max())
+    np.testing.assert_allclose(got, wanted, atol=off * np.abs(wanted).max())
     assert np.abs(wanted).max() > 0.01
 
 

@@ -7,9 +7,10 @@ from rft.effects.disturbed import DisturbedGround
 from rft.effects.end_caps import EndCaps
 from rft.effects.grain_inertia import GrainInertia
 from rft.effects.skin import SkinFriction
+from rft.effects.towed import TowedSled
 from rft.effects.transient import Transient
 
-ALL = (SkinFriction, EndCaps, DepthProfile, GrainInertia, BodyInertia, Transient, DisturbedGround)
+ALL = (SkinFriction, EndCaps, TowedSled, DepthProfile, GrainInertia, BodyInertia, Transient, DisturbedGround)
 KINDS = {effect.kind: effect for effect in ALL}
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Process",
     "Site",
     "SkinFriction",
+    "TowedSled",
     "Transient",
     "broken",
     "engine",
