@@ -89,12 +89,12 @@ def exact(medium: Medium) -> LoadLaw:
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
     def load(a, m, w, eps):
-        out = np.zeros((3, 4, *a.shape))
+        if not terms:
+            out = np.zeros((3, 4, *a.shape))
+        else:
+            out = _dry(Ends.of(q2 * (a * a) + eps * eps, m, w), a, q2 * a, k_t, k_n)
         if any(medium.viscous):
             _add_viscous(out, medium.viscous, a, m, w)
-        if terms:
-            ends = Ends.of(q2 * (a * a) + eps * eps, m, w)
-            _add_dry(out, ends, a, q2 * a, k_t, k_n)
         return out
 
     return load
@@ -107,31 +107,44 @@ def _add_viscous(out, coefficients, a, m, w) -> None:
         out[i, i + 1] += c
 
 
-def _add_dry(out, e: Ends, a, qa, k_t, k_n) -> None:
-    """Add sum over terms of f_t = k_t a / R, f_n = k_n u / R; ``e`` and ``qa`` = q^2 a have the terms on axis 0."""
+def _dry(e: Ends, a, qa, k_t, k_n) -> np.ndarray:
+    """Sum over terms of f_t = k_t a / R, f_n = k_n u / R; ``e`` and ``qa`` = q^2 a have the terms on axis 0."""
+    out = np.empty((3, 4, *a.shape))
     two_S = 2.0 / e.S
-    inverse = two_S * (1.0 + e.t * e.t * e.k)  # <1/R>
+    mt = e.mu * e.t
     p = 1.0 / (e.c_mu + e.mu * e.mu * e.c_t + TINY)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
     cmp = e.c_mu * p
     four_S2 = two_S * two_S
     per_c_t = four_S2 / (e.c_t + TINY)
     d_m = -four_S2 * e.mu * p  # d<1/R>/dm = -<u/R^3>
     d_w = per_c_t * e.t * (e.h - cmp)  # d<1/R>/dw = -<s u/R^3>
-    if first := k_t.size:
+    first = k_t.size
+    rows = np.empty((first, 4, *a.shape))
+    if first:
+        inverse = two_S[:first] * (1.0 + e.t[:first] * e.t[:first] * e.k[:first])  # <1/R>
         d_a = -qa[:first] * per_c_t[:first] * two_S[:first] * p[:first]  # -q^2 a <1/R^3>
-        d_t = inverse[:first] + a * d_a
-        rows = np.stack([a * inverse[:first], d_t, a * d_m[:first], a * d_w[:first]], 1)
-        out[0] += _weighed(k_t, rows)
-    normal = two_S * cmp
-    cross = -e.mu * e.t * normal
-    across = [e.mu, qa * d_m, normal, cross]
-    turning = [0.5 * e.c_mu * e.t * e.h, qa * d_w, cross, two_S * e.c_mu * (p - e.h)]
-    out[1:] += _weighed(k_n, np.stack(across + turning, 1)).reshape(2, 4, *a.shape)
+        np.multiply(a, inverse, out=rows[:, 0])
+        np.add(inverse, a * d_a, out=rows[:, 1])
+        np.multiply(a, d_m[:first], out=rows[:, 2])
+        np.multiply(a, d_w[:first], out=rows[:, 3])
+    _weigh(k_t, rows, out[0])
+    rows = np.empty((k_n.size, 2, 4, *a.shape))
+    across, turning = rows[:, 0], rows[:, 1]
+    across[:, 0] = e.mu
+    np.multiply(qa, d_m, out=across[:, 1])
+    np.multiply(two_S, cmp, out=across[:, 2])
+    np.multiply(-mt, across[:, 2], out=across[:, 3])
+    np.multiply(0.5 * e.c_mu * e.t, e.h, out=turning[:, 0])
+    np.multiply(qa, d_w, out=turning[:, 1])
+    turning[:, 2] = across[:, 3]
+    np.multiply(two_S * e.c_mu, p - e.h, out=turning[:, 3])
+    _weigh(k_n, rows, out[1:])
+    return out
 
 
-def _weighed(k: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Sum over the terms on axis 0 of k times rows."""
-    return (k @ rows.reshape(k.size, -1)).reshape(rows.shape[1:])
+def _weigh(k: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+    """To ``out``: the sum over the terms on axis 0 of k times rows."""
+    np.matmul(k, rows.reshape(k.size, -1) if k.size else np.zeros((0, out.size)), out=out.reshape(-1))
 
 
 def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:

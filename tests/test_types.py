@@ -28,7 +28,7 @@ PARTS = {
     "Granular": Granular(1.8, 0.24), "Viscous": Viscous(), "Chain": Chain(), "Backbone": rft.Backbone(8),
     "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
-    "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1),
+    "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
     "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Scene": Scene(Coulomb(), Chain(), Circle()),
     "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
 }  # fmt: skip

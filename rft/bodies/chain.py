@@ -63,7 +63,7 @@ class Chain:
     def _of_frame(self, x: np.ndarray, frame: str) -> np.ndarray:
         """The frame's own value from per-link values (n, ...): its link's, or the length-weighted mean."""
         link = self._link_of(frame)
-        return x[link] if link is not None else np.tensordot(self.fractions, x, 1)
+        return x[link] if link is not None else self.fractions @ x
 
     def _links(self, alpha, alphadot):
         """Headings (n, B), their rates, and complex places and velocities of the link centres in the body frame."""

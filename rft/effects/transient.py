@@ -51,10 +51,10 @@ class Transient(Process):
 
     def after(self, state: np.ndarray, site: Site, v) -> np.ndarray:
         velocity, left, _ = parts(*v[SIDE][1:])
-        ends = [
-            _developed(state, SIGN * site.before[SIDE][1], SIGN * u, site.dt, _rate(self.travel))[0] for u in velocity
-        ]
-        return left * ends[0] + (1 - left) * ends[1]
+        step = SIGN * site.before[SIDE][1], SIGN * velocity, site.dt, _rate(self.travel)
+        own = _developed(state, *step)[0]  # to the left in the part that moves left, to the right in the other
+        others = 1 - _developed(1 - state[::-1], *step)[0]  # what one side loses another gains in the same way
+        return np.stack([left * own[0] + (1 - left) * others[1], left * others[0] + (1 - left) * own[1]])
 
 
 @dataclass(frozen=True)
@@ -82,21 +82,16 @@ def _rate(travel):
 
 
 def _developed(share, before, now, dt: float, rate):
-    """A share after a step in which the velocity towards its side went evenly from ``before`` to ``now``, and its
-    derivative with respect to ``now``: order 2 in dt. The right's share is that of velocities to the right."""
-    same = before * now >= 0
-    total = np.abs(before) + np.abs(now)
+    """A share after a step in which the velocity towards its side went evenly from ``before`` to ``now`` >= 0, and its
+    derivative with respect to ``now``: order 2 in dt. Where it went the other way before, the share first decays."""
+    forth = before >= 0
+    total = np.abs(before) + now
     total = np.where(total == 0, 1.0, total)
-    old, new = np.abs(before) / total, np.abs(now) / total
-    # Travel first the old way and then, past a reversal, the new way; and its growth with |now|.
-    travels = dt / 2 * total * np.array([np.where(same, old + new, old**2), np.where(same, 0.0, new**2)])
+    old, new = np.abs(before) / total, now / total
+    back, on = np.where(forth, 0.0, old**2), np.where(forth, old + new, new**2)  # travels, over dt / 2 x total
+    growth = np.where(forth, 1.0, new**2 + 2 * old * new)  # of the way on, with ``now``; that back shrinks by old^2
     at_once = np.isinf(rate)
-    rate = np.where(at_once, 0.0, rate)
-    growths = dt / 2 * np.array([np.where(same, 1.0, -(old**2)), np.where(same, 0.0, new**2 + 2 * old * new)])
-    ways = np.where(same, before + now > 0, before > 0), now > 0
-    slope = np.zeros_like(share)
-    for way, travel, growth in zip(ways, travels, growths):
-        left = np.exp(-rate * travel)
-        share = way + (share - way) * left
-        slope = slope * left + (way - share) * rate * growth * np.sign(now)
-    return np.where(at_once, 1.0, share), slope
+    step = np.where(at_once, 0.0, rate) * dt / 2
+    kept, lacking = share * np.exp(-step * total * back), np.exp(-step * total * on)
+    slope = step * lacking * (growth * (1 - kept) + back * kept)
+    return np.where(at_once, 1.0, 1 - (1 - kept) * lacking), slope
