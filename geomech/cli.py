@@ -17,7 +17,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.errors import SceneError, choose
+from geomech.errors import SceneError, choose, named
 from geomech.files import refuse_inputs, whole_file, whole_folder
 
 app = typer.Typer(
@@ -57,12 +57,13 @@ def run(
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech.output import report
     from geomech.scene import inputs, load
+    from geomech.study.bench import Study
 
     scene = load(name)
     report.refuse_folder(scene, out, inputs(scene))
     with whole_folder(out, inputs(scene)) as folder, progress(f"field of {scene.name}") as bar:
         allow(scene, report.cost(scene), yes)
-        tables = report.write(scene, folder, bar)
+        tables = report.write(Study(scene), folder, bar)
     for title, table in tables.items():
         print(report.text_table(title, table, scene))
     print(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir() if not p.name.startswith('.')))}")
@@ -79,15 +80,15 @@ def velocity(
     from geomech.scene import load
 
     scene = load(name)
-    solution = scene.solve(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
-    out = {"xi": solution.xi.tolist(), "status": str(solution.status), "residual": float(solution.residual)}
-    if out["status"] == "unconverged":
-        raise SceneError(f"{scene.name}: the force balance did not converge: raise [numerics] regularisation")
+    with named(scene.name):
+        out = scene.system.single(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
     if as_json:
-        print(json.dumps(out))
-    else:
-        print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{scene.unit}, {scene.unit}, rad per unit time")
-        print(f"{out['status']}, residual {out['residual']:.1e}, {int(solution.iterations)} iterations")
+        print(json.dumps({k: v for k, v in out.items() if k != "iterations"}))
+        return
+    unit = scene.system.unit
+    print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{unit}, {unit}, rad per unit time")
+    steps = f", {out['iterations']} iterations" if "iterations" in out else ""
+    print(f"{out['status']}, residual {out['residual']:.1e}{steps}")
 
 
 @app.command()
@@ -104,10 +105,10 @@ def connection(
     from geomech.output.netcdf import save_connection
 
     _is_netcdf(out)
-    scene = _field_scene(name, grid, extent, out, plot, plot is not None, yes)
-    save_connection(out, scene)
+    study = _field(name, grid, extent, out, plot, plot is not None, yes)
+    save_connection(out, study)
     if plot:
-        plots.save(plots.connection_figure(scene.fitted, scene.unit), plot)
+        plots.save(plots.connection_figure(study.fitted, study.scene.system.unit), plot)
 
 
 @app.command()
@@ -121,8 +122,9 @@ def ccf(
     """The CCF map with the scene's gait drawn on it."""
     from geomech.output import plots
 
-    scene = _field_scene(name, grid, extent, plot, plot, True, yes)
-    plots.save(plots.ccf_figure(scene.curvature, [scene.gait], scene.unit, scene.curvature_error), plot)
+    study = _field(name, grid, extent, plot, plot, True, yes)
+    gait, unit = study.scene.gait, study.scene.system.unit
+    plots.save(plots.ccf_figure(study.curvature, [gait], unit, study.curvature_error), plot)
 
 
 @app.command()
@@ -139,9 +141,9 @@ def displacement(
 ):
     """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
     from geomech.output import plots, report
-    from geomech.scene import METHODS
     from geomech.study import cost
-    from geomech.study.estimate import cheapest
+    from geomech.study.bench import METHODS, Study
+    from geomech.study.choose import cheapest
 
     values = _sweep("--amplitudes", amplitudes)
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
@@ -149,8 +151,9 @@ def displacement(
     _check_outputs(scene, None, plot)
     with progress(f"displacement of {scene.name}") as bar:
         if tol is None:
-            allow(scene, scene.cost(values, chosen or scene.methods), yes)
-            table = scene.study(values, chosen or scene.methods, progress=bar)
+            study = Study(scene)
+            allow(scene, study.cost(values, chosen or study.methods), yes)
+            table = study.study(values, chosen or study.methods, progress=bar)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
         else:
@@ -158,7 +161,7 @@ def displacement(
             table = cheapest(scene, values, tol, ask=ask)
     if plot:
         fig, axes = plots.figure(3.6, 3.4)
-        plots.displacement(table, scene.unit, axes[0, 0], gait=scene.gait, marker="o")
+        plots.displacement(table, scene.system.unit, axes[0, 0], gait=scene.gait, marker="o")
         plots.save(fig, plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))
 
@@ -221,7 +224,7 @@ def sweep(
         plots.save(sweeping.draw(scene, results), plot)
     partial.unlink(missing_ok=True)
     net = plots.net(results["displacement"])
-    print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.unit}, in {out}")
+    print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.system.unit}, in {out}")
 
 
 @app.command()
@@ -275,21 +278,23 @@ def _loaded(name: str, grid: int | None, extent: float | None):
     return load(name).with_numerics(grid=grid, extent=extent)
 
 
-def _field_scene(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
-    """The scene with its field computed, once its outputs are known to be writable. maps: they show shape space."""
+def _field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
+    """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space."""
+    from geomech.study.bench import Study
     from geomech.study.cost import built, price
+    from geomech.tiers import TIERS
 
     scene = _loaded(name, grid, extent)
-    scene.require_connection()
-    if maps and scene.body.joints != 2:
-        raise SceneError(
-            f"{scene.name}: maps of shape space take a body of two joints, this one has {scene.body.joints}"
-        )
-    _check_outputs(scene, output, plot)
-    allow(scene, price([built(scene, "path")]), yes)
+    study, joints = Study(scene), scene.system.joints
+    with named(scene.name):
+        TIERS["path"].refuse(scene.system)
+        if maps and joints != 2:
+            raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {joints}")
+        _check_outputs(scene, output, plot)
+        allow(scene, price([built(scene, "path")]), yes)
     with progress(f"field of {scene.name}") as bar:
-        scene.compute_field(bar)
-    return scene
+        study.compute_field(bar)
+    return study
 
 
 def _is_netcdf(path: Path) -> None:

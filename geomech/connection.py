@@ -23,7 +23,8 @@ SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
 class Connection:
     """A on a grid. A: (3, d, N_1, ..., N_d), xi = + A alphadot, in the velocity's units and frame.
     residual: (3, N_1, ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1;
-    speed: (3, N_1, ..., N_d), rms of xi itself. degree: of the interpolating spline."""
+    speed: (3, N_1, ..., N_d), rms of xi itself. degree: of the interpolating spline. All are nan at grid points that are
+    singular, or have a neighbour beyond singular shapes."""
 
     axes: tuple[np.ndarray, ...]
     A: np.ndarray
@@ -44,15 +45,15 @@ class Connection:
         return np.einsum("...ij,...j->...i", self(alpha), np.asarray(alphadot, float))
 
 
-def evaluate(velocity: Velocity, alpha, alphadot) -> np.ndarray:
-    """velocity(alpha, alphadot), or ValueError if that is not finite and of shape (..., 3)."""
+def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
+    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), or not finite unless ``masked``."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
     if not callable(velocity):
         raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
     xi = np.asarray(velocity(alpha, alphadot))
     if xi.shape != shape:
         raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
-    if not np.isfinite(xi).all():
+    if not masked and not np.isfinite(xi).all():
         where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
         raise ValueError(f"velocity is not finite at alpha = {where}")
     return xi
@@ -96,6 +97,7 @@ def sampled(
     degree: int = 3,
     progress: Callable | None = None,
     mirror: bool = False,
+    singularity: Callable | None = None,
 ) -> list[np.ndarray]:
     """What ``keep`` keeps of the velocity at every shape of a grid for the directions ``unit`` (C, d) of alphadot: keep takes
     xi (s, C, 3) at some shapes and gives arrays (..., s), here (..., N_1, ..., N_d). Velocities themselves are not kept:
@@ -110,7 +112,7 @@ def sampled(
     fields: list[np.ndarray] = []
     for k in range(0, todo, step):
         here = slice(k, min(k + step, todo))
-        xi = evaluate(velocity, alpha[here], unit)
+        xi = evaluate(velocity, alpha[here], unit, masked=singularity is not None)
         kept = keep(xi)
         fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in kept]
         _put(fields, here, kept)
@@ -120,7 +122,23 @@ def sampled(
             _put(fields, there, keep([-1.0, 1.0, 1.0] * xi[:twins][::-1]))
         if progress:
             progress(here.stop / todo)
-    return [x.reshape(*x.shape[:-1], *map(len, axes)) for x in fields]
+    fields = [x.reshape(*x.shape[:-1], *map(len, axes)) for x in fields]
+    if singularity is not None:
+        mask = crossed(singularity(alpha[:, 0]).reshape(*map(len, axes)))
+        fields = [np.where(mask, np.nan, x) for x in fields]
+    return fields
+
+
+def crossed(d: np.ndarray) -> np.ndarray:
+    """Mask (N_1, ..., N_d) of the grid points at which d is 0 or of another sign than at a neighbour along an axis."""
+    mask = d == 0
+    for axis in range(d.ndim):
+        low, high = (np.moveaxis(mask, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+        ordered = np.moveaxis(d, axis, 0)
+        other = ordered[:-1] * ordered[1:] < 0
+        low |= other
+        high |= other
+    return mask
 
 
 def _put(fields: list[np.ndarray], where: slice, values) -> None:
@@ -129,12 +147,20 @@ def _put(fields: list[np.ndarray], where: slice, values) -> None:
 
 
 def fit(
-    velocity: Velocity, axes, count: int = 8, degree: int = 3, progress: Callable | None = None, mirror: bool = False
+    velocity: Velocity,
+    axes,
+    count: int = 8,
+    degree: int = 3,
+    progress: Callable | None = None,
+    mirror: bool = False,
+    *,
+    singularity: Callable | None = None,
 ) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
     progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that
-    xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half.
+    xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half. singularity: a
+    function of shapes (..., d) that passes through 0 where the velocity does not exist; there the connection is nan.
     Raises what ``velocity`` raises.
     """
     axes = tuple(np.asarray(a, float) for a in axes)
@@ -146,4 +172,4 @@ def fit(
         residual = np.sqrt(((xi - np.einsum("ijs,cj->sci", A, unit)) ** 2).mean(1)).T
         return A, residual, np.sqrt((xi**2).mean(1)).T
 
-    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror), degree)
+    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, singularity), degree)

@@ -48,16 +48,35 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     from scipy.ndimage import maximum_filter
 
     whole = ccf(connection, i, j)
+    if whole.masked:
+        return _at_halves(connection, whole, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)
     halves = (np.moveaxis(ccf(_half(connection, first), i, j)(shapes), -1, 0) for first in (0, 1))
     apart = np.maximum(*(np.abs(half - whole.values) for half in halves))
     return Field(connection.axes, maximum_filter(apart, (1, *(3,) * len(connection.axes))), connection.degree)
 
 
+def _at_halves(connection: Connection, whole: Field, i: int, j: int) -> Field:
+    """`error` where there are singular shapes: the halves, of which nothing is looked up, count at their own points."""
+    from scipy.ndimage import maximum_filter
+
+    apart = np.zeros(whole.values.shape)
+    for first in (0, 1):
+        picks = (..., *np.ix_(*(_every_second(axis, first) for axis in connection.axes)))
+        off = np.abs(ccf(_half(connection, first), i, j).values - whole.values[picks])
+        apart[picks] = np.fmax(apart[picks], off)
+    worst = maximum_filter(apart, (1, *(3,) * len(connection.axes)))
+    return Field(connection.axes, np.where(np.isnan(whole.values), np.nan, worst), connection.degree)
+
+
+def _every_second(axis: np.ndarray, first: int) -> np.ndarray:
+    return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
+
+
 def _half(connection: Connection, first: int) -> Connection:
     """The connection on every second point of each axis from ``first``, and on both ends; of a lower degree where that
     leaves too few points for the spline."""
-    picks = [np.unique([0, *range(first, len(axis), 2), len(axis) - 1]) for axis in connection.axes]
+    picks = [_every_second(axis, first) for axis in connection.axes]
     A, residual, speed = (x[(..., *np.ix_(*picks))] for x in (connection.A, connection.residual, connection.speed))
     axes = tuple(axis[pick] for axis, pick in zip(connection.axes, picks))
     return Connection(axes, A, residual, speed, min(connection.degree, min(map(len, picks)) - 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import numbers
@@ -14,6 +15,17 @@ class SceneError(ValueError):
     def __init__(self, text: str):
         text = " ".join(text.split())
         super().__init__(text if len(text) <= 400 else text[:300] + " ... " + text[-80:])
+
+
+@contextlib.contextmanager
+def named(place: str):
+    """Say of what is wrong that it is so in this scene, unless it says so itself."""
+    try:
+        yield
+    except ValueError as error:
+        if str(error).startswith(f"{place}: "):
+            raise
+        raise SceneError(f"{place}: {error}") from None
 
 
 def choose(place: str, word: object, known: Iterable[str]) -> str:

@@ -12,7 +12,8 @@ from geomech.errors import real_array
 
 @dataclass(frozen=True)
 class Field:
-    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending.
+    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
+    components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
 
     degree: of the spline through them; interpolation is of order degree + 1 in the spacing where the function is
     smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection.
@@ -42,19 +43,48 @@ class Field:
 
     def derivative(self, axis: int) -> np.ndarray:
         """d values / d alpha_axis on the grid, of the spline."""
+        if self.masked:
+            return self._between_masks(axis)
         return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
+
+    @property
+    def masked(self) -> bool:
+        """Whether some grid points are."""
+        return bool(np.isnan(self.values).any())
+
+    def _between_masks(self, axis: int) -> np.ndarray:
+        """`derivative`, of a spline through each run of points without a mask; nan for a run of one."""
+        from scipy.interpolate import make_interp_spline
+
+        x, out = self.axes[axis], np.full(self.values.shape, np.nan)
+        rows, slopes = (np.moveaxis(a, axis - self.joints, -1) for a in (self.values, out))
+        lead = rows.ndim - self.joints
+        for place in np.ndindex(rows.shape[lead:-1]):
+            row, slope = rows[(slice(None),) * lead + place], slopes[(slice(None),) * lead + place]
+            good = np.flatnonzero(np.isfinite(row).all(tuple(range(lead))))
+            for run in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1):
+                if len(run) > 1:
+                    degree = min(self.degree, len(run) - 1)
+                    slope[..., run] = make_interp_spline(x[run], row[..., run], degree, axis=-1).derivative()(x[run])
+        return out
 
     @cached_property
     def spline(self):
+        self._refuse_masks()
         return _tensor_spline(self)
 
     def antiderivative(self, axis: int):
         """The spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
+        self._refuse_masks()
         return _tensor_spline(self, integrate=axis)
 
     def __call__(self, alpha) -> np.ndarray:
         """Values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the grid."""
         return self.spline(self.inside(alpha))
+
+    def _refuse_masks(self) -> None:
+        if self.masked:
+            raise ValueError("a field with singular shapes is not looked up between its points: use the direct tier")
 
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""

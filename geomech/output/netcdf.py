@@ -8,22 +8,27 @@ import numpy as np
 
 from geomech.files import whole_file
 from geomech.scene.model import Scene
+from geomech.scene.write import toml
+from geomech.study.bench import Study
 
 COMPONENTS = ("x", "y", "theta")
 
 
-def save_connection(path: str | Path, scene: Scene) -> None:
+def save_connection(path: str | Path, study: Study) -> None:
     """Write A (component, joint, alpha_1, ...), its fit residual and, for two joints, the CCF and its estimated error,
     with units, conventions (`about`) and the scene's text. The file appears whole or not at all."""
     from scipy.io import netcdf_file
 
-    fitted, unit = scene.fitted, "body length" if scene.unit == "BL" else "m"
+    scene, fitted = study.scene, study.fitted
+    unit = "body length" if scene.system.unit == "BL" else "m"
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
         file.title = attribute(f"Local connection and curvature constraint function of the scene {scene.name}")
         for key, value in about(scene).items():
             setattr(file, key, value)
-        file.scene = attribute(scene.text or repr(scene))
-        file.numerics = repr(scene.numerics)
+        file.scene = attribute(toml(scene))
+        file.numerics = (
+            repr(scene.numerics) if scene.system.solver is None else f"{scene.numerics}, {scene.system.solver}"
+        )
         _coordinates(file, fitted)
         angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))
         units = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
@@ -33,26 +38,24 @@ def save_connection(path: str | Path, scene: Scene) -> None:
         if len(angles) == 2:
             units = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
             name = "curvature constraint function of joints 1 and 2"
-            _variable(file, "ccf", scene.curvature.values, ("component", *angles), units, name)
+            _variable(file, "ccf", study.curvature.values, ("component", *angles), units, name)
             name = (
                 "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
             )
-            _variable(file, "ccf_error", scene.curvature_error.values, ("component", *angles), units, name)
+            _variable(file, "ccf_error", study.curvature_error.values, ("component", *angles), units, name)
 
 
 def about(scene: Scene) -> dict:
     """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
-    body, numerics = scene.body, scene.numerics
+    system = scene.system
     mean = "centre of mass, length-weighted mean heading"
     return {
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
-        "frame": body.frame,
-        "frame_meaning": f"body frame: {mean if body.frame == 'mean' else 'centre and heading of that link, 1 the tail'}",
-        "body_length": float(body.length),
-        "length_unit": "body length" if scene.unit == "BL" else "m",
-        "loads": numerics.loads,
-        "regularisation": float(numerics.regularisation),
-        "regularisation_unit": "body length rad-1",
+        "frame": scene.frame,
+        "frame_meaning": f"body frame: {mean if scene.frame == 'mean' else 'centre and heading of that link, 1 the tail'}",
+        "body_length": float(system.length),
+        "length_unit": "body length" if system.unit == "BL" else "m",
+        **system.about(),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

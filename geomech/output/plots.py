@@ -13,6 +13,7 @@ from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.files import whole_file
 from geomech.gaits import Gait
+from geomech.tiers import TIERS
 
 STYLE = {
     "font.size": 9,
@@ -29,21 +30,6 @@ STYLE = {
 }
 COMPONENTS = ("x", "y", r"\theta")
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
-METHOD_STYLE = {  # colours of Okabe and Ito, told apart by the colour-blind and in print by their dashes
-    "area": {"color": "#D55E00", "linestyle": "--"},
-    "adapted": {"color": "#CC79A7", "linestyle": (0, (5, 1))},
-    "path": {"color": "#0072B2", "linestyle": "-."},
-    "harmonic": {"color": "#009E73", "linestyle": ":"},
-    "direct": {"color": "0.72", "linestyle": "-", "linewidth": 4.0, "zorder": 1},  # the others lie on it, or do not
-}
-METHOD_COLOUR = {method: "black" if method == "direct" else style["color"] for method, style in METHOD_STYLE.items()}
-METHOD_LABEL = {
-    "area": "area integral of the CCF",
-    "adapted": "area integral, adapted CCF",
-    "path": "path integral of A",
-    "harmonic": "path integral, odd harmonics",
-    "direct": "force balance",
-}
 
 
 def styled(draw):
@@ -162,12 +148,12 @@ def draw_gait(gait: Gait, ax, color: str = "black"):
 
 @styled
 def displacement(table: Mapping, unit: str = "BL", ax=None, label: str = "", gait: Gait | None = None, **style):
-    """Net displacement per cycle (`net`) against amplitude, a line a tier; ``table`` as `Scene.study` gives it."""
+    """Net displacement per cycle (`net`) against amplitude, a line a tier; ``table`` as `Study.study` gives it."""
     ax = _axes(ax)
-    for method in METHOD_STYLE:
-        if method in table:
-            name = f"{label}, {METHOD_LABEL[method]}" if label else METHOD_LABEL[method]
-            ax.plot(table["amplitude"], net(table[method]), label=name, **{**METHOD_STYLE[method], **style})
+    for name, tier in TIERS.items():
+        if name in table:
+            title = f"{label}, {tier.label}" if label else tier.label
+            ax.plot(table["amplitude"], net(table[name]), label=title, **{**tier.style, **style})
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
     ax.set(xlabel=gait.amplitude_label if gait else "amplitude", ylabel=f"displacement per cycle ({unit})")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
@@ -209,7 +195,7 @@ def work_precision(results: Mapping, axes=None):
     for ax, against in zip(axes, ("truth", "limit")):
         lines = [line for line in results["lines"] if line["against"] == against]
         for line, marker in zip(lines, KNOB_MARKER):
-            style = {"color": METHOD_COLOUR[line["tier"]], "linestyle": "-", "linewidth": 1.0}
+            style = {"color": TIERS[line["tier"]].colour, "linestyle": "-", "linewidth": 1.0}
             if against == "limit":
                 style["color"] = f"C{KNOB_MARKER.index(marker)}"
             order = "" if line["slope"] is None else f", order {line['slope']:.1f}"

@@ -11,15 +11,16 @@ from pathlib import Path
 
 import msgspec
 
-import rft
-from geomech.errors import SceneError, choose, short
+from geomech.errors import SceneError, choose, named, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Numerics, Scene
-from rft.bodies import KINDS as BODIES
-from rft.effects import KINDS as EFFECTS
-from rft.media import LAWS
+from geomech.systems import KINDS as SYSTEMS
+from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
+TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
+PHYSICAL = ("length", "frequency", "mass", "radius")  # sizes that a body and its effects share
+NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 LARGEST = 10_000_000  # bytes of a scene file
 
 
@@ -75,27 +76,100 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
-    tables = dict(tables)
     for table in tables:
-        choose(f"{name}: table", table, ("medium", "body", "gait", "numerics", "effects"))
-    for table in ("medium", "body", "gait"):
+        choose(f"{name}: table", table, TABLES)
+    for table in ("gait",) if "system" in tables else ("medium", "body", "gait"):
         if table not in tables:
             raise SceneError(f"{name}: the table [{table}] is missing: add it, see 'geomech scenes --show NAME'")
-    effects = tables.pop("effects", [])
+    for table, value in tables.items():
+        if table not in ("effects", "frame") and not isinstance(value, dict):
+            raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
+    kind, parts = _system(tables, name)
+    own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
+    numerics = tables.get("numerics", {})
+    for key in numerics:
+        choose(f"{name}: [numerics] key", key, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
+    if own:
+        solver = {k: v for k, v in numerics.items() if k in own}
+        parts["solver"] = _build(f"{name}: [numerics]", solver, type(kind.solver))
+    with named(name):
+        return Scene(
+            system=kind(**parts),
+            gait=_of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS),
+            numerics=_build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics),
+            name=name,
+            text=text,
+        )
+
+
+def _system(tables: Mapping, name: str) -> tuple[type, dict]:
+    """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
+    they may also be in its own table."""
+    table = dict(tables.get("system", {"kind": "swimmer"}))
+    kind = SYSTEMS[_kind(f"{name}: [system]", table, "kind", SYSTEMS)]
+    del table["kind"]
+    sizes = _Sizes(name, tables.get("physical", {}), tables.get("frame"))
+    if kind is not Swimmer:
+        if strangers := sorted({"medium", "body", "effects"} & {*tables}):
+            raise SceneError(f"{name}: a {kind.kind} takes no {strangers[0]!r}: drop it, or the table [system]")
+        place = f"{name}: [system]"
+        parts = _fields(_build(place, sizes.fill(place, table, kind), kind))
+    else:
+        parts = _swimmer({**{k: tables[k] for k in PARTS if k in tables}, **table}, name, sizes)
+    sizes.all_used()
+    return kind, parts
+
+
+def _fields(thing) -> dict:
+    return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
+
+
+def _swimmer(parts: dict, name: str, sizes: _Sizes) -> dict:
+    """The fields of a swimmer but for the solver."""
+    for part in parts:
+        choose(f"{name}: [system] key", part, PARTS)
+    effects = parts.get("effects", [])
     if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
         raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
-    for table, value in tables.items():
-        if not isinstance(value, dict):
-            raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
-    return Scene(
-        medium=_medium(f"{name}: [medium]", tables["medium"]),
-        body=_of_kind(f"{name}: [body]", tables["body"], "kind", BODIES),
-        gait=_of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS),
-        numerics=_build(f"{name}: [numerics]", tables.get("numerics", {}), Numerics),
-        effects=tuple(_of_kind(f"{name}: [[effects]]", e, "kind", EFFECTS) for e in effects),
-        name=name,
-        text=text,
-    )
+    for part in ("medium", "body"):
+        if not isinstance(parts.get(part), dict):
+            raise SceneError(f"{name}: the table [{part}] is missing: add it, see 'geomech scenes --show NAME'")
+    made = {"medium": _medium(f"{name}: [medium]", parts["medium"])}
+    made["body"] = _of_kind(f"{name}: [body]", parts["body"], *PARTS["body"], sizes.fill)
+    places = [(f"{name}: [[effects]]", e) for e in effects]
+    made["effects"] = tuple(_of_kind(place, e, *PARTS["effects"], sizes.fill) for place, e in places)
+    return made
+
+
+class _Sizes:
+    """What stands once for the whole scene: [physical], and the frame."""
+
+    def __init__(self, name: str, physical: dict, frame):
+        for key in physical:
+            choose(f"{name}: [physical] key", key, PHYSICAL)
+        self.name, self.given, self.unused = name, dict(physical), {*physical}
+        if frame is not None:
+            self.given["frame"] = frame
+            self.unused.add("frame")
+
+    def fill(self, place: str, table: dict, kind: type) -> dict:
+        """The table with the sizes that its class has; SceneError if it says otherwise itself."""
+        names = [f.name for f in dataclasses.fields(kind)]
+        for key, value in self.given.items():
+            if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
+                continue
+            self.unused.discard(key)
+            if table.get(key, value) != value:
+                where = "the scene's frame" if key == "frame" else f"[physical] {key}"
+                raise SceneError(f"{place} {key} = {table[key]!r}, but {where} = {value!r}: keep one")
+            table = {**table, key: value}
+        return table
+
+    def all_used(self) -> None:
+        if self.unused:
+            key = sorted(self.unused)[0]
+            place = "" if key == "frame" else "[physical] "
+            raise SceneError(f"{self.name}: {place}{key}: nothing in this scene has one: drop it, or add what has")
 
 
 def _located(table: dict, name: str) -> dict:
@@ -104,21 +178,25 @@ def _located(table: dict, name: str) -> dict:
     return {**table, "file": str(Path(name).absolute().parent / file)} if isinstance(file, str) else table
 
 
-def _medium(place: str, table: dict) -> rft.Medium:
+def _medium(place: str, table: dict):
     if "name" not in table:
-        return _of_kind(place, table, "law", LAWS)
+        return _of_kind(place, table, *PARTS["medium"])
     if extra := sorted(set(table) - {"name"}):
         raise SceneError(
             f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'"
         )
-    return rft.CATALOGUE[choose(f"{place} name", table["name"], rft.CATALOGUE)].medium
+    return MEDIA[choose(f"{place} name", table["name"], MEDIA)]
 
 
-def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type]):
+def _kind(place: str, table: dict, key: str, kinds: Mapping[str, type]) -> str:
     if key not in table:
         raise SceneError(f"{place} has no {key!r}: add {key} = one of {', '.join(kinds)}")
-    kind = kinds[choose(f"{place} {key}", table[key], kinds)]
-    return _build(place, {k: v for k, v in table.items() if k != key}, kind)
+    return choose(f"{place} {key}", table[key], kinds)
+
+
+def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type], fill=lambda place, table, kind: table):
+    kind = kinds[_kind(place, table, key, kinds)]
+    return _build(place, fill(place, {k: v for k, v in table.items() if k != key}, kind), kind)
 
 
 def _build(place: str, table: dict, kind: type):

@@ -17,7 +17,9 @@ import numpy as np
 from geomech.scene.model import Scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
+from geomech.study.bench import Study
 from geomech.study.cost import Cost
+from geomech.study.offer import tiers
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)
@@ -50,9 +52,11 @@ class Knob:
         return scene.with_numerics(**{self.setting: f"{self.rule}:{value}" if self.rule else value})
 
     def applies(self, scene: Scene) -> bool:
-        if scene.linear and (self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")):
+        if scene.system.linear and (
+            self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")
+        ):
             return False
-        return self.tier in scene.tiers and (self.setting != "pieces" or scene.pieces > 0)
+        return self.tier in tiers(scene.system) and (self.setting != "pieces" or scene.system.cut > 0)
 
 
 KNOBS = (
@@ -83,9 +87,9 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
 
     runs: each setting is timed so often, and the quickest counts; a march once, it is long enough for that to tell."""
     amplitudes = scene.gait.amplitude * FRACTIONS
-    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.medium.dry is not None else scene
-    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.pieces else finest
-    truth = finest.with_numerics(phases=_truth_phases(scene)).displacement("direct", None, amplitudes)
+    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
+    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
+    truth = Study(finest.with_numerics(phases=_truth_phases(scene))).displacement("direct", None, amplitudes)
     knobs, lines = _knobs(scene), []
     for done, knob in enumerate(knobs):
         lines.append(_sweep(scene, knob, amplitudes, truth, _runs(scene, runs)))
@@ -116,24 +120,24 @@ def _jobs(knob: Knob, scene: Scene) -> list[foretold.Job]:
 
 
 def _truth_phases(scene: Scene) -> int:
-    return TRUTH_PHASES if scene.engine == "algebraic" else TRUTH_STEPS
+    return TRUTH_STEPS if scene.system.steps else TRUTH_PHASES
 
 
 def _knobs(scene: Scene) -> list[Knob]:
-    return [k for k in KNOBS if k.applies(scene) and not (k.rule and scene.medium.dry is None)]
+    return [k for k in KNOBS if k.applies(scene) and not (k.rule and not scene.system.closed)]
 
 
 def _runs(scene: Scene, runs: int) -> int:
-    return runs if scene.engine == "algebraic" else 1
+    return 1 if scene.system.steps else runs
 
 
 def _sweep(scene: Scene, knob: Knob, amplitudes, truth, runs: int) -> dict:
     if knob.against == "limit":
-        truth = _limit(scene, knob).displacement(knob.tier, None, amplitudes)
+        truth = Study(_limit(scene, knob)).displacement(knob.tier, None, amplitudes)
     errors, seconds = [], []
     for value in knob.values:
         poses, took = _timed(partial(_fresh, knob, scene, value, amplitudes), runs)
-        errors.append(float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.body.length) ** 2))))
+        errors.append(float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.system.length) ** 2))))
         seconds.append(took)
     entry = {"label": knob.label, "tier": knob.tier, "knob": knob.name, "order": knob.order, "against": knob.against}
     slope = _slope(knob, errors)
@@ -149,7 +153,7 @@ def _limit(scene: Scene, knob: Knob) -> Scene:
 
 def _fresh(knob: Knob, scene: Scene, value, amplitudes):
     """The displacement with the knob at ``value``, tables built anew so that their cost is counted."""
-    return knob.turned(scene, value).displacement(knob.tier, None, amplitudes)
+    return Study(knob.turned(scene, value)).displacement(knob.tier, None, amplitudes)
 
 
 def _timed(f: Callable, runs: int):

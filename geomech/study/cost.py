@@ -2,7 +2,7 @@
 
 A request is a list of jobs, counted as the tiers ask for them (`geomech.study.estimate`); `price` solves a few balances of each
 kind, then more, until it can tell what one takes. Jobs too small to matter are not piloted. Seconds are of computing, so
-that other work on the machine does not count. From Python nothing is refused: ask `Scene.cost`, and decide.
+that other work on the machine does not count. From Python nothing is refused: ask `Study.cost`, and decide.
 """
 
 from __future__ import annotations
@@ -11,21 +11,19 @@ import math
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-import rft
 from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.harmonics import Harmonics
+from geomech.scene.model import Scene
 from geomech.study import estimate
-from rft.loads import parse
-from rft.newton import ELEMENTS_TOGETHER
-
-if TYPE_CHECKING:
-    from geomech.scene.model import Scene
+from geomech.study.offer import lookups as looked_up
+from geomech.tiers import TIERS
+from geomech.tiers.path import axes
 
 LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
@@ -80,7 +78,7 @@ class Job(NamedTuple):
         """The same for jobs whose balances, steps or look-ups take the same time."""
         s = self.scene
         terms = s.numerics.harmonics if self.tier == "harmonic" else 0
-        return repr((self.what, s.medium, s.body, s.effects, s.numerics.loads, self.gait, self.group, self.tier, terms))
+        return repr((self.what, s.system.costs_as, self.gait, self.group, self.tier, terms))
 
 
 def price(jobs: Sequence[Job]) -> Cost:
@@ -109,9 +107,9 @@ def _size(memory: float) -> str:
 
 
 def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = None, tables: bool = True) -> list[Job]:
-    """`Scene.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
+    """`Study.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
     gait, phases = gait or scene.gait, scene.numerics.phases
-    lookups = [m for m in methods if m in scene.lookups]
+    lookups = [m for m in methods if m in looked_up(scene.system)]
     jobs = [built(scene, m, gait) for m in lookups if tables and not (m == "path" and "area" in lookups)]
     jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m != "adapted"]
     if len(lookups) < len(methods):
@@ -125,14 +123,14 @@ def direct(
 ) -> list[Job]:
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
     (`estimate.direct`) or, if not ``checked``, without."""
-    marching = scene.engine != "algebraic"
+    system, marching = scene.system, scene.system.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if marching else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, scene.at_once(phases))
+    group = min(max(1, count), together, system.at_once(phases))
     solved, held = phases * (_refinements(scene, marching) if checked else 1.0), 0
     if marching:
-        held = group * (60 * scene.elements + sum(e.held for e in scene.effects))
-    memory = BASE + 8 * (COPIES * group * phases * (scene.body.joints + 6) + held) + count * ROW
+        held = group * (60 * system.elements + system.held)
+    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
     if marching:
         return [Job("steps", scene, gait, solved * count / group, group, memory=memory)]
     return [Job("balances", scene, gait, solved * count, memory=memory)]
@@ -143,20 +141,20 @@ def _refinements(scene: Scene, marching: bool) -> float:
     an eighth of them, and a quarter with a finer model where there is one. Pieces of body are doubled on the quarter, and
     halved and quartered at all phases: as much as half and a half and a quarter."""
     again = 0.5 + 0.25 + 0.125 if marching else 0.0
-    again += 0.5 + 0.5 + 0.25 if scene.pieces else 0.0
-    return 1.0 + again + (0.25 if estimate.finer_model(scene) else 0.0)
+    again += 0.5 + 0.5 + 0.25 if scene.system.cut else 0.0
+    return 1.0 + again + (0.25 if scene.system.finer() else 0.0)
 
 
 def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     """The table of a tier; that of area and path is the connection with its CCF."""
-    n, joints = scene.numerics, scene.body.joints
+    n, joints = scene.numerics, scene.system.joints
     if tier != "adapted":
-        scene.axes()  # refuses a field that is too large
+        axes(scene.system, n)  # refuses a field that is too large
     values = {"harmonic": n.harmonics + 2, "adapted": 0}.get(tier, joints + 3) * 3 * n.grid**joints
     values += n.curves * (n.phases // 2) * 3 if tier == "adapted" else 0
     place = (gait or scene.gait) if tier == "adapted" else None
     memory = BASE + 8 * TABLES * values
-    return Job("balances", scene, place, estimate.solves(scene, tier, 1, n.phases), memory=memory)
+    return Job("balances", scene, place, TIERS[tier].solves(scene.system, n, 1, n.phases), memory=memory)
 
 
 def _per_sample(job: Job, count: float) -> float:
@@ -164,24 +162,24 @@ def _per_sample(job: Job, count: float) -> float:
     scene = job.scene
     if job.what == "look-ups":
         return 0.0 if count < 1e5 else _grown(_look(scene, job.tier), 64, count)
-    prior = SLOW * scene.elements * parse(scene.numerics.loads)[1]
+    prior = SLOW * scene.system.evaluations
     if prior * count < FREE:
         return prior / 2
-    rng, joints, extent = np.random.default_rng(0), scene.body.joints, scene.numerics.extent
+    rng, joints, extent = np.random.default_rng(0), scene.system.joints, scene.numerics.extent
 
     def solve(samples: int):
         if job.gait is None:
             alpha = rng.uniform(-extent, extent, (samples, joints))
-            return scene.solve(alpha, rng.normal(size=(samples, joints)))
+            return scene.system.sample(alpha, rng.normal(size=(samples, joints)))
         phases = max(8, 2 * job.gait.harmonics + 2)
-        return scene.solve(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
+        return scene.system.sample(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
 
-    return _grown(solve, max(8, 3072 // scene.elements), count)
+    return _grown(solve, max(8, 3072 // scene.system.elements), count)
 
 
 def _look(scene: Scene, tier: str) -> Callable:
     """Looks n shapes up in a table of zeros, as large as a shape touches."""
-    joints, degree = scene.body.joints, scene.numerics.interpolation
+    joints, degree = scene.system.joints, scene.numerics.interpolation
     axes = (np.linspace(-1.0, 1.0, degree + 3),) * joints
     size = [len(a) for a in axes]
     if tier == "harmonic":
@@ -193,23 +191,19 @@ def _look(scene: Scene, tier: str) -> Callable:
 
 def _per_step(job: Job, count: float) -> tuple[float, int]:
     """(seconds a step of a march takes, cycles until it settles)."""
-    scene, gait, n = job.scene, job.gait, job.scene.numerics
-    elements = scene.elements * parse(n.loads)[1]
-    prior, cycles = STEP + SLOW * elements * job.group, n.cycles or CYCLES
+    system, gait = job.scene.system, job.gait
+    prior, cycles = STEP + SLOW * system.evaluations * job.group, system.solver.cycles or CYCLES
     if prior * count * cycles < FREE:
         return prior / 2, cycles
     phases = max(16, 8 * -(-gait.harmonics // 3))
-    some = min(job.group, max(1, ELEMENTS_TOGETHER // elements))
+    some = min(job.group, max(1, system.together // system.evaluations))
 
     def march(samples: int, cycles: int | None):
         start = time.process_time()
-        found = rft.march(
-            scene.medium, scene.body, *gait.cycle(phases, np.full(samples, gait.amplitude)), effects=scene.effects,
-            cycles=cycles, loads=n.loads, regularisation=n.regularisation, tolerance=n.tolerance,
-        )  # fmt: skip
+        found = system.march(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    return march(some, 1)[1] * job.group / some, n.cycles or march(1, None)[0]
+    return march(some, 1)[1] * job.group / some, system.solver.cycles or march(1, None)[0]
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:

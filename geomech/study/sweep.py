@@ -5,23 +5,24 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import time
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 
-import rft
 from geomech import __version__
 from geomech.errors import SceneError
 from geomech.files import note, whole_file
 from geomech.gaits import Gait
 from geomech.output.netcdf import COMPONENTS, attribute
+from geomech.scene import write as written
 from geomech.scene.model import Scene
 from geomech.scene.read import from_tables
 from geomech.study import estimate, kept
 from geomech.study.cost import Cost, direct, price
-from rft.effects import broken, side_by_side
+from geomech.systems import Swimmer
+from rft import SOLVER
+from rft.effects import side_by_side
 
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
@@ -34,7 +35,7 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     """The tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
     "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
-    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics"):
+    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical"):
         old = tables.get(parts[0], {}).get(parts[1])
         value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
         return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
@@ -69,7 +70,7 @@ def sweep(
         while len(rows) < rows.total:
             k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
             first = _scene_at(tables, scene, names, points[k])
-            most = min(SAMPLES_TOGETHER, first.at_once(first.numerics.phases))
+            most = min(SAMPLES_TOGETHER, first.system.at_once(first.numerics.phases))
             beyond = points[k + 1 : k + max(1, most // len(amplitudes or [0]))] if done == 0 else []
             batch = [first, *(_scene_at(tables, scene, names, p) for p in beyond)]
             rows.add(_rows(batch, amplitudes[done : done + most] if amplitudes else None))
@@ -101,7 +102,7 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     if not 0 < total <= LARGEST:
         raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
     outer = [values[k] for k in names if k != AMPLITUDE]
-    tables = _tables(scene)
+    tables = written.tables(scene)
     for corner in _corners(outer):
         _scene_at(tables, scene, names, corner)  # refuse before computing
     return tables, names, values, list(itertools.product(*outer))
@@ -109,22 +110,9 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
 
 def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
-    parts = {name: repr(getattr(scene, name)) for name in ("medium", "body", "gait", "effects", "numerics")}
+    parts = {name: repr(getattr(scene, name)) for name in ("system", "gait", "numerics")}
     over = [[name, list(x)] for name, x in values.items()]
-    return {"geomech": __version__, "solver": rft.SOLVER, "scene": scene.text, **parts, "over": over}
-
-
-def _tables(scene: Scene) -> dict:
-    """The scene's TOML with its numerics of now; SceneError if it is not what its text says."""
-    if not scene.text:
-        raise SceneError(f"{scene.name}: a sweep takes a scene that was read from TOML")
-    numerics = {k: v for k, v in dataclasses.asdict(scene.numerics).items() if v is not None}
-    tables = {**tomllib.loads(scene.text), "numerics": numerics}
-    if not _same(from_tables(tables, scene.name, scene.text), scene):
-        raise SceneError(
-            f"{scene.name}: a sweep takes a scene as its TOML text has it: change that, or sweep the change"
-        )
-    return tables
+    return {"geomech": __version__, "solver": SOLVER, "scene": written.toml(scene), **parts, "over": over}
 
 
 class _Rows(list):
@@ -164,10 +152,6 @@ class _Rows(list):
             error.add_note(told)
 
 
-def _same(a: Scene, b: Scene) -> bool:
-    return (a.medium, a.body, a.gait, a.effects) == (b.medium, b.body, b.gait, b.effects)
-
-
 def _corners(outer: list[list[float]]):
     """The grid's corners, and every value of each parameter with the others at their first."""
     yield from itertools.product(*([v[0], v[-1]] for v in outer))
@@ -199,17 +183,23 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
 def _kind(scene: Scene) -> str:
     """The same for scenes that can share a batch."""
     effects = [
-        (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched]) for e in scene.effects
+        (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched])
+        for e in getattr(scene.system, "effects", ())
     ]
-    return repr((scene.medium, scene.body, scene.numerics, scene.gait.joints, broken(scene.effects), effects))
+    s = scene.system
+    rest = (s.medium, s.body, s.solver) if isinstance(s, Swimmer) else s
+    return repr((rest, scene.numerics, scene.gait.joints, s.lacks, effects))
 
 
 def beside(scenes: list[Scene], amplitudes=None) -> Scene:
     """One scene with the gaits and effects of several side by side, each for all amplitudes or its own one."""
     count = 1 if amplitudes is None else len(amplitudes)
     gaits = Beside(tuple(s.gait for s in scenes), amplitudes)
-    effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.effects for s in scenes)))
-    return dataclasses.replace(scenes[0], gait=gaits, effects=effects)
+    joined = dataclasses.replace(scenes[0], gait=gaits)
+    if not isinstance(joined.system, Swimmer):
+        return joined
+    effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
+    return joined.with_system(effects=effects)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -239,7 +229,7 @@ def save(path: Path, scene: Scene, results: dict) -> None:
 
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
         file.title = attribute(f"Net displacement per cycle of the scene {scene.name}")
-        file.scene = attribute(scene.text)
+        file.scene = attribute(written.toml(scene))
         names = []
         for parameter, values in results["over"].items():
             names.append(parameter.replace(".", "_").replace("-", "_"))
@@ -252,7 +242,7 @@ def save(path: Path, scene: Scene, results: dict) -> None:
         component = file.createVariable("component", "c", ("component", "component_length"))
         component[:] = np.array([list(c.ljust(5, "\0")) for c in COMPONENTS], "S1")
         component._Encoding = "ascii"
-        unit = "body length" if scene.unit == "BL" else "m"
+        unit = "body length" if scene.system.unit == "BL" else "m"
         for name, dims, units in (
             ("displacement", (*names, "component"), f"{unit} (x, y), rad (theta)"),
             ("estimate", tuple(names), "body length"),
@@ -270,7 +260,7 @@ def draw(scene: Scene, results: dict):
     over = results["over"]
     if len(over) > 2:
         raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
-    net, label = plots.net(results["displacement"]), f"displacement per cycle ({scene.unit})"
+    net, label = plots.net(results["displacement"]), f"displacement per cycle ({scene.system.unit})"
     fig, axes = plots.figure(4.0, 3.0)
     ax, names = axes[0, 0], list(over)
     named = [scene.gait.amplitude_label if name == AMPLITUDE else name for name in names]

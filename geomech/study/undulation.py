@@ -31,7 +31,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     """
     gait = _sine(scene, "performance")
     amplitudes = np.asarray(amplitudes, float)
-    run, length = scene.cycle(gait, amplitudes, work=True), scene.body.length
+    run, length = scene.cycle(gait, amplitudes, work=True), scene.system.length
     spent = run.work
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
     wavelength = gait.wavelength(amplitudes)
@@ -135,7 +135,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     if gait.amplitude == 0:
         raise ValueError("activation takes a wave of amplitude > 0: a straight body at rest needs no muscles")
     bend, rate = gait.cycle(scene.numerics.phases)
-    moment = scene.run(bend, rate, work=True).work.moment
+    moment = scene.system.run(bend, rate, work=True).work.moment
     s = np.arange(1, gait.elements) / gait.elements
     onset, offset, changes = _zeros(moment)
     right, left, _ = _zeros(bend)

@@ -1,0 +1,94 @@
+"""The TOML of a scene, however it was made: reading it gives the same scene."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import tomllib
+
+from geomech.errors import SceneError
+from geomech.gaits import KINDS as GAITS
+from geomech.scene.model import Scene
+from geomech.scene.read import from_tables
+from geomech.systems.swimmer import PARTS, Swimmer, name_in
+
+
+def toml(scene: Scene) -> str:
+    """The text it was read from where that still holds, comments and all; else a new one. SceneError if it has a part that
+    no scene file can name."""
+    if scene.text and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+        return scene.text
+    return _text(_anew(scene))
+
+
+def tables(scene: Scene) -> dict:
+    """The tables of its text, with the numerics of now, where these make the scene; else those written anew."""
+    numerics = _numerics(scene)
+    if scene.text:
+        read = {**tomllib.loads(scene.text), "numerics": numerics}
+        if from_tables(read, scene.name, scene.text) == scene:
+            return read
+    return _anew(scene)
+
+
+def _anew(scene: Scene) -> dict:
+    system, out = scene.system, {}
+    if scene.frame != "mean":
+        out["frame"] = scene.frame
+    if isinstance(system, Swimmer):
+        out["medium"] = _of_kind(system.medium, *PARTS["medium"])
+        out["body"] = _of_kind(system.body, *PARTS["body"])
+        effects = [_of_kind(effect, *PARTS["effects"]) for effect in system.effects]
+    else:
+        out["system"], effects = {"kind": system.kind, **_fields(system)}, []
+        out["system"].pop("solver", None)
+    for part in (out.get("body"), out.get("system")):
+        if part and "frame" in part:
+            del part["frame"]  # the scene's
+    out["gait"] = _of_kind(scene.gait, "kind", GAITS)
+    out["numerics"] = _numerics(scene)
+    if effects:
+        out["effects"] = effects
+    if from_tables(out, scene.name) != scene:
+        raise SceneError(f"{scene.name}: a part of this scene is of no kind that a scene file can name")
+    return out
+
+
+def _numerics(scene: Scene) -> dict:
+    return _fields(scene.numerics) | (_fields(scene.system.solver) if scene.system.solver else {})
+
+
+def _of_kind(thing, key: str, kinds: dict) -> dict:
+    name = name_in(kinds, thing)
+    if name not in kinds:
+        raise SceneError(f"a {name} is of no kind that a scene file can name: use one of {', '.join(kinds)}")
+    return {key: name, **_fields(thing)}
+
+
+def _fields(thing) -> dict:
+    """Those that are told at construction and have a value."""
+    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
+    return {k: _plain(v) for k, v in values.items() if v is not None}
+
+
+def _plain(value):
+    """NumPy's numbers and rows as Python's own."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
+
+
+def _text(tables: dict) -> str:
+    lines = [f"{key} = {_value(x)}" for key, x in tables.items() if not isinstance(x, (dict, list))]
+    for name, table in tables.items():
+        for each in table if isinstance(table, list) else [table] if isinstance(table, dict) else []:
+            lines += ["", f"[[{name}]]" if isinstance(table, list) else f"[{name}]"]
+            lines += [f"{key} = {_value(x)}" for key, x in each.items()]
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _value(x) -> str:
+    """As TOML; its strings and lists are JSON's, its numbers Python's."""
+    if isinstance(x, list):
+        return f"[{', '.join(map(_value, x))}]"
+    return json.dumps(x, ensure_ascii=False) if isinstance(x, (str, bool)) else repr(x)

@@ -1,0 +1,141 @@
+"""The workbench of a scene: displacements by every tier. The one thing that remembers what was computed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.curvature import ccf
+from geomech.curvature import error as ccf_error
+from geomech.errors import SceneError, choose, named, real_array, short
+from geomech.field import Field
+from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
+from geomech.scene.model import Scene
+from geomech.study import cost, estimate
+from geomech.study.offer import METHODS, lookups, methods, tiers
+from geomech.tiers import TIERS
+
+
+class Study:
+    """A scene and the tables computed for it so far, kept under what they depend on: the system, some entries of
+    [numerics], for a family also the gait. `turned` gives a bench with other numerics that shares them."""
+
+    def __init__(self, scene: Scene, tables: dict | None = None):
+        if not isinstance(scene, Scene):
+            raise ValueError(f"a study is that of a Scene, got {short(scene)}")
+        self.scene, self._tables = scene, {} if tables is None else tables
+
+    def turned(self, **numerics) -> Study:
+        """The bench of the scene with some of its [numerics] changed; None keeps a value."""
+        return Study(self.scene.with_numerics(**numerics), self._tables)
+
+    methods = property(lambda self: methods(self.scene.system))
+    tiers = property(lambda self: tiers(self.scene.system))
+    lookups = property(lambda self: lookups(self.scene.system))
+
+    def _kept(self, what: str, depends_on: Sequence[str], reach: tuple, make: Callable):
+        s = self.scene
+        key = what, s.system, *(getattr(s.numerics, name) for name in depends_on), *reach
+        if key not in self._tables:
+            self._tables[key] = make()
+        return self._tables[key]
+
+    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None):
+        """What a tier looks up, computed once: a Connection, Harmonics or a Family; SceneError if it has none."""
+        with named(self.scene.name):
+            how = TIERS[choose("methods", tier, METHODS)]
+            how.refuse(self.scene.system)
+            reach = how.reach(self.scene.gait if gait is None else gait, amplitudes)
+            make = lambda: how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
+            return self._kept(how.looks_up, how.depends_on, reach, make)
+
+    def compute_field(self, progress: Callable | None = None) -> None:
+        """Fill `fitted` now, telling ``progress`` the fraction done."""
+        self.table("path", progress=progress)
+
+    @property
+    def fitted(self) -> Connection:
+        """The least-squares connection on the scene's grid."""
+        return self.table("path")
+
+    @property
+    def curvature(self) -> Field:
+        """The CCF of `fitted`, for joints 1 and 2."""
+        return self._kept("ccf", TIERS["path"].depends_on, (), lambda: ccf(self.fitted))
+
+    @property
+    def curvature_error(self) -> Field:
+        """The estimated error of `curvature`."""
+        return self._kept("error of the ccf", TIERS["path"].depends_on, (), lambda: ccf_error(self.fitted))
+
+    def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
+        """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
+        scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
+        with named(scene.name):
+            tier = TIERS[choose("methods", method, METHODS)]
+            tier.refuse(scene.system)
+            self._refuse_singular(tier, gait, amplitudes)
+            table = None if tier.is_direct(scene.system) else self.table(method, gait, amplitudes)
+            return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
+
+    def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
+        """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
+        system, n = self.scene.system, self.scene.numerics
+        if system.singularity is not None:
+            a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+            if reach := tier.reach(gait, a):
+                a = reach[-1] * np.arange(1, n.curves + 1) / n.curves
+            system.refuse_singular(gait.cycle(n.phases, a)[0])
+
+    def study(
+        self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
+    ) -> dict:
+        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "estimate_heading":
+        {method: [...]}, "seconds": {...}}.
+
+        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.study.estimate`). Fields
+        are timed on their own.
+        """
+        scene = self.scene
+        gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        if amplitudes.ndim != 1:
+            raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
+        with named(scene.name):
+            chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
+            for tier in chosen.values():
+                tier.refuse(scene.system)
+                self._refuse_singular(tier, gait, amplitudes)
+        seconds, errors, found, reference = {}, {}, {}, None
+        if any(t.looks_up == "connection" and not t.is_direct(scene.system) for t in chosen.values()):
+            seconds["field"] = timed(lambda: self.compute_field(progress))[1]
+        for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
+            if chosen[method].is_direct(scene.system):
+                (poses, errors[method]), seconds[method] = timed(
+                    lambda: estimate.direct(scene, gait, amplitudes, scene.numerics.phases)
+                )
+                reference = poses, errors[method]
+            else:
+                poses, seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
+                errors[method] = estimate.against_direct(scene, poses, gait, amplitudes, reference)
+            found[method] = poses.tolist()
+        estimates = {
+            key: {m: errors[m][:, k].tolist() for m in methods}
+            for k, key in enumerate(("estimate", "estimate_heading"))
+        }
+        return {"amplitude": amplitudes.tolist(), **{m: found[m] for m in methods}, **estimates, "seconds": seconds}
+
+    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> cost.Cost:
+        """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""
+        with named(self.scene.name):
+            return cost.price(cost.study(self.scene, methods, len(amplitudes), gait))
+
+
+def timed(f: Callable):
+    """(value, seconds)."""
+    start = time.perf_counter()
+    value = f()
+    return value, time.perf_counter() - start

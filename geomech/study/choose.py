@@ -1,0 +1,98 @@
+"""The cheapest way to a displacement that can be trusted far enough."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from geomech.errors import SceneError, is_number, short
+from geomech.gaits import Gait
+from geomech.scene.model import Scene
+from geomech.study import cost
+from geomech.study.bench import Study
+from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
+from geomech.tiers import TIERS
+
+MOST_PHASES = 1 << 16
+FINEST_PIECES = 640  # that a tolerance asks for
+
+
+def cheapest(
+    scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
+) -> dict:
+    """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "estimate_heading": [...], "tier", "settings",
+    "seconds"}: the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
+    most ``tol`` body lengths.
+
+    Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
+    come (`geomech.study.cost`) before each is done. SceneError if no tier gets there.
+    """
+    if not (is_number(tol) and 0 < tol <= 1e300):
+        raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
+    system, study = scene.system, Study(scene)
+    gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
+    if tol <= system.settling:
+        raise SceneError(f"{scene.name}: a march with these effects repeats to {system.settling:g} only: raise --tol")
+    some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
+    phases = max(FEWEST_STEPS if system.steps else 32, 8 * gait.harmonics)
+    if study.lookups:
+        pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
+        phases = settings["phases"]
+    solves = lambda m: TIERS[m].solves(system, scene.numerics, len(amplitudes), phases)
+    for method in sorted(study.lookups, key=solves):
+        if solves(method) >= solves("direct"):
+            break
+        ask([cost.built(scene, method, gait)])
+        try:
+            checked = study.displacement(method, gait, amplitudes[some])
+        except ValueError:  # the gait leaves the field or the family: this tier cannot say
+            continue
+        if (apart(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
+            poses = study.displacement(method, gait, amplitudes)
+            error = against_direct(scene, poses, gait, amplitudes)
+            if error[:, 0].max() <= tol:
+                return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
+    (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
+    if error[:, 0].max() > tol:
+        found = " and ".join(f"{n} {name}" for name, n in settings.items())
+        raise SceneError(
+            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
+            "raise --tol, or lower [numerics] regularisation and tolerance"
+        )
+    return _answer("direct", amplitudes, poses, error, settings, start)
+
+
+def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
+    """The direct tier at twice the phases, or the pieces of body where these leave more, again and again, for the
+    amplitudes that need it, until all positions are within ``tol`` or doubling stops helping. Returns (poses, errors) and
+    {"phases": ..., "pieces": ... where there are any}."""
+    ask(cost.direct(scene, gait, len(amplitudes), phases))
+    poses, error, of_pieces = in_groups(scene, gait, amplitudes, phases)
+    error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), getattr(scene.system.solver, "pieces", 0)
+    while (worse := open_[error[open_, 0] > tol]).size:
+        coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
+        if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
+            break
+        pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
+        finer_scene = scene.with_numerics(pieces=pieces) if scene.system.cut else scene
+        ask(cost.direct(finer_scene, gait, len(worse), phases))
+        finer, now, left = in_groups(finer_scene, gait, amplitudes[worse], phases)
+        stalled = (now + left > 0.9 * error[worse])[:, 0].all() and phases > 1024
+        poses[worse], error[worse], of_pieces[worse], open_ = finer, now + left, left, worse
+        if stalled:
+            break
+    return (poses, error), {"phases": phases, **({"pieces": pieces} if scene.system.cut else {})}
+
+
+def _answer(method, amplitudes, poses, error, settings, start) -> dict:
+    return {
+        "amplitude": amplitudes.tolist(),
+        method: poses.tolist(),
+        "estimate": error[:, 0].tolist(),
+        "estimate_heading": error[:, 1].tolist(),
+        "tier": method,
+        "settings": settings,
+        "seconds": {method: time.perf_counter() - start},
+    }

@@ -1,0 +1,23 @@
+"""Which tiers a system allows."""
+
+from __future__ import annotations
+
+from geomech.systems.base import System
+from geomech.tiers import TIERS
+
+METHODS = tuple(TIERS)  # cheapest look-up first
+
+
+def tiers(system: System) -> tuple[str, ...]:
+    """All that say something of this system."""
+    return tuple(name for name, tier in TIERS.items() if tier.takes(system))
+
+
+def methods(system: System) -> tuple[str, ...]:
+    """Those of a plain study: without tables that serve one family of gaits only."""
+    return tuple(name for name in tiers(system) if TIERS[name].plain)
+
+
+def lookups(system: System) -> tuple[str, ...]:
+    """Those that look a precomputed table up; where xi = A alphadot holds exactly, path and harmonic do not."""
+    return tuple(name for name in tiers(system) if not TIERS[name].is_direct(system))

@@ -1,0 +1,9 @@
+"""Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
+
+from geomech.systems.base import Cycle, Plain, Premise, System, checked_system
+from geomech.systems.no_slip import NoSlipSnake
+from geomech.systems.swimmer import Solver, Swimmer
+
+KINDS = {"swimmer": Swimmer, "no-slip-snake": NoSlipSnake}
+
+__all__ = ["KINDS", "Cycle", "NoSlipSnake", "Plain", "Premise", "Solver", "Swimmer", "System", "checked_system"]

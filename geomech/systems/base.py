@@ -1,0 +1,186 @@
+"""What a system is: a body velocity for a shape and its rate of change, and the premises it lacks."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from geomech.connection import evaluate
+from geomech.errors import real_array, short
+from geomech.reconstruct import displacement
+from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
+
+__all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
+
+VALUES_TOGETHER = 1 << 22  # of gaits run side by side, angles and velocities: some 500 MB with what is made of them
+
+
+class Cycle(NamedTuple):
+    """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
+    in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work: power,
+    internal moments and slip, (..., N) each (`rft.work`), or None. cycles: how many time stepping took, 1 without it.
+    to_come: (...), change of displacement still to come where cycles go on until they repeat, body lengths or rad; 0
+    elsewhere."""
+
+    xi: np.ndarray
+    net: np.ndarray
+    residual: np.ndarray
+    speed: np.ndarray
+    work: Any
+    cycles: int
+    to_come: np.ndarray
+
+
+class System(Protocol):
+    """What the geometry asks for; `Plain` answers all but ``joints`` and ``velocity`` for a system that needs no more.
+
+    joints: shape variables. length: of the body, in ``unit``, "BL" (body lengths) or "m". frame: the body frame, in
+    words. mirror: left and right are alike, xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta). linear: xi = A alphadot
+    holds exactly. lacks: premises that do not hold; those of SHAPE_ALONE leave no velocity of a single shape, only `run`.
+    singularity: None, or a function of shapes (..., joints) that passes through 0 where the velocity does not exist.
+    """
+
+    joints: int
+    length: float
+    unit: str
+    frame: str
+    mirror: bool
+    linear: bool
+    lacks: Premise
+    singularity: Callable | None
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) for alpha, alphadot (..., joints), in the body frame; nan at singular shapes."""
+
+    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases."""
+
+
+class Plain:
+    """Base of systems: what holds of one whose velocity follows from shape alone, at one place at a time.
+
+    kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the phases only. solver:
+    its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are evaluated, for
+    one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that time
+    stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
+    displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
+    closed: forces on an element have an exact form, which finer loads come near to.
+    """
+
+    kind = "system"
+    length = 1.0
+    frame = "mean"
+    mirror = linear = kinks = False
+    lacks = NONE
+    solver = None
+    singularity = None
+    elements = evaluations = 1
+    together = 1 << 12
+    held = cut = 0
+    closed = False
+    settling = 0.0
+    engine = "algebraic"
+
+    @property
+    def unit(self) -> str:
+        """Of lengths: body lengths, or metres where the body has a size."""
+        return "BL" if self.length == 1.0 else "m"
+
+    @property
+    def steps(self) -> bool:
+        """Whether a cycle is run phase after phase: no velocity follows from shape alone."""
+        return bool(self.lacks & SHAPE_ALONE)
+
+    @property
+    def settles(self) -> bool:
+        """Whether its cycles are run until they repeat."""
+        return self.settling > 0
+
+    def sample(self, alpha, alphadot):
+        """`velocity`, unchecked, to be timed."""
+        return self.velocity(alpha, alphadot)
+
+    def single(self, alpha, alphadot) -> dict:
+        """{"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
+        if self.singularity is not None and not self.singularity(real_array("alpha", alpha)):
+            raise ValueError(f"the shape is singular: {self.singular}: move a joint")
+        xi = evaluate(self.velocity, real_array("alpha", alpha), real_array("alphadot", alphadot))
+        return {"xi": xi.tolist(), "status": "exact", "residual": 0.0}
+
+    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases; ValueError at a singular shape."""
+        self.refuse_singular(alpha)
+        xi, speed = evaluate(self.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
+        return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
+
+    def at_once(self, phases: int) -> int:
+        """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
+        return max(1, VALUES_TOGETHER // (phases * (self.joints + 6)))
+
+    def finer(self):
+        """The system with its velocity computed more exactly, None where it is exact already."""
+        return None
+
+    def in_frame(self, frame: str):
+        """The system seen from another of its frames; ValueError if it has none of that name."""
+        return dataclasses.replace(self, frame=frame)
+
+    def with_solver(self, **changes):
+        """The system with some of its own [numerics] changed."""
+        return dataclasses.replace(self, solver=dataclasses.replace(self.solver, **changes)) if changes else self
+
+    @property
+    def costs_as(self) -> str:
+        """The same for systems whose velocities take the same time."""
+        return repr(self)
+
+    @property
+    def blames(self) -> str:
+        """All that lack a premise, by name."""
+        return f"the {self.kind}"
+
+    def blame(self, premises: Premise) -> str:
+        """Who lacks one of these premises, to follow "no connection with"; empty if nobody does."""
+        return f"the {self.kind}, which is {not_so(self.lacks)}" if self.lacks & premises else ""
+
+    def refuse(self, what: str, premises: Premise, instead: str) -> None:
+        """ValueError if there is no such result because a premise of it does not hold."""
+        if blame := self.blame(premises):
+            raise ValueError(f"no {what} with {blame}: {instead}")
+
+    def refuse_singular(self, alpha) -> None:
+        """ValueError naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
+        if self.singularity is None:
+            return
+        d = self.singularity(alpha)
+        met = (d == 0) | (d * np.roll(d, -1, -1) < 0)
+        if met.any():
+            shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[met][0])
+            raise ValueError(
+                f"the gait meets the singular shape near alpha = ({shape}), where {self.singular}: "
+                "move its centre, or lower the amplitude"
+            )
+
+    def about(self) -> dict:
+        """Attributes of a file of results, beside those every system has."""
+        return {}
+
+    def told(self) -> list[str]:
+        """What it is and what follows, in lines; the first continues the scene's name."""
+        fields = ", ".join(f"{f.name} = {short(getattr(self, f.name))}" for f in dataclasses.fields(self))
+        return [f"{self.kind} ({fields})"]
+
+    @property
+    def because(self) -> str:
+        """Why it needs its engine, and what that does."""
+        return "(the velocity at every shape, all shapes at once): nothing remembers, places are alike, no mass"
+
+
+def checked_system(system):
+    """system, or ValueError if it is nothing of the kind."""
+    if isinstance(system, type) or not all(hasattr(system, x) for x in ("joints", "velocity", "run", "lacks")):
+        raise ValueError(f"system must be a system such as Swimmer(medium, body), got {short(system)}")
+    return system

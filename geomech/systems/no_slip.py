@@ -1,0 +1,60 @@
+"""The no-slip, or kinematic, snake: three links on wheels that roll along the link and do not slip sideways.
+
+The velocity across the link is zero at every link's centre: three equations for xi, linear in alphadot, no force law.
+Source: the kinematic snake of E. A. Shammas, H. Choset and A. A. Rizzi, Int. J. Robotics Research 26, 1075 (2007).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.systems.base import Plain
+from rft.bodies import Chain
+
+
+@dataclass(frozen=True)
+class NoSlipSnake(Plain):
+    """Three links, tail to head, with wheels at their centres. lengths: relative. length, frame: as of `rft.Chain`.
+
+    Where the wheels' axles meet in one point, or are parallel, the snake can turn about it without rolling any wheel
+    sideways: the shape is singular. For equal links that is alpha_1 = alpha_2, the straight snake and arcs of a circle.
+    """
+
+    lengths: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    length: float = 1.0
+    frame: str = "mean"
+
+    kind = "no-slip-snake"
+    joints = 2
+    mirror = linear = True
+    singular = "the wheels' axles meet in one point"
+
+    def __post_init__(self):
+        object.__setattr__(self, "lengths", self._chain.lengths)
+        if len(self.lengths) != 3:
+            raise ValueError(f"lengths must be those of three links, got {len(self.lengths)}")
+
+    @property
+    def _chain(self) -> Chain:
+        return Chain(self.lengths, self.length, self.frame)
+
+    def _rolling(self, alpha, alphadot):
+        """Rows (..., 3, 3) and sides (..., 3) of: velocity across each link's centre = row . xi + side, body lengths."""
+        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        m = self._chain.motion(*(x.reshape(-1, 2).T for x in (alpha, alphadot)))
+        rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
+        return rows.reshape(*shape, 3, 3), m.v[1].T.reshape(*shape, 3)
+
+    def singularity(self, alpha) -> np.ndarray:
+        """The determinant of the three equations (...,), 0 at singular shapes; no unit."""
+        det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])
+        return np.where(np.abs(det) < 1e-14, 0.0, det)
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) in the frame, (length/time, length/time, rad/time); nan at singular shapes."""
+        rows, side = self._rolling(alpha, alphadot)
+        good = np.abs(np.linalg.det(rows)) >= 1e-14
+        xi = np.linalg.solve(np.where(good[..., None, None], rows, np.eye(3)), -side[..., None])[..., 0]
+        return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]

@@ -1,0 +1,264 @@
+"""A body that swims in a medium by resistive force theory: the one user of rft's solver."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import rft
+from geomech.errors import short
+from geomech.reconstruct import displacement
+from geomech.systems.base import SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so
+from rft.balance import checked_body
+from rft.bodies import KINDS as BODIES
+from rft.bodies.base import halves
+from rft.bodies.pieces import PIECES
+from rft.effects import ENGINES
+from rft.effects import KINDS as EFFECTS
+from rft.effects.base import MOST_PIECES, pieced
+from rft.loads import element_load, parse
+from rft.media import CATALOGUE, LAWS, is_linear
+from rft.media.base import check_ranges, in_range
+from rft.newton import ELEMENTS_TOGETHER
+
+PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
+MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How the balance of forces is solved; part of [numerics]. loads: "exact", "midpoint:N", "gauss:N" (rft.loads).
+    regularisation: body lengths per radian (rft.balance). tolerance: normalised residual. cycles: of a march (rft.march);
+    if left out until they repeat, one where effects break symmetry. pieces: to a body length, 1 to 10,000, into which
+    effects that vary along an element cut it (`rft.effects`)."""
+
+    loads: str = "exact"
+    regularisation: float = 1e-6
+    tolerance: float = 1e-10
+    cycles: int | None = None
+    pieces: int = PIECES
+
+    def __post_init__(self):
+        parse(self.loads)
+        check_ranges(self, regularisation=(1e-12, 1), tolerance=(1e-13, 1))
+        in_range("pieces", self.pieces, 1, MOST_PIECES, whole=True)
+        if self.cycles is not None:
+            in_range("cycles", self.cycles, 1, 10_000, whole=True)
+
+
+@dataclass(frozen=True)
+class Swimmer(Plain):
+    """A body in a medium, with the effects it is asked to have."""
+
+    medium: rft.Medium
+    body: rft.Body
+    effects: tuple[rft.effects.Effect, ...] = ()
+    solver: Solver = field(default=Solver())
+
+    kind = "swimmer"
+    together = ELEMENTS_TOGETHER
+
+    def __post_init__(self):
+        element_load(self.medium)
+        checked_body(self.body)
+        rft.effects.broken(self.effects)
+        if not isinstance(self.solver, Solver):
+            raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
+        try:
+            element_load(self.medium, self.solver.loads)
+        except ValueError as error:
+            raise ValueError(f"[numerics] {error}") from None
+        self._agree()
+        kinds = [type(e) for e in self.effects]
+        for effect in self.effects:
+            if kinds.count(type(effect)) > 1:
+                raise ValueError(f"[[effects]] {effect.kind} is asked for twice: keep one")
+            try:
+                effect.load(None, self.medium, self.body)
+            except ValueError as error:
+                raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
+
+    def _agree(self) -> None:
+        """ValueError if effects, or the body, say different things of the same swimmer."""
+        sized = self.body.length != 1.0
+        for what, said in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
+            said += [(e.kind, getattr(e, what)) for e in self.effects if hasattr(e, what)]
+            for name, value in said[1:]:
+                if np.any(np.asarray(value) != said[0][1]):
+                    raise ValueError(
+                        f"{said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}: it is one swimmer"
+                    )
+
+    joints = property(lambda self: self.body.joints)
+    length = property(lambda self: self.body.length)
+    frame = property(lambda self: getattr(self.body, "frame", "mean"))
+    mirror = property(lambda self: self.medium.mirror)
+    kinks = property(lambda self: self.medium.dry != ())
+    lacks = property(lambda self: rft.effects.broken(self.effects))
+    closed = property(lambda self: self.medium.dry is not None)
+    held = property(lambda self: sum(e.held for e in self.effects))
+
+    @property
+    def three_link(self) -> bool:
+        """Whether the body is the three-link swimmer, for which the published gaits were made."""
+        return isinstance(self.body, rft.Chain) and self.joints == 2
+
+    @property
+    def linear(self) -> bool:
+        return is_linear(self.medium) and not self.effects
+
+    @property
+    def engine(self) -> str:
+        """Of `rft.effects.ENGINES`, the cheapest that is right for the effects."""
+        return rft.effects.engine(self.effects)
+
+    @property
+    def settling(self) -> float:
+        place_matters = self.lacks & Premise.SE2_SYMMETRIC
+        runs_on = self.steps and self.solver.cycles is None and not place_matters
+        return max(e.settles for e in self.effects) if runs_on else 0.0
+
+    @property
+    def cut(self) -> int:
+        """Pieces to a body length that effects which vary along elements see: as asked for, or whole elements where these
+        are shorter; 0 without such effects."""
+        if not any(e.varies for e in self.effects):
+            return 0
+        return max(self.solver.pieces, int(np.ceil(0.5 / halves(self.body).max() - 1e-9)))
+
+    @property
+    def elements(self) -> int:
+        """Straight elements of the body, as its effects cut it."""
+        body = pieced(self.body, self.effects, self.solver.pieces)
+        for effect in self.effects:
+            body = effect.body(body)
+        return len(halves(body))
+
+    @property
+    def evaluations(self) -> int:
+        return self.elements * parse(self.solver.loads)[1]
+
+    @property
+    def costs_as(self) -> str:
+        return repr((self.medium, self.body, self.effects, self.solver.loads))
+
+    def in_frame(self, frame: str) -> Swimmer:
+        return dataclasses.replace(self, body=dataclasses.replace(self.body, frame=frame))
+
+    def _settings(self, *names: str) -> dict:
+        """Of the solver, and the effects, as rft takes them."""
+        names = ("loads", "regularisation", "pieces", *names)
+        return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
+
+    def solve(self, alpha, alphadot) -> rft.Solution:
+        """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. ValueError
+        if shape alone does not settle them."""
+        self.refuse("body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
+        return rft.body_velocity(self.medium, self.body, alpha, alphadot, **self._settings("tolerance"))
+
+    sample = solve
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) in the body's frame; RuntimeError if any sample did not converge."""
+        return self.solve(alpha, alphadot).checked().xi
+
+    def single(self, alpha, alphadot) -> dict:
+        s = self.solve(alpha, alphadot)
+        if str(s.status) == "unconverged":
+            raise ValueError("the force balance did not converge: raise [numerics] regularisation")
+        told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
+        return {"xi": s.xi.tolist(), **told}
+
+    def work(self, alpha, alphadot, xi) -> rft.Work:
+        """Power, internal moments and slip of a solution of `solve`; see `rft.work`."""
+        return rft.work(self.medium, self.body, alpha, alphadot, xi, **self._settings())
+
+    def march(self, alpha, alphadot, cycles: int | None, work: bool = False) -> rft.March:
+        """The gait phase after phase (`rft.march`), unchecked."""
+        return rft.march(
+            self.medium, self.body, alpha, alphadot, cycles=cycles, with_work=work, **self._settings("tolerance")
+        )
+
+    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
+        right. RuntimeError if a force balance did not converge or a march did not settle."""
+        speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
+        if not self.steps:
+            each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
+            solution = each.solve(alpha, alphadot).checked()
+            done = each.work(alpha, alphadot, solution.xi) if work else None
+            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
+        march = self.march(alpha, alphadot, self.solver.cycles, work).checked()
+        # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
+        repeats = not self.lacks & Premise.SE2_SYMMETRIC and (march.status == "settled").all()
+        net = displacement(march.xi) if repeats else march.displacement
+        to_come = march.drift if self.settles else 0.0 * speed
+        return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles, to_come)
+
+    def at_once(self, phases: int) -> int:
+        batched = [getattr(e, name) for e in self.effects for name in e.batched]
+        if any(map(np.ndim, batched)):
+            return sys.maxsize  # a parameter for each amplitude: they belong together
+        # A march has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
+        marched = 4 * self.elements + self.held // 8 if self.steps else 0
+        return max(1, VALUES_TOGETHER // max(phases * (self.joints + 6), marched))
+
+    def finer(self) -> Swimmer | None:
+        rule, _, count = self.solver.loads.partition(":")
+        finer = {"loads": "exact" if self.closed else f"{rule}:{2 * int(count)}"} if rule != "exact" else {}
+        if not self.linear:
+            finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
+        return self.with_solver(**finer) if finer else None
+
+    @property
+    def blames(self) -> str:
+        return ", ".join(e.kind for e in self.effects if e.breaks)
+
+    def blame(self, premises: Premise) -> str:
+        for effect in self.effects:
+            if effect.breaks & premises:
+                return f"the effect {effect.kind}, which is {not_so(effect.breaks)}"
+        return ""
+
+    def refuse(self, what: str, premises: Premise, instead: str) -> None:
+        super().refuse(what, premises, f"{instead}, or drop the effect")
+
+    def about(self) -> dict:
+        return {
+            "loads": self.solver.loads,
+            "regularisation": float(self.solver.regularisation),
+            "regularisation_unit": "body length rad-1",
+        }
+
+    def told(self) -> list[str]:
+        medium, body = (said(name_in(kinds, x), x) for kinds, x in ((LAWS, self.medium), (BODIES, self.body)))
+        lines = [f"{medium}, {body}"]
+        for effect in self.effects:
+            lines.append(
+                f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs "
+                f"{effect.cost}; gone at {effect.limit}, order {effect.order}"
+            )
+            if assumed := effect.assumes(self.medium):
+                lines.append(f"     assumes {assumed}")
+        off = [name for name in EFFECTS if name not in [e.kind for e in self.effects]]
+        return [*lines, "off, not evaluated: " + (", ".join(off) or "none")]
+
+    @property
+    def because(self) -> str:
+        broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in self.effects if e.breaks & SHAPE_ALONE]
+        reasons = [f"with {kind} the scene is {not_so(lost)}" for kind, lost in broken]
+        return f"({ENGINES[self.engine]}): " + ("; ".join(reasons) or "nothing remembers, places are alike, no mass")
+
+
+def said(kind: str, thing) -> str:
+    """What a part of a scene is and its numbers, as a scene has them."""
+    values = [f"{f.name} = {short(getattr(thing, f.name))}" for f in dataclasses.fields(thing)]
+    return f"{kind} ({', '.join(values)})" if values else kind
+
+
+def name_in(kinds: dict, thing) -> str:
+    """Its name in ``kinds``, or that of its class."""
+    return next((name for name, kind in kinds.items() if type(thing) is kind), type(thing).__name__)

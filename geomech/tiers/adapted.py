@@ -1,0 +1,36 @@
+"""The adapted tier: a connection made for one family of gaits, exact up to its table (`geomech.family`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech import family
+from geomech.systems.base import SHAPE_ALONE
+from geomech.tiers.base import Tier
+
+
+class Adapted(Tier):
+    """Asked for by name only: its table serves the scaled copies of one gait and no other."""
+
+    name, label = "adapted", "area integral, adapted CCF"
+    style = {"color": "#CC79A7", "linestyle": (0, (5, 1))}
+    rests_on = SHAPE_ALONE
+    needs = "adapted tier"
+    looks_up = "family"
+    plain = False
+    depends_on = ("curves", "phases")
+
+    def reach(self, gait, amplitudes):
+        a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
+        if (a < 0).any():
+            raise ValueError("the adapted tier takes amplitudes >= 0: use the direct tier below")
+        return gait, float(a.max(initial=0.0))
+
+    def table(self, system, numerics, *reach, progress=None):
+        return family.fit(system.velocity, *reach, numerics.curves, numerics.phases // 2, progress)
+
+    def solves(self, system, numerics, count, phases):
+        return numerics.curves * (numerics.phases // 2)
+
+    def predict(self, table, system, gait, amplitudes, numerics):
+        return table.area(np.asarray(gait.amplitude if amplitudes is None else amplitudes, float))

@@ -1,0 +1,114 @@
+"""What a tier is: a way to predict the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.errors import number, real_array
+from geomech.gaits import Gait
+from geomech.systems.base import ALL, SHAPE_ALONE, Premise, System
+
+WHOLE = {  # numbers of [numerics], from and to
+    "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
+    "harmonics": (1, 999), "curves": (4, 4096),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How finely tiers compute; all optional, and part of [numerics] beside the system's own. directions: of alphadot in
+    the least-squares fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on
+    either side. interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's
+    table."""
+
+    directions: int | None = None
+    grid: int = 31
+    extent: float = 2.5
+    interpolation: int = 3
+    phases: int = 256
+    harmonics: int = 15
+    curves: int = 24
+
+    def __post_init__(self):
+        number("extent", self.extent, 1e-6, 100)
+        for name, (low, high) in WHOLE.items():
+            if name != "directions" or self.directions is not None:
+                number(name, getattr(self, name), low, high, whole=True)
+        if self.harmonics % 2 == 0:
+            raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
+        if self.interpolation >= self.grid:
+            raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
+
+
+class Tier:
+    """Base of all tiers. name: in scenes, options and tables. label: for legends. style: of its line. rests_on: premises
+    without which it says nothing. needs: what these are lost for. joints: shape variables that it takes; offered: those
+    for which a plain study asks for it. looks_up: its table's name, of which tiers may share one, "" for none.
+    depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. whole: the table must have
+    no singular shapes. plain: a plain study asks for it.
+    """
+
+    name = "tier"
+    label = ""
+    style: dict = {}
+    rests_on = ALL
+    needs = "connection or CCF"
+    joints = offered = range(1, 10_001)
+    looks_up = ""
+    depends_on: tuple[str, ...] = ()
+    whole = False
+    plain = True
+
+    @property
+    def colour(self) -> str:
+        """Of its markers."""
+        return self.style["color"]
+
+    def refuse(self, system: System) -> None:
+        """ValueError if it says nothing of this system."""
+        system.refuse(self.needs, self.rests_on, "use the direct tier")
+        if system.joints not in self.joints:
+            raise ValueError(f"the {self.name} tier takes a body of two joints: use path, adapted or direct")
+        if self.whole and system.singularity is not None:
+            raise ValueError(
+                f"the {self.name} tier sums a field up, and the {system.kind} has singular shapes: use path or direct"
+            )
+
+    def takes(self, system: System) -> bool:
+        """Whether it says something of this system, and is worth asking."""
+        if system.joints not in self.offered or system.lacks & self.rests_on:
+            return False
+        return not (self.whole and system.singularity is not None)
+
+    def is_direct(self, system: System) -> bool:
+        """Whether it is the direct tier, for want of anything to look up."""
+        return not self.looks_up
+
+    def reach(self, gait: Gait, amplitudes) -> tuple:
+        """What of a gait the table depends on: nothing."""
+        return ()
+
+    def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None):
+        """What is computed once for a system; None for nothing."""
+
+    def solves(self, system: System, numerics: Numerics, count: int, phases: int) -> int:
+        """Velocities that it asks for in all: its cost, look-ups being cheap beside it."""
+        raise NotImplementedError
+
+    def predict(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray:
+        """Net poses (..., 3) for amplitudes (...,), or the gait's own."""
+        raise NotImplementedError
+
+
+def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
+    """f(some) (b, ...) for amplitudes (...,), at most ``size`` (or one) at a time, so that memory is bounded: (..., ...)."""
+    amplitudes = real_array("amplitudes", amplitudes)
+    flat, size = amplitudes.reshape(-1), max(1, size)
+    found = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
+    return np.concatenate(found).reshape(*amplitudes.shape, -1) if found else np.zeros((*amplitudes.shape, 3))
+
+
+__all__ = ["ALL", "SHAPE_ALONE", "Numerics", "Premise", "Tier", "in_groups"]

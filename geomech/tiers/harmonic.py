@@ -1,0 +1,32 @@
+"""The harmonic tier: the odd harmonics of the velocity in the direction of alphadot, looked up along the gait."""
+
+from __future__ import annotations
+
+from geomech import harmonics
+from geomech.tiers.path import Path, axes, path, shapes
+
+
+class Harmonic(Path):
+    """The path tier with what the velocity has beyond its linear part."""
+
+    name, label = "harmonic", "path integral, odd harmonics"
+    style = {"color": "#009E73", "linestyle": ":"}
+    joints = offered = range(2, 3)
+    looks_up = "harmonics"
+    depends_on = ("grid", "extent", "harmonics", "interpolation")
+    whole = True
+
+    def directions(self, system, numerics) -> int:
+        """Enough above the highest harmonic for folding to stay small."""
+        return max(24, (8 * numerics.harmonics) // 5)
+
+    def table(self, system, numerics, *reach, progress=None):
+        count, degree = self.directions(system, numerics), numerics.interpolation
+        grid = axes(system, numerics)
+        return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, highest=numerics.harmonics)
+
+    def solves(self, system, numerics, count, phases):
+        return shapes(system, numerics) * self.directions(system, numerics)
+
+    def predict(self, table, system, gait, amplitudes, numerics):
+        return path(system.velocity if self.is_direct(system) else table.velocity, gait, amplitudes, numerics.phases)

@@ -1,0 +1,63 @@
+"""The path tier: the fitted connection integrated along the gait."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech import connection
+from geomech.connection import Connection, Velocity
+from geomech.gaits import Gait
+from geomech.tiers.base import Tier
+from geomech.tiers.direct import direct
+
+LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+
+
+def path(fitted: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
+    """The fitted connection integrated along the gait, for amplitudes (...,) or the gait's own."""
+    return direct(fitted.velocity if isinstance(fitted, Connection) else fitted, gait, amplitudes, phases)
+
+
+def axes(system, numerics) -> tuple[np.ndarray, ...]:
+    """Of the field; ValueError if there is none, or one too large."""
+    system.refuse(Tier.needs, Tier.rests_on, "use the direct tier")
+    if numerics.grid**system.joints > LARGEST_GRID:
+        raise ValueError(
+            f"a field of {numerics.grid}^{system.joints} shapes is too large: lower [numerics] grid, or use "
+            "methods = direct, which needs no field"
+        )
+    return connection.grid(system.joints, numerics.grid, numerics.extent)
+
+
+def shapes(system, numerics) -> int:
+    """Of the field, that are solved."""
+    return numerics.grid**system.joints // (2 if system.mirror else 1)
+
+
+class Path(Tier):
+    """Looks the least-squares connection up. Where xi = A alphadot holds exactly it needs none, and is the direct tier."""
+
+    name, label = "path", "path integral of A"
+    style = {"color": "#0072B2", "linestyle": "-."}
+    offered = range(1, 4)  # no more joints than a grid can span
+    looks_up = "connection"
+    depends_on = ("grid", "extent", "directions", "interpolation")
+
+    def is_direct(self, system):
+        return system.linear
+
+    def directions(self, system, numerics) -> int:
+        """Of alphadot at each shape."""
+        return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
+
+    def table(self, system, numerics, *reach, progress=None):
+        return connection.fit(
+            system.velocity, axes(system, numerics), self.directions(system, numerics), numerics.interpolation,
+            progress, system.mirror, singularity=system.singularity,
+        )  # fmt: skip
+
+    def solves(self, system, numerics, count, phases):
+        return shapes(system, numerics) * self.directions(system, numerics)
+
+    def predict(self, table, system, gait, amplitudes, numerics):
+        return path(system.velocity if self.is_direct(system) else table, gait, amplitudes, numerics.phases)
