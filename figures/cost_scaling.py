@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from figures import main
-from geomech import connection, predict
+from geomech import connection
 from geomech.gaits import Circle
 from geomech.output import plots
+from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, body_velocity
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -46,7 +47,7 @@ def compute(scale: int = 1) -> dict:
         "directions": ([4, 8, 16, 32, 64], lambda n: connection.fit(_velocity, connection.grid(2, 31 // scale), n)),
         "phases": (
             [n // scale for n in (500, 2000, 8000, 32000)],
-            lambda n: predict.direct(_velocity, Circle(), phases=n),
+            lambda n: direct(_velocity, Circle(), phases=n),
         ),
     }
     out = {}

@@ -6,7 +6,6 @@ after the other and the cycle several times over until it repeats: that is what 
 
 from __future__ import annotations
 
-import dataclasses
 import time
 
 import numpy as np
@@ -43,11 +42,11 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
 
     cycles: of a march; None: as many as it takes to settle."""
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
-    scenes = {name: dataclasses.replace(fish, effects=effects) for name, effects in SETS.items()}
+    scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
     for again in range(repeats + 1):  # the first round warms up
         for name, scene in scenes.items():
-            if again != 1 and scene.engine != "algebraic":
+            if again != 1 and scene.system.engine != "algebraic":
                 continue  # long enough for one timing to tell, and nothing to warm up that the others have not
             start = time.perf_counter()
             runs[name] = scene.cycle(amplitudes=amplitudes, phases=phases)
@@ -57,7 +56,7 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
     return {
         name: {
             "ratio": float(np.median(np.array(taken) / plain[: len(taken)])),
-            "engine": scenes[name].engine,
+            "engine": scenes[name].system.engine,
             "cycles": runs[name].cycles,
         }
         for name, taken in seconds.items()

@@ -56,8 +56,10 @@ def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
         found["best"] = {k: v for k, v in best.items() if v is not None}
         if name.startswith("sandfish"):
             for key, (capped, kinematics, _, _) in ENDLESS.items():
-                cap = scene.effects[0] if capped else None
-                waves = [undulation.endless_sine(scene.medium, a, cap, kinematics=kinematics) for a in amplitudes]
+                cap = scene.system.effects[0] if capped else None
+                waves = [
+                    undulation.endless_sine(scene.system.medium, a, cap, kinematics=kinematics) for a in amplitudes
+                ]
                 found[key] = np.array(waves)
             found["animal"] = scene.gait.amplitude
             found["cycle"] = undulation.performance(scene, [scene.gait.amplitude])["velocity"][0]
@@ -69,7 +71,7 @@ def refined(scene: Scene, finer: int) -> Scene:
     """The scene with that many times its elements."""
     elements = finer * scene.gait.elements
     gait = dataclasses.replace(scene.gait, elements=elements)
-    return dataclasses.replace(scene, gait=gait, body=dataclasses.replace(scene.body, elements=elements))
+    return scene.changed(body=dataclasses.replace(scene.system.body, elements=elements), gait=gait)
 
 
 def optimum(amplitudes, values, sign: int) -> tuple[float, float] | None:

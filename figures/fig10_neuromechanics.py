@@ -21,8 +21,6 @@ the animals' data and is not made.
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from figures import main
@@ -49,10 +47,10 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
 
     def run(count, effects=()):
         gait = Sine(waves=count, amplitude=fish.gait.amplitude, elements=elements)
-        return undulation.activation(dataclasses.replace(fish, gait=gait, body=Backbone(elements), effects=effects))
+        return undulation.activation(fish.changed(body=Backbone(elements), effects=effects, gait=gait))
 
     keys = {"lag": "lag", "speed": "speed_ratio", "fundamental_speed": "fundamental_speed_ratio"}
-    plain, head = ([run(w, effects) for w in waves] for effects in ((), fish.effects))
+    plain, head = ([run(w, effects) for w in waves] for effects in ((), fish.system.effects))
     plain, head = ({k: np.array([r[old] for r in runs]) for k, old in keys.items()} for runs in (plain, head))
     one = run(1.0)
     return {"waves": np.array(waves), "s": one["s"], **plain, "one": one, "head": head}

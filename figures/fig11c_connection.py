@@ -7,14 +7,15 @@ import numpy as np
 from figures import main
 from geomech.output import plots
 from geomech.scene import load
+from geomech.study.bench import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
     """The connection on its grid, and the rms misfit of the linear fit over the rms velocity, per component (3,)."""
     loaded = load(scene).with_numerics(**numerics)
-    fitted = loaded.fitted
+    fitted = Study(loaded).fitted
     misfit = np.sqrt((fitted.residual**2).mean((1, 2)) / (fitted.speed**2).mean((1, 2)))
-    return {"connection": fitted, "misfit": misfit, "gait": loaded.gait, "unit": loaded.unit}
+    return {"connection": fitted, "misfit": misfit, "gait": loaded.gait, "unit": loaded.system.unit}
 
 
 @plots.styled

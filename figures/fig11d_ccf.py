@@ -6,13 +6,15 @@ from figures import main
 from geomech.gaits import Butterfly
 from geomech.output import plots
 from geomech.scene import load
+from geomech.study.bench import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
     """The CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
     loaded = load(scene).with_numerics(**numerics)
-    fields = {"ccf": loaded.curvature, "error": loaded.curvature_error}
-    return {**fields, "gaits": [loaded.gait, Butterfly()], "unit": loaded.unit}
+    study = Study(loaded)
+    fields = {"ccf": study.curvature, "error": study.curvature_error}
+    return {**fields, "gaits": [loaded.gait, Butterfly()], "unit": loaded.system.unit}
 
 
 @plots.styled

@@ -8,17 +8,19 @@ import numpy as np
 from figures import main
 from geomech.gaits import Butterfly, Circle
 from geomech.output import plots
-from geomech.scene import METHODS, load
+from geomech.scene import load
+from geomech.study.bench import METHODS, Study
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
 AMPLITUDES = {"circle": np.linspace(0.125, 2.25, 18), "butterfly": np.linspace(0.1, 1.3, 13)}
 
 
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
-    """For each gait a table as `Scene.study` gives it."""
+    """For each gait a table as `Study.study` gives it."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
-    tables = {name: loaded.study(a, METHODS, GAITS[name]) for name, a in amplitudes.items()}
-    return {"tables": tables, "unit": loaded.unit}
+    study = Study(loaded)
+    tables = {name: study.study(a, METHODS, GAITS[name]) for name, a in amplitudes.items()}
+    return {"tables": tables, "unit": loaded.system.unit}
 
 
 @plots.styled

@@ -7,8 +7,6 @@ over that without the effect, against the travel over the wave's amplitude A. Ri
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from figures import main
@@ -28,11 +26,10 @@ def compute(shares=SHARES, elements: int = 100, phases: int = 96) -> dict:
     xi_x at the animal's amplitude, body lengths per rad."""
     fish = load("sandfish-loose")
     scenes = [
-        dataclasses.replace(
-            fish,
+        fish.changed(
             body=Backbone(elements),
-            gait=Sine(amplitude=a, elements=elements),
             effects=(Transient(travel=share * a * float(Sine().wavelength(a))),),
+            gait=Sine(amplitude=a, elements=elements),
         )
         for a in AMPLITUDES
         for share in shares

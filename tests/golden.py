@@ -28,11 +28,13 @@ import rft
 from geomech import cli
 from geomech import scene as scenes
 from geomech.gaits import Ellipse
+from geomech.study.bench import Study
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
 TOLERANCE, OF_ESTIMATES = 1e-12, 1e-8  # relative, of the largest number of an entry
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
 COARSE = {"regularisation": 1e-3, "tolerance": 1e-13, "grid": 7, "phases": 32, "curves": 6, "harmonics": 5, "cycles": 2}
+GEOMETRY = ("grid", "phases", "curves", "harmonics")
 SCENE = """[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8
 [body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\nlength = 0.3\nframe = "link-1"
 [gait]\nkind = "ellipse"\nsemi_axes = [1.0, 0.6]\ntilt = 0.4\ncentre = [0.3, -0.2]
@@ -60,10 +62,12 @@ def velocities():
 
 def tiers():
     for name in scenes.builtin_names():
-        scene = scenes.load(name).with_numerics(**COARSE)
+        scene = scenes.load(name)
+        own = COARSE if scene.system.solver else {k: v for k, v in COARSE.items() if k in GEOMETRY}
+        study = Study(scene.with_numerics(**own))
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
-        for tier in scene.tiers:
-            yield f"tier, {name}, {tier}", scene.displacement(tier, None, amplitudes)
+        for tier in study.tiers:
+            yield f"tier, {name}, {tier}", study.displacement(tier, None, amplitudes)
 
 
 def marches():

@@ -3,6 +3,7 @@
 import math
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
+from geomech.systems import NoSlipSnake, Swimmer
 from rft import (
     Backbone,
     BodyInertia,
@@ -52,6 +53,11 @@ GAITS = {
     "backwards": Butterfly(reverse=True),
     "fourier": Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0))),
     "points": Points(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9))),
+}
+
+SYSTEMS = {
+    "swimmer": Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, BODIES["uneven"]),
+    "no-slip-snake": NoSlipSnake((0.8, 1.3, 1.0), length=0.4, frame="link-1"),
 }
 
 # name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)

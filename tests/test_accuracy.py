@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from figures import cost_scaling, work_precision
-from geomech import connection, predict
+from geomech import connection
 from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.study import accuracy
+from geomech.study.bench import Study
+from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
 
@@ -70,10 +72,10 @@ def test_families_are_of_order_four_where_nothing_kinks():
     viscous = scenes.load("three-link-viscous")
     counts = np.array([8, 16, 32, 64])
     a = np.linspace(0.0, 1.5, 2001)[1:]
-    exact = predict.direct(viscous.velocity, Circle(), a)
+    exact = direct(viscous.system.velocity, Circle(), a)
     errors = []
     for n in counts:
-        adapted = viscous.with_numerics(curves=int(n)).displacement("adapted", Circle(), a)
+        adapted = Study(viscous.with_numerics(curves=int(n))).displacement("adapted", Circle(), a)
         errors.append(np.abs(adapted - exact).max())
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
 
@@ -81,8 +83,8 @@ def test_families_are_of_order_four_where_nothing_kinks():
 def test_phases_are_spectral_where_nothing_kinks():
     swimmer = lambda a, d: body_velocity(Viscous(2.0), Chain(), a, d).xi
     gait = Ellipse(centre=(0.4, 0.2), semi_axes=(1.0, 0.8))
-    exact = predict.direct(swimmer, gait, phases=256)
-    errors = [np.abs(predict.direct(swimmer, gait, phases=n) - exact).max() for n in (8, 16, 32, 64)]
+    exact = direct(swimmer, gait, phases=256)
+    errors = [np.abs(direct(swimmer, gait, phases=n) - exact).max() for n in (8, 16, 32, 64)]
     assert errors[1] < errors[0] / 30
     assert errors[2] < errors[1] / 300
     assert errors[3] < 1e-15
@@ -92,8 +94,8 @@ def test_phases_are_of_order_two_across_kinks():
     """Averaged over gaits, since where a kink falls between two phases is chance."""
     glass = scenes.load("three-link-glass")
     radii, counts = np.linspace(0.4, 2.0, 25), np.array([32, 64, 128, 256, 512])
-    exact = predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, 4096)
-    off = [predict.direct(glass.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact for n in counts]
+    exact = direct(glass.system.velocity, Circle(centre=(0.2, 0.1)), radii, 4096)
+    off = [direct(glass.system.velocity, Circle(centre=(0.2, 0.1)), radii, n) - exact for n in counts]
     errors = [np.exp(np.log(np.linalg.norm(x, axis=-1)).mean()) for x in off]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.25)
 

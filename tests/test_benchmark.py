@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from geomech import connection, predict
+from geomech import connection
 from geomech.gaits import Circle
+from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, body_velocity
 
 pytestmark = pytest.mark.benchmark
@@ -83,13 +84,13 @@ def test_direct_tier_of_a_circle_to_four_digits():
     swimmer = lambda a, d: body_velocity(GLASS, Chain(), a, d).xi
     for radius in (0.5, 1.0, 1.75):
         gait, n = Circle(amplitude=radius), 16
-        truth = predict.direct(swimmer, gait, phases=4096)
-        while np.linalg.norm(predict.direct(swimmer, gait, phases=n) - truth) > 1e-4:
+        truth = direct(swimmer, gait, phases=4096)
+        while np.linalg.norm(direct(swimmer, gait, phases=n) - truth) > 1e-4:
             n *= 2
         times = []
         for _ in range(20):
             start = time.perf_counter()
-            predict.direct(swimmer, gait, phases=n)
+            direct(swimmer, gait, phases=n)
             times.append(time.perf_counter() - start)
         print(f"\ncircle of {radius} rad to 1e-4: {n} phases, {1e3 * np.median(times):.1f} ms", end="")
         assert n <= 128

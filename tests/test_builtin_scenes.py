@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from geomech import scene as scenes
+from geomech.study.bench import Study
 from rft import CATALOGUE
 
 # Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's own numerics.
 PINNED = {
     "butterfly-glass": (0.267792218, 0.0, 0.0),
+    "no-slip-snake": (0.110055635, 0.0210151860, 0.0),
     "sandfish-close": (0.277242251, -0.0855674831, 0.0),
     "sandfish-heavy": (0.353167793, -0.087359391, 0.0),
     "sandfish-loose": (0.354014795, -0.0870573091, 0.0),
@@ -27,7 +29,7 @@ PINNED = {
 
 @pytest.mark.parametrize("name", scenes.builtin_names())
 def test_displacement_is_pinned(name):
-    found, wanted = scenes.load(name).displacement("direct"), np.array(PINNED[name])
+    found, wanted = Study(scenes.load(name)).displacement("direct"), np.array(PINNED[name])
     # Where drag builds up, 64 phases and pieces of 1 / 100 leave some 1e-3, whose digits are the scheme's.
     fine = 5e-4 if name == "sandfish-transient" else 2e-5
     np.testing.assert_allclose(found, wanted, atol=fine * np.abs(wanted).max())
@@ -36,15 +38,15 @@ def test_displacement_is_pinned(name):
 def test_constants_of_the_scenes():
     """What a displacement shows only weakly: the mass of Sec. II C, and a fifth of the wave's amplitude (Sec. IV A)."""
     heavy, slowed = scenes.load("sandfish-heavy"), scenes.load("sandfish-transient")
-    mass = heavy.effects[1]
+    mass = heavy.system.effects[1]
     assert (mass.mass, mass.frequency, mass.length, mass.drag) == (0.016, 3.0, 0.1, 2.1)
     assert mass.inertia == pytest.approx(0.016 * 0.1 * (6 * math.pi) ** 2 / 2.1, rel=1e-12)
     # Eq. 2: 2 k rho g r |z| L with the numbers beside it in the scene.
     assert mass.drag == pytest.approx(2 * 2.5 * 1450 * 9.81 * 0.006 * 0.05 * 0.1, rel=0.02)
-    skin = scenes.load("shovel-nosed-snake").effects[0]  # this snake never slides backwards
+    skin = scenes.load("shovel-nosed-snake").system.effects[0]  # this snake never slides backwards
     assert (skin.forward, skin.backward, skin.reference) == (0.109, 0.137, 0.2)
     wave = 0.22 * float(slowed.gait.wavelength())
-    assert slowed.effects[1].travel == pytest.approx(wave / 5, rel=0.01)
+    assert slowed.system.effects[1].travel == pytest.approx(wave / 5, rel=0.01)
 
 
 # C and tan^2(gamma0) of Eq. 3, or the ratio of a viscous medium; axial stress, Pa.

@@ -16,6 +16,7 @@ from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
+from geomech.study.bench import Study
 from rft import Backbone
 
 ROOT = pathlib.Path(__file__).parents[1]
@@ -98,15 +99,15 @@ def test_order_along_the_body(kind, tmp_path):
 def sandfish():
     """The built-in sandfish with fewer elements, and its displacement."""
     full = scenes.load("sandfish-loose").with_numerics(phases=64)
-    made = dataclasses.replace(full, body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS))
-    return made, made.displacement("direct")
+    made = full.changed(body=Backbone(ELEMENTS), gait=Sine(amplitude=0.2, elements=ELEMENTS))
+    return made, Study(made).displacement("direct")
 
 
 @pytest.mark.parametrize("kind", HEADERS)
 def test_displacement_is_that_of_the_sine(kind, sandfish, tmp_path):
     made, exact = sandfish
     measured = gait(write(tmp_path, kind, count=64, places=80, amplitude=0.2))
-    np.testing.assert_allclose(made.displacement("direct", measured), exact, atol=1e-5)
+    np.testing.assert_allclose(Study(made).displacement("direct", measured), exact, atol=1e-5)
     assert exact[0] > 0.3
 
 
@@ -120,7 +121,7 @@ def test_smoothing_recovers_the_displacement(kind, noise, sandfish, tmp_path):
     ]
 
     def error(**options):
-        poses = np.array([made.displacement("direct", gait(path, **options)) for path in paths])
+        poses = np.array([Study(made).displacement("direct", gait(path, **options)) for path in paths])
         return np.sqrt(np.mean((poses - exact)[:, :2] ** 2) * 2)
 
     plain = error()
@@ -260,7 +261,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path / "elsewhere", env=surroundings)
     assert (done.returncode, done.stderr) == (0, "")
     made = scenes.load(toml)
-    sine = made.displacement("direct", Sine(amplitude=0.1, elements=ELEMENTS))
+    sine = Study(made).displacement("direct", Sine(amplitude=0.1, elements=ELEMENTS))
     assert float(done.stdout.splitlines()[2].split()[1]) == pytest.approx(np.hypot(*sine[:2]), abs=2e-5)
     with pytest.raises(SceneError, match="cannot read"):
         scenes.parse(toml.read_text())

@@ -18,6 +18,7 @@ from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.output import plots
 from geomech.study import accuracy, cost, estimate, sweep
+from geomech.study.bench import Study
 from rft.newton import Balance
 
 GLASS = scenes.load("three-link-glass")
@@ -54,9 +55,9 @@ def solved(monkeypatch):
     ],
 )
 def test_the_balances_foretold_are_those_solved(scene, methods, solved):
-    foretold = scene.cost([0.1, 0.2, 0.3], methods).balances
+    foretold = Study(scene).cost([0.1, 0.2, 0.3], methods).balances
     solved.clear()  # of a pilot
-    scene.study([0.1, 0.2, 0.3], methods)
+    Study(scene).study([0.1, 0.2, 0.3], methods)
     assert foretold == pytest.approx(sum(solved), rel=0.02)  # half of a grid, and its middle
 
 
@@ -154,15 +155,16 @@ def test_pieces_change_no_numbers(monkeypatch):
     amplitudes = np.linspace(0.3, 1.4, 7)
 
     def everything():
-        fresh = scene.with_numerics(grid=7)
+        fresh = Study(scene.with_numerics(grid=7))
         tiers = [fresh.displacement(m, None, amplitudes) for m in ("area", "adapted", "path", "harmonic", "direct")]
-        fields = fresh.fitted.A, fresh.fitted.residual, fresh.fitted.speed, fresh.harmonics.residual
-        marched = SLOPING.with_numerics(phases=16, cycles=2).displacement("direct", None, amplitudes / 5)
-        return [*tiers, *fields, marched, *estimate.direct(fresh, fresh.gait, amplitudes, 32)]
+        fields = fresh.fitted.A, fresh.fitted.residual, fresh.fitted.speed, fresh.table("harmonic").residual
+        marched = Study(SLOPING.with_numerics(phases=16, cycles=2)).displacement("direct", None, amplitudes / 5)
+        return [*tiers, *fields, marched, *estimate.direct(scene, scene.gait, amplitudes, 32)]
 
     whole = everything()
-    monkeypatch.setattr("geomech.scene.model.VALUES_TOGETHER", 1)
-    for module in (connection, sys.modules["geomech.predict"], sys.modules["geomech.family"]):
+    monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
+    for module in (connection, *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "family"))):
         monkeypatch.setattr(module, "SAMPLES_TOGETHER", 17)
     monkeypatch.setattr(harmonics, "VALUES_TOGETHER", 23)
     for a, b in zip(whole, everything(), strict=True):
@@ -185,7 +187,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     rows, calls = sweep._rows, []
 
     def stopping(at, amplitudes):
-        calls.append((at[0].medium.ratio, len(amplitudes)))
+        calls.append((at[0].system.medium.ratio, len(amplitudes)))
         if len(calls) == 5:
             raise cli.Stopped(signal.SIGTERM)
         return rows(at, amplitudes)

@@ -10,17 +10,20 @@ import xarray
 from geomech import connection, curvature, symbolic
 from geomech import scene as scenes
 from geomech.output import netcdf
+from geomech.study.bench import Study
+from geomech.tiers import TIERS
 from rft import se2
 
 GLASS = scenes.load("three-link-glass")
+BENCH = Study(GLASS)
 
 
 def local(scene, shapes, h=2e-4):
     """The CCF (..., 3) of the scene's own fit at shapes (..., 2), by differences over 2 h of A solved there."""
-    unit = connection.directions(2, scene.direction_count)
+    unit = connection.directions(2, TIERS["path"].directions(scene.system, scene.numerics))
 
     def A(alpha):
-        return np.einsum("jc,...ci->...ij", np.linalg.pinv(unit), scene.velocity(alpha[..., None, :], unit))
+        return np.einsum("jc,...ci->...ij", np.linalg.pinv(unit), scene.system.velocity(alpha[..., None, :], unit))
 
     d1, d2 = ((A(shapes + step) - A(shapes - step)) / (2 * h) for step in h * np.eye(2))
     here = A(shapes)
@@ -56,10 +59,11 @@ def test_the_error_of_the_ccf_covers_the_truth(name, numerics, least, most):
     """At random grid points, each component, in a share of ``least``; and in the median by no more than ``most`` errors."""
     scene, rng = scenes.load(name).with_numerics(**numerics), np.random.default_rng(4)
     i, j = rng.integers(0, scene.numerics.grid, (2, 300))
-    axes = scene.fitted.axes
+    study = Study(scene)
+    axes = study.fitted.axes
     truth = local(scene, np.stack([axes[0][i], axes[1][j]], -1)).T
-    estimate = scene.curvature_error.values[:, i, j]
-    error = np.abs(scene.curvature.values[:, i, j] - truth)
+    estimate = study.curvature_error.values[:, i, j]
+    error = np.abs(study.curvature.values[:, i, j] - truth)
     assert ((error <= estimate + 1e-12).mean(1) >= least).all()
     assert (np.median(estimate / np.maximum(error, 1e-16), 1) <= most).all()
 
@@ -68,9 +72,9 @@ def test_wrong_signs_near_kinks_are_known_to_be_unknown():
     """Where the default grid gives the turn a sign that the local derivative does not have, the error says so; likewise at
     (-1, -5/6), beside a kink, where the sign is right."""
     assert GLASS.numerics.grid == 31
-    shapes = np.stack(np.meshgrid(*GLASS.fitted.axes, indexing="ij"), -1)[1:-1, 1:-1]
+    shapes = np.stack(np.meshgrid(*BENCH.fitted.axes, indexing="ij"), -1)[1:-1, 1:-1]
     truth = np.moveaxis(local(GLASS, shapes), -1, 0)
-    field, error = (x.values[:, 1:-1, 1:-1] for x in (GLASS.curvature, GLASS.curvature_error))
+    field, error = (x.values[:, 1:-1, 1:-1] for x in (BENCH.curvature, BENCH.curvature_error))
     wrong = (field * truth < 0) & (np.minimum(np.abs(field), np.abs(truth)) > 0.003)
     assert wrong[2].sum() >= 8
     assert (error > np.abs(field))[wrong].all()
@@ -81,25 +85,26 @@ def test_wrong_signs_near_kinks_are_known_to_be_unknown():
 
 def test_the_smallest_grid_has_an_error_too():
     small = GLASS.with_numerics(grid=4)
-    assert np.isfinite(small.curvature_error.values).all()
-    assert small.curvature_error.values.max() > 0.01
+    assert np.isfinite(Study(small).curvature_error.values).all()
+    assert Study(small).curvature_error.values.max() > 0.01
 
 
 @pytest.mark.parametrize(("length", "unit"), [(1.0, "body length"), (0.4, "m")])
 def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     """All of the file against the objects: an uneven body in a frame of its own, off the defaults."""
-    body = dataclasses.replace(GLASS.body, lengths=(1, 2, 3), length=length, frame="link-2")
-    scene = dataclasses.replace(GLASS, body=body).with_numerics(grid=7, extent=2.0, regularisation=1e-5)
-    netcdf.save_connection(tmp_path / "a.nc", scene)
+    body = dataclasses.replace(GLASS.system.body, lengths=(1, 2, 3), length=length, frame="link-2")
+    scene = GLASS.changed(body=body).with_numerics(grid=7, extent=2.0, regularisation=1e-5)
+    study = Study(scene)
+    netcdf.save_connection(tmp_path / "a.nc", study)
     per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
     per2 = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         for name, values, units in (
-            ("A", scene.fitted.A, per),
-            ("fit_residual", scene.fitted.residual, per),
-            ("ccf", scene.curvature.values, per2),
-            ("ccf_error", scene.curvature_error.values, per2),
-            ("alpha_2", scene.fitted.axes[1], "rad"),
+            ("A", study.fitted.A, per),
+            ("fit_residual", study.fitted.residual, per),
+            ("ccf", study.curvature.values, per2),
+            ("ccf_error", study.curvature_error.values, per2),
+            ("alpha_2", study.fitted.axes[1], "rad"),
         ):
             np.testing.assert_array_equal(data[name], values)
             assert data[name].attrs["units"] == units

@@ -13,6 +13,7 @@ from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.output.explain import explain
+from geomech.study.bench import Study
 from rft import (
     CATALOGUE,
     Backbone,
@@ -63,7 +64,7 @@ def test_effects_say_what_they_are(name):
     # Of a balance the body cut in pieces has its own rounding.
     np.testing.assert_allclose(run(at_its_limit(effect)), run(), atol=1e-7)
     assert np.abs(run(effect) - run()).max() > 1e-3
-    told = explain(dataclasses.replace(SANDFISH, effects=(effect,)))
+    told = explain(SANDFISH.changed(effects=(effect,)))
     assert f"; costs {effect.cost}; gone at {effect.limit}, order {effect.order}" in told
     assert f"; {not_so(effect.breaks) or 'keeps every premise'};" in told
     assert len(effect.cost) > 10
@@ -181,11 +182,11 @@ def test_effects_that_are_off_are_not_evaluated(monkeypatch, name):
             original = getattr(kind, part)
             counted = lambda self, *a, f=original: calls.append(type(self)) or f(self, *a)
             monkeypatch.setattr(kind, part, counted)
-    small = dataclasses.replace(SANDFISH, effects=(), body=Backbone(12), gait=Sine(elements=12))
+    small = SANDFISH.changed(effects=(), body=Backbone(12), gait=Sine(elements=12))
     small.cycle(phases=16, work=True)
     assert calls == []
     effect = EFFECTS[name][0](0.01)
-    dataclasses.replace(small, effects=(effect,)).with_numerics(cycles=1).cycle(phases=16)
+    small.changed(effects=(effect,)).with_numerics(cycles=1).cycle(phases=16)
     assert set(calls) == {type(effect)}
 
 
@@ -315,23 +316,25 @@ INERTIAL = (
 
 def test_with_grain_inertia_frequency_matters():
     slow, fast = (scenes.parse(INERTIAL.format(f=f)) for f in (0.01, 3.0))
-    plain = scenes.load("three-link-glass").displacement("direct")
-    np.testing.assert_allclose(slow.displacement("direct"), plain, atol=1e-4)
-    assert np.abs(fast.displacement("direct") - plain).max() > 5e-3
+    plain = Study(scenes.load("three-link-glass")).displacement("direct")
+    np.testing.assert_allclose(Study(slow).displacement("direct"), plain, atol=1e-4)
+    assert np.abs(Study(fast).displacement("direct") - plain).max() > 5e-3
     alpha, alphadot = fast.gait.cycle(16)
-    twice = fast.velocity(alpha, 2 * alphadot) / 2
-    assert np.abs(twice - fast.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
+    twice = fast.system.velocity(alpha, 2 * alphadot) / 2
+    assert np.abs(twice - fast.system.velocity(alpha, alphadot)).max() > 1e-3  # time is not the swimmer's own any more
 
 
 @pytest.mark.parametrize("method", ["area", "path", "harmonic"])
 def test_what_an_effect_breaks_is_refused_by_name(method):
     inertial = scenes.parse(INERTIAL.format(f=1.0))
-    assert inertial.methods == ("direct",)
+    assert Study(inertial).methods == ("direct",)
     with pytest.raises(SceneError, match="the effect grain-inertia, which is not rate-independent"):
-        inertial.displacement(method)
+        Study(inertial).displacement(method)
     assert "; not rate-independent; costs" in explain(inertial)
     assert "not available: connection, CCF" in explain(inertial)
-    np.testing.assert_allclose(inertial.displacement("adapted"), inertial.displacement("direct"), atol=1e-3)
+    np.testing.assert_allclose(
+        Study(inertial).displacement("adapted"), Study(inertial).displacement("direct"), atol=1e-3
+    )
 
 
 def test_transients_draw(tmp_path):
@@ -363,7 +366,7 @@ def test_the_cost_of_effects_draws(tmp_path):
 def test_a_body_that_comes_to_the_surface_is_refused():
     text = SANDFISH.text.partition("[[effects]]")[0] + '[[effects]]\nkind = "depth-profile"\nslope = 10.0\n'
     with pytest.raises(ValueError, match="comes to the surface: lower the slope"):
-        scenes.parse(text).displacement("direct")
+        Study(scenes.parse(text)).displacement("direct")
 
 
 PAST = {
@@ -377,19 +380,19 @@ PAST = {
 @pytest.mark.parametrize("name", PAST)
 def test_what_a_march_cannot_give_is_refused_by_name(name):
     swimmer = scenes.parse(f'{scenes.load("three-link-glass").text}\n[[effects]]\nkind = "{name}"\n{PAST[name]}\n')
-    assert swimmer.tiers == swimmer.methods == ("direct",)
+    assert Study(swimmer).tiers == Study(swimmer).methods == ("direct",)
     for asked in (
-        lambda: swimmer.displacement("area"),
-        lambda: swimmer.displacement("path"),
-        lambda: swimmer.displacement("harmonic"),
-        lambda: swimmer.displacement("adapted"),
-        lambda: swimmer.connection(),
-        lambda: swimmer.velocity([0.1, 0.2], [1.0, 0.0]),
+        lambda: Study(swimmer).displacement("area"),
+        lambda: Study(swimmer).displacement("path"),
+        lambda: Study(swimmer).displacement("harmonic"),
+        lambda: Study(swimmer).displacement("adapted"),
+        lambda: Study(swimmer).fitted,
+        lambda: swimmer.system.velocity([0.1, 0.2], [1.0, 0.0]),
     ):
-        with pytest.raises(SceneError, match=f"with the effect {name}, which is not .*: .*, or drop the effect"):
+        with pytest.raises(ValueError, match=f"with the effect {name}, which is not .*: .*, or drop the effect"):
             asked()
     told = explain(swimmer)
-    assert f"engine: {swimmer.engine}" in told
+    assert f"engine: {swimmer.system.engine}" in told
     assert f"with {name} " in told
     assert (
         f"not available: connection, CCF, area, path and harmonic tiers, adapted tier, velocity at a single shape: {name}"

@@ -10,6 +10,7 @@ import pytest
 
 from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks
 from geomech.scene import load
+from geomech.study.bench import Study
 from rft import Granular
 
 
@@ -42,7 +43,7 @@ def test_fig11c(tmp_path):
 def test_the_misfit_of_the_plane_in_loose_glass(tmp_path):
     """26 to 33 % rms of each component in the middle-link frame."""
     glass = load("three-link-glass").with_numerics(directions=24)
-    fitted = dataclasses.replace(glass, body=dataclasses.replace(glass.body, frame="link-2")).fitted
+    fitted = Study(glass.changed(body=dataclasses.replace(glass.system.body, frame="link-2"))).fitted
     misfit = np.sqrt((fitted.residual**2).mean((1, 2)) / (fitted.speed**2).mean((1, 2)))
     assert misfit.min() == pytest.approx(0.26, abs=0.005)
     assert misfit.max() == pytest.approx(0.33, abs=0.005)
@@ -55,8 +56,8 @@ def test_fig11d(tmp_path):
     # Left and right are alike, and the field is computed by half: here every shape of a smaller one is solved.
     lopsided = type("Lopsided", (Granular,), {"mirror": False})
     small = load("three-link-glass").with_numerics(grid=8, extent=2.0)
-    whole = dataclasses.replace(small, medium=lopsided(small.medium.C, small.medium.gamma0)).curvature.values
-    np.testing.assert_allclose(whole, small.curvature.values, atol=1e-6)
+    whole = Study(small.changed(medium=lopsided(small.system.medium.C, small.system.medium.gamma0))).curvature.values
+    np.testing.assert_allclose(whole, Study(small).curvature.values, atol=1e-6)
     np.testing.assert_allclose(whole[:, ::-1, ::-1], whole * np.array([1, -1, -1])[:, None, None], atol=1e-6)
     assert np.abs(whole).max((1, 2)).min() > 0.01
     assert numbers["ccf"].values.shape == (3, 31, 31)

@@ -7,9 +7,12 @@ import pytest
 import sympy as sp
 from registry import GAITS, MEDIA
 
-from geomech import connection, coordinates, curvature, predict, reconstruct, symbolic
+from geomech import connection, coordinates, curvature, reconstruct, symbolic
 from geomech.field import Field
 from geomech.gaits import Circle, Ellipse, Fourier
+from geomech.tiers.area import area
+from geomech.tiers.direct import direct
+from geomech.tiers.path import path
 from rft import Chain, Serpenoid, Viscous, body_velocity, se2
 from rft.symbolic import viscous_chain
 
@@ -130,7 +133,7 @@ def test_small_loops_follow_the_ccf_of_their_joints(i, j):
     waves[0, i], waves[1, j] = 1.0, 0.7
     size = 1e-3
     loop = Fourier(amplitude=size, centre=tuple(centre), cos=waves[0], sin=waves[1])
-    moved = predict.direct(solve, loop, phases=64)
+    moved = direct(solve, loop, phases=64)
     # From the loop's start, a displacement of order 1 in its size away from where the density is taken.
     start = fitted(centre)[:, i] * size
     moved = se2.compose(se2.compose(se2.exp(start), moved), se2.inverse(se2.exp(start)))
@@ -141,18 +144,18 @@ def test_small_loops_follow_the_ccf_of_their_joints(i, j):
 def test_small_circles_follow_the_ccf():
     """|displacement| -> 5 (r - 1) / 243 times the area."""
     for ratio in (2.0, 4.0):
-        g = predict.direct(viscous("link-2", ratio), Circle(), [0.01, 0.001])
+        g = direct(viscous("link-2", ratio), Circle(), [0.01, 0.001])
         limit = 5 * (ratio - 1) / 243 * np.pi * np.array([0.01, 0.001]) ** 2
         np.testing.assert_allclose(np.hypot(g[:, 0], g[:, 1]), limit, rtol=2e-4)
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3"])
 def test_unit_circle_in_every_frame(frame):
-    g = predict.direct(viscous(frame), Circle())
+    g = direct(viscous(frame), Circle())
     assert np.hypot(g[0], g[1]) == pytest.approx(0.0512808243, abs=5e-11)
     fitted = connection.fit(viscous(frame), connection.grid(2, 61, 1.2), degree=5)
-    path = predict.path(fitted, Circle())
-    assert np.hypot(path[0], path[1]) == pytest.approx(0.0512808243, abs=1e-8)
+    looked_up = path(fitted, Circle())
+    assert np.hypot(looked_up[0], looked_up[1]) == pytest.approx(0.0512808243, abs=1e-8)
 
 
 def slope(x, y):
@@ -165,10 +168,10 @@ def test_area_tier_is_of_order_three_in_a_generic_frame(centre, frame, order):
     ccf = curvature.ccf(fitted)
     sizes = np.geomspace(0.01, 0.05, 7)
     gait = Ellipse(centre=centre, semi_axes=(1.0, 0.7), tilt=0.3)
-    error = np.linalg.norm(predict.area(ccf, gait, sizes) - predict.path(viscous(frame), gait, sizes), axis=-1)
+    error = np.linalg.norm(area(ccf, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1)
     assert slope(sizes, error) == pytest.approx(order, abs=0.1)
     wrong = Field(fitted.axes, curvature.exterior_derivative(fitted) - curvature.lie_bracket(fitted), 5)
-    error = np.linalg.norm(predict.area(wrong, gait, sizes) - predict.path(viscous(frame), gait, sizes), axis=-1)
+    error = np.linalg.norm(area(wrong, gait, sizes) - path(viscous(frame), gait, sizes), axis=-1)
     assert slope(sizes, error) == pytest.approx(2.0, abs=0.1)  # the test can tell the bracket's sign
 
 
@@ -176,20 +179,20 @@ def test_area_counts_winding_numbers():
     """A figure-eight cancels, a circle run twice counts twice, a reversed gait counts against."""
     ones = np.ones((3, 31, 31)) * np.array([0.01, 0.0, 0.0])[:, None, None]
     ccf = Field(connection.grid(2, 31, 2.5), ones)
-    circle = predict.area(ccf, Circle())
+    circle = area(ccf, Circle())
     assert circle[0] == pytest.approx(0.01 * np.pi, rel=1e-12)
     eight = Fourier(cos=((0.0, 0.0), (0.0, 0.0)), sin=((1.0, 0.0), (0.0, 1.0)))
     twice = Fourier(cos=((0.0, 1.0), (0.0, 0.0)), sin=((0.0, 0.0), (0.0, 1.0)))
-    assert predict.area(ccf, eight)[0] == pytest.approx(0.0, abs=1e-15)
-    assert predict.area(ccf, twice)[0] == pytest.approx(2 * circle[0], rel=1e-12)
-    assert predict.area(ccf, Circle(reverse=True))[0] == pytest.approx(-circle[0], rel=1e-12)
+    assert area(ccf, eight)[0] == pytest.approx(0.0, abs=1e-15)
+    assert area(ccf, twice)[0] == pytest.approx(2 * circle[0], rel=1e-12)
+    assert area(ccf, Circle(reverse=True))[0] == pytest.approx(-circle[0], rel=1e-12)
 
 
 def test_leaving_the_field_is_an_error_that_names_the_angle():
     fitted = connection.fit(MIDDLE, connection.grid(2, 11, 1.0))
     for tier in (
-        lambda: predict.path(fitted, Circle(amplitude=1.3)),
-        lambda: predict.area(curvature.ccf(fitted), Circle(), 1.3),
+        lambda: path(fitted, Circle(amplitude=1.3)),
+        lambda: area(curvature.ccf(fitted), Circle(), 1.3),
     ):
         with pytest.raises(ValueError, match=r"alpha_1 = .*1\.3 rad lies outside the field's -1 to 1"):
             tier()
@@ -236,7 +239,7 @@ def test_connections_at_many_shapes_change_frame_one_by_one():
 @pytest.mark.parametrize("name", GAITS)
 def test_displacement_is_conjugated_by_the_frame(name):
     gait = GAITS[name]
-    mean, link = (predict.direct(viscous(f), gait, phases=1024) for f in ("mean", "link-3"))
+    mean, link = (direct(viscous(f), gait, phases=1024) for f in ("mean", "link-3"))
     h = Chain().frame_pose("link-3", gait.shape(0.0), gait.rate(0.0))[0]
     np.testing.assert_allclose(se2.compose(se2.compose(se2.inverse(h), mean), h), link, atol=1e-9)
 
@@ -245,7 +248,7 @@ def test_displacement_is_conjugated_by_the_frame(name):
 def test_a_reversed_gait_undoes_the_gait(name):
     forth = GAITS[name]
     back = dataclasses.replace(forth, reverse=not forth.reverse)
-    g, h = (predict.direct(viscous(), x) for x in (forth, back))
+    g, h = (direct(viscous(), x) for x in (forth, back))
     np.testing.assert_allclose(se2.compose(g, h), 0, atol=1e-12)
 
 
@@ -259,7 +262,7 @@ def stepwise(velocity, gait, steps, end=2 * np.pi):
 
 def test_spectral_integration_against_short_steps():
     gait = Ellipse(centre=(0.3, 0.6), semi_axes=(1.1, 0.5))
-    spectral = predict.direct(MIDDLE, gait)
+    spectral = direct(MIDDLE, gait)
     coarse, fine = (stepwise(MIDDLE, gait, n) for n in (400, 800))
     np.testing.assert_allclose(spectral, (4 * fine - coarse) / 3, atol=1e-9)
 
@@ -309,9 +312,9 @@ def test_bad_shapes_are_refused():
     with pytest.raises(ValueError, match=r"must return shape \(.*, 3\).*got .*1\)"):
         connection.fit(lambda a, d: MIDDLE(a, d)[..., :1], connection.grid(2, 5))
     with pytest.raises(ValueError, match="not finite at alpha"):
-        predict.direct(lambda a, d: MIDDLE(a, d) * np.nan, Circle())
+        direct(lambda a, d: MIDDLE(a, d) * np.nan, Circle())
     with pytest.raises(ValueError, match="amplitudes must be finite"):
-        predict.direct(MIDDLE, Circle(), [np.nan])
+        direct(MIDDLE, Circle(), [np.nan])
     with pytest.raises(ValueError, match="xi must be finite"):
         reconstruct.displacement(np.full((4, 3), np.inf))
     with pytest.raises(ValueError, match="two joints"):

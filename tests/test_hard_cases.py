@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from registry import BODIES, DRY, MEDIA
 
-from geomech import coordinates, predict
+from geomech import coordinates
 from geomech.gaits import Butterfly, Circle, Fourier
+from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, newton, se2
 from rft.contact import Model
 
@@ -80,7 +81,7 @@ def test_from_two_to_two_hundred_links(links, medium):
 def test_isotropic_viscous_drag_moves_nothing():
     """Ratio 1: the drag is proportional to the momentum of a uniform body, so its centre stays where it is."""
     for gait in (Circle(), Butterfly()):
-        g = predict.direct(lambda a, d: body_velocity(Viscous(1.0), Chain(), a, d).xi, gait)
+        g = direct(lambda a, d: body_velocity(Viscous(1.0), Chain(), a, d).xi, gait)
         assert np.abs(g[:2]).max() < 1e-15
 
 
@@ -102,7 +103,7 @@ def test_large_ratios_approach_the_kinematic_limit():
 
 @pytest.mark.parametrize("amplitude", [1e-6, 1e-4, 1e-2])
 def test_tiny_gaits_keep_their_digits(amplitude):
-    g = predict.direct(lambda a, d: body_velocity(Viscous(2.0), Chain(frame="link-2"), a, d).xi, Circle(), [amplitude])
+    g = direct(lambda a, d: body_velocity(Viscous(2.0), Chain(frame="link-2"), a, d).xi, Circle(), [amplitude])
     limit = 5 / 243 * np.pi * amplitude**2
     assert np.hypot(*g[0, :2]) == pytest.approx(limit, rel=1e-8 + amplitude**2)
 
@@ -110,7 +111,7 @@ def test_tiny_gaits_keep_their_digits(amplitude):
 def test_tiny_gaits_in_sand():
     """Displacement per area settles as the circle shrinks, down to a millionth of a radian."""
     radii = np.array([1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
-    g = predict.direct(
+    g = direct(
         lambda a, d: body_velocity(GLASS, Chain((1, 1, 1.1)), a, d).checked().xi, Circle(centre=(0.7, -0.4)), radii
     )
     per_radius = np.hypot(g[:, 0], g[:, 1]) / radii**2
@@ -122,8 +123,8 @@ def test_scallops_go_nowhere(medium):
     """A gait of no area, and every gait followed by its reversal."""
     velocity = lambda a, d: body_velocity(MEDIA[medium], Chain((1, 1.3, 0.8)), a, d).checked().xi
     scallop = Fourier(centre=(0.3, 0.5), cos=((1.0,), (0.6,)), sin=((0.0,), (0.0,)))
-    assert np.abs(predict.direct(velocity, scallop, phases=64)).max() < 1e-9
-    forth, back = (predict.direct(velocity, Circle(amplitude=0.8, reverse=r), phases=64) for r in (False, True))
+    assert np.abs(direct(velocity, scallop, phases=64)).max() < 1e-9
+    forth, back = (direct(velocity, Circle(amplitude=0.8, reverse=r), phases=64) for r in (False, True))
     np.testing.assert_allclose(se2.compose(forth, back), 0, atol=1e-9)
 
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from registry import GAITS
 
-from geomech import connection, family, harmonics, predict
+from geomech import connection, family, harmonics
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
+from geomech.tiers.direct import direct
+from geomech.tiers.path import path
 from rft import (
     Backbone,
     BodyInertia,
@@ -186,8 +188,8 @@ def test_what_is_left_out_is_what_the_documentation_says():
         (lambda v: connection.fit(v, connection.grid(2, 5)), 25, 8),
         (lambda v: harmonics.fit(v, connection.grid(2, 5)), 25, 24),
         (lambda v: family.fit(v, Circle(), 1.0), 24, 128),
-        (lambda v: predict.direct(v, Circle(), [0.5, 1.0]), 2, 256),
-        (lambda v: predict.path(v, Circle()), 1, 256),
+        (lambda v: direct(v, Circle(), [0.5, 1.0]), 2, 256),
+        (lambda v: path(v, Circle()), 1, 256),
     ],
     ids=["connection", "harmonics", "family", "direct", "path"],
 )

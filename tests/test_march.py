@@ -1,7 +1,5 @@
 """The march: equation of motion against an independent integrator, orders in the step, hard cases, refusals."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from registry import BODIES, MEDIA
@@ -13,7 +11,10 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.reconstruct import displacement
 from geomech.scene import Scene
 from geomech.study import accuracy, estimate, undulation
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
 from geomech.study.sweep import beside
+from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
     Backbone,
@@ -158,7 +159,7 @@ def test_transients_slow_the_sandfish():
     theory exceeds discrete-element simulation, takes 0.65 of it (paper Secs. III B, IV A)."""
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
     effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.65)]
-    slowed = [dataclasses.replace(SANDFISH, effects=(effect,)) for effect in effects]
+    slowed = [SANDFISH.changed(effects=(effect,)) for effect in effects]
     net = np.hypot(*beside(slowed).cycle(phases=64).net.T[:2])
     lost = 1 - net / net[0]
     assert (np.diff(lost) > 0).all()
@@ -168,7 +169,7 @@ def test_transients_slow_the_sandfish():
 
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():
     slowed = scenes.load("sandfish-transient")
-    assert slowed.engine == "marching"
+    assert slowed.system.engine == "marching"
     found = undulation.performance(slowed, [0.15, 0.22])
     plain = undulation.performance(SANDFISH, [0.15, 0.22])
     assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
@@ -211,18 +212,16 @@ def test_a_first_cycle_is_of_order_two_as_well(truths):
 
 
 def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
-    slow = dataclasses.replace(scenes.load("three-link-glass"), effects=(heavy(20.0),)).with_numerics(
-        cycles=1, phases=64
-    )
+    slow = scenes.load("three-link-glass").changed(effects=(heavy(20.0),)).with_numerics(cycles=1, phases=64)
     alpha, alphadot = slow.gait.cycle(64)
-    wanted = march(GLASS, slow.body, alpha, alphadot, effects=slow.effects, cycles=1).displacement
-    np.testing.assert_allclose(slow.displacement("direct"), wanted, atol=1e-12)
+    wanted = march(GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1).displacement
+    np.testing.assert_allclose(Study(slow).displacement("direct"), wanted, atol=1e-12)
 
 
 def test_a_tolerance_below_what_a_march_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
     with pytest.raises(SceneError, match="repeats to 1e-06 only: raise --tol"):
-        estimate.cheapest(slowed, [0.2], 1e-7)
+        cheapest(slowed, [0.2], 1e-7)
 
 
 def test_pauses_and_empty_batches():
@@ -303,18 +302,18 @@ def test_batches_march_as_each_alone():
 
 def periodic(effects, gait, body, phases, amplitudes):
     """Poses after a settled cycle of the sandfish, as its scene gives them."""
-    scene = dataclasses.replace(SANDFISH, body=body, gait=gait, effects=effects).with_numerics(phases=phases)
-    return scene.displacement("direct", None, amplitudes)
+    scene = SANDFISH.changed(body=body, effects=effects, gait=gait).with_numerics(phases=phases)
+    return Study(scene).displacement("direct", None, amplitudes)
 
 
 def test_estimates_of_marches_cover_the_truth(truths):
     """Against four times the phases."""
     for effect in (Transient(travel=0.05), heavy(2.0), DepthProfile(slope=0.2)):
-        scene = dataclasses.replace(SANDFISH, body=Backbone(30), gait=Sine(elements=30), effects=(effect,))
+        scene = SANDFISH.changed(body=Backbone(30), effects=(effect,), gait=Sine(elements=30))
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
-        off = estimate.apart(found, truth, scene.body.length)
+        off = estimate.apart(found, truth, scene.system.body.length)
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
         assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(effect)  # one heading may be right by chance
@@ -330,14 +329,14 @@ def pieced_scene(rng, kind):
         "disturbed": DisturbedGround(radius=rng.uniform(0.04, 0.1), weakening=rng.uniform(0.1, 0.6)),
         "depth": DepthProfile(along=tuple(rng.uniform(0.5, 2, 4))),
     }[kind]
-    return Scene(medium, body, Ellipse(semi_axes=axes, tilt=rng.uniform(0, 3), centre=centre), effects=(effect,))
+    return Scene(Swimmer(medium, body, (effect,)), Ellipse(semi_axes=axes, tilt=rng.uniform(0, 3), centre=centre))
 
 
 def second_cycle(medium, body, gait, effects, pieces, phases, amplitudes):
     """Poses after the second cycle."""
-    scene = Scene(medium, body, gait, effects=effects)
+    scene = Scene(Swimmer(medium, body, effects), gait)
     scene = scene.with_numerics(pieces=pieces, phases=phases, tolerance=1e-9, cycles=2)
-    return scene.displacement("direct", None, amplitudes)
+    return Study(scene).displacement("direct", None, amplitudes)
 
 
 def errors_over_estimates(scene, pieces, phases, finer, truths):
@@ -345,7 +344,7 @@ def errors_over_estimates(scene, pieces, phases, finer, truths):
     a = np.array([0.5, 1.0, 1.4])
     scene = scene.with_numerics(pieces=pieces, tolerance=1e-9, cycles=2)
     found, error = estimate.direct(scene, scene.gait, a, phases)
-    fine = scene.medium, scene.body, scene.gait, scene.effects, finer * pieces, finer * phases, a
+    fine = scene.system.medium, scene.system.body, scene.gait, scene.system.effects, finer * pieces, finer * phases, a
     return estimate.apart(found, truths("pieces", second_cycle, *fine), 1.0) / (error + 1e-9)
 
 
@@ -373,31 +372,35 @@ def test_estimates_cover_what_pieces_leave_of_many_random_chains():
 
 def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     """Depth that differs along long links, all else being exact enough long before."""
-    scene = Scene(Viscous(2.0), Chain((1, 1.4, 0.8)), Circle(amplitude=1.2), effects=(DepthProfile(along=(0.5, 2, 1)),))
+    scene = Scene(
+        Swimmer(Viscous(2.0), Chain((1, 1.4, 0.8)), (DepthProfile(along=(0.5, 2, 1)),)), Circle(amplitude=1.2)
+    )
     scene = scene.with_numerics(pieces=5)
-    found = estimate.cheapest(scene, [1.2], 1e-5)
+    found = cheapest(scene, [1.2], 1e-5)
     assert found["settings"]["pieces"] > 5
-    truth = scene.with_numerics(pieces=640).displacement("direct", None, [1.2])
+    truth = Study(scene.with_numerics(pieces=640)).displacement("direct", None, [1.2])
     off = estimate.distance(np.array(found[found["tier"]]), truth)
     assert (off <= found["estimate"]).all()
     assert max(found["estimate"]) <= 1e-5
-    monkeypatch.setattr(estimate, "FINEST_PIECES", 40)
+    monkeypatch.setattr("geomech.study.choose.FINEST_PIECES", 40)
     with pytest.raises(SceneError, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
-        estimate.cheapest(scene, [1.2], 1e-8)
+        cheapest(scene, [1.2], 1e-8)
 
 
 def test_a_knob_for_pieces():
-    depth = dataclasses.replace(scenes.load("three-link-glass"), effects=(DepthProfile(along=(0.5, 2, 1)),))
+    depth = scenes.load("three-link-glass").changed(effects=(DepthProfile(along=(0.5, 2, 1)),))
     knob = next(k for k in accuracy.KNOBS if k.name == "pieces")
     assert knob.applies(depth)
-    assert not knob.applies(dataclasses.replace(depth, effects=()))
+    assert not knob.applies(depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
-    far = depth.with_numerics(pieces=320, phases=64).displacement("direct", Circle(), a)
-    coarse = [knob.turned(depth.with_numerics(phases=64), n).displacement("direct", Circle(), a) for n in knob.values]
+    far = Study(depth.with_numerics(pieces=320, phases=64)).displacement("direct", Circle(), a)
+    coarse = [
+        Study(knob.turned(depth.with_numerics(phases=64), n)).displacement("direct", Circle(), a) for n in knob.values
+    ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
     assert -np.polyfit(np.log(knob.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
     with pytest.raises(ValueError, match="pieces must be a whole number from 1 to 10000, got 0"):
-        body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.effects, pieces=0)
+        body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.system.effects, pieces=0)
     with pytest.raises(SceneError, match="pieces must be a whole number from 1 to 10000, got 0.5"):
         depth.with_numerics(pieces=0.5)
 
@@ -438,15 +441,15 @@ def test_heavy_bodies_know_how_far_they_are(truths):
 
 
 def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
-    scene = Scene(Viscous(2.0), Chain((1, 2, 1.5)), HEAVY, effects=(heavy(5.0),)).with_numerics(phases=64)
+    scene = Scene(Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY).with_numerics(phases=64)
     a, shapes = np.array([1.0]), HEAVY.cycle(64, np.array([1.0]))
-    left = march(scene.medium, scene.body, *shapes, effects=scene.effects).drift
-    assert scene.run(*shapes).to_come == left > 0
-    assert (scene.with_numerics(cycles=3).run(*shapes).to_come == 0).all()
+    left = march(scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects).drift
+    assert scene.system.run(*shapes).to_come == left > 0
+    assert (scene.with_numerics(cycles=3).system.run(*shapes).to_come == 0).all()
     scene = scene.with_numerics(cycles=1)
     of_steps = estimate.direct(scene, HEAVY, a, 64)[1]
     monkeypatch.setattr(
-        Scene, "run", lambda *args, run=Scene.run: (c := run(*args))._replace(to_come=c.to_come + 0.125)
+        Swimmer, "run", lambda *args, run=Swimmer.run: (c := run(*args))._replace(to_come=c.to_come + 0.125)
     )
     np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 64)[1], of_steps + 0.125, rtol=1e-6)
 

@@ -12,6 +12,8 @@ from geomech.field import Field
 from geomech.gaits import Ellipse
 from geomech.output import plots
 from geomech.study import sweep
+from geomech.study.bench import Study
+from geomech.tiers import TIERS
 from rft import CATALOGUE
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
@@ -100,8 +102,8 @@ def test_the_line_of_zeros_leaves_noise_alone():
 def test_no_specks_on_the_default_map():
     """In loose glass the turn's map has closed loops of zeros less than half a radian across, with its error it has none."""
     glass, found = scenes.load("three-link-glass"), {}
-    for key, error in (("plain", None), ("known", glass.curvature_error)):
-        (path,) = plots.ccf_map(glass.curvature, 2, error=error).collections[-1].get_paths()
+    for key, error in (("plain", None), ("known", Study(glass).curvature_error)):
+        (path,) = plots.ccf_map(Study(glass).curvature, 2, error=error).collections[-1].get_paths()
         loops = [p for p in path.to_polygons(closed_only=False) if np.allclose(p[0], p[-1])]
         found[key] = [np.ptp(p, axis=0).max() for p in loops]
     assert min(found["plain"]) < 0.5
@@ -113,7 +115,7 @@ def test_lines_of_displacement_are_the_net_of_each_tier():
     ax = plots.displacement(table, "m", gait=Ellipse())
     lines = {line.get_label(): line for line in ax.lines}
     for tier, net in (("direct", [-0.5, 1.0]), ("area", [1.0, 2.0])):
-        np.testing.assert_allclose(lines[plots.METHOD_LABEL[tier]].get_xydata(), np.transpose([[0.5, 1.0], net]))
+        np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], net]))
     assert len(lines) == 3
     assert ax.get_ylabel() == "displacement per cycle (m)"
     assert ax.get_xlabel() == Ellipse().amplitude_label

@@ -16,6 +16,7 @@ from test_cli import geomech
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.study import estimate, kept, sweep
+from geomech.study.bench import Study
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
@@ -81,7 +82,7 @@ def test_sweeps_are_batches(name, monkeypatch):
 @pytest.fixture
 def without_estimates(monkeypatch):
     def direct(scene, gait, amplitudes, phases):
-        net = scene.run(*gait.cycle(phases, amplitudes)).net
+        net = scene.system.run(*gait.cycle(phases, amplitudes)).net
         return net, np.zeros((len(net), 2))
 
     monkeypatch.setattr(estimate, "direct", direct)
@@ -93,16 +94,18 @@ def test_a_level_ground_is_no_gentle_slope(without_estimates):
     effects = PAST + '"transient"\ntravel = 0.03' + PAST + '"depth-profile"\nslope = 0.0'
     parse = lambda text: scenes.parse(text).with_numerics(phases=64, pieces=12)
     found = sweep.sweep(parse(text + effects), {"effects.depth-profile.slope": [0.0, 0.05]})
-    level = parse(text + PAST + '"transient"\ntravel = 0.03').displacement("direct")
+    level = Study(parse(text + PAST + '"transient"\ntravel = 0.03')).displacement("direct")
     np.testing.assert_allclose(found["displacement"][0], level, atol=2e-6)
 
 
-def test_a_scene_changed_since_it_was_read_is_refused():
-    import dataclasses
-
-    fish = dataclasses.replace(scenes.load("sandfish-loose"), effects=())
-    with pytest.raises(SceneError, match="a sweep takes a scene as its TOML text has it"):
-        sweep.sweep(fish, {"gait.amplitude": [0.1]})
+def test_a_scene_changed_since_it_was_read_is_swept_as_it_is():
+    fish = scenes.load("sandfish-loose").with_numerics(phases=32)
+    plain = fish.changed(effects=())
+    found = sweep.sweep(plain, {"gait.amplitude": [0.1], "medium.C": [1.8, 3.0]})["displacement"]
+    assert Study(plain).displacement("direct", None, 0.1) == pytest.approx(found[0, 0], abs=1e-9)
+    assert np.abs(found[0, 0] - Study(fish).displacement("direct", None, 0.1))[0] > 0.01
+    with pytest.raises(SceneError, match="the scene has no effect 'end-caps'"):
+        sweep.sweep(plain, {"effects.end-caps.radius": [0.1]})
 
 
 def test_one_frequency_for_all_effects(without_estimates):
@@ -111,7 +114,7 @@ def test_one_frequency_for_all_effects(without_estimates):
     )
     swimmer = scenes.parse(both).with_numerics(phases=64)
     found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
-    np.testing.assert_allclose(found[1], swimmer.displacement("direct"), atol=1e-9)
+    np.testing.assert_allclose(found[1], Study(swimmer).displacement("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
     with pytest.raises(SceneError, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
         sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})
@@ -143,7 +146,7 @@ def interrupted(tmp_path, monkeypatch):
     partial, rows, calls = tmp_path / ".s.nc.partial", sweep._rows, []
 
     def failing(at, amplitudes):
-        calls.append(at[0].body.length)
+        calls.append(at[0].system.body.length)
         if len(calls) == 3:
             raise KeyboardInterrupt
         return rows(at, amplitudes)
@@ -195,8 +198,8 @@ def test_a_sweep_goes_on_anywhere(done, tmp_path, monkeypatch):
         found = []
 
         def rows(batch, amplitudes):
-            found.extend((s.body.length, a) for s in batch for a in amplitudes)
-            return [[s.body.length, a, 0.0, 0.0, 0.0] for s in batch for a in amplitudes]
+            found.extend((s.system.body.length, a) for s in batch for a in amplitudes)
+            return [[s.system.body.length, a, 0.0, 0.0, 0.0] for s in batch for a in amplitudes]
 
         kept.keep(tmp_path / "p", asked, [[*point, 0.0, 0.0, 0.0] for point in every[:done]])
         monkeypatch.setattr(sweep, "_rows", rows)

@@ -6,31 +6,36 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import connection, family, harmonics, predict
+from geomech import connection, family, harmonics
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.output import plots
-from geomech.scene import METHODS, Numerics, Scene
+from geomech.scene import Numerics, Scene
 from geomech.study import estimate
+from geomech.study.bench import METHODS, Study
+from geomech.study.choose import cheapest
+from geomech.systems import Swimmer
+from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, se2
 
 GLASS = scenes.load("three-link-glass")
+BENCH = Study(GLASS)
 RADII = np.linspace(0.5, 2.0, 13)
 SCALES = np.linspace(0.25, 1.0, 7)
 
 
 def exact(medium, body, gait, amplitudes, regularisation=1e-6, phases=2048):
     """Net poses by the force balance, far finer than anything tested here."""
-    scene = Scene(medium, body, gait, Numerics(regularisation=regularisation))
-    return predict.direct(scene.velocity, gait, amplitudes, phases)
+    scene = Scene(Swimmer(medium, body), gait, Numerics()).with_numerics(regularisation=regularisation)
+    return direct(scene.system.velocity, gait, amplitudes, phases)
 
 
 @pytest.fixture(scope="module")
 def truth(truths):
     return {
-        "circle": truths("tiers", exact, GLASS.medium, GLASS.body, Circle(), RADII),
-        "butterfly": truths("tiers", exact, GLASS.medium, GLASS.body, Butterfly(), SCALES),
+        "circle": truths("tiers", exact, GLASS.system.medium, GLASS.system.body, Circle(), RADII),
+        "butterfly": truths("tiers", exact, GLASS.system.medium, GLASS.system.body, Butterfly(), SCALES),
     }
 
 
@@ -40,34 +45,36 @@ def off(poses, truth):
 
 def test_harmonics_predict_circles_within_a_percent(truth):
     """A on a 31 x 31 grid is off by up to 50 %; the odd harmonics to the 15th by 1 % from 0.5 to 2 rad."""
-    tier = GLASS.displacement("harmonic", Circle(), RADII)
+    tier = BENCH.displacement("harmonic", Circle(), RADII)
     assert off(tier, truth["circle"]).max() < 0.0101
-    assert off(GLASS.displacement("path", Circle(), RADII), truth["circle"]).max() > 0.4
-    assert off(GLASS.displacement("harmonic", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
+    assert off(BENCH.displacement("path", Circle(), RADII), truth["circle"]).max() > 0.4
+    assert off(BENCH.displacement("harmonic", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
 
 
 def test_the_first_harmonic_is_the_uniform_fit():
     axes = connection.grid(2, 7, 2.0)
-    first = harmonics.fit(GLASS.velocity, axes, 24, highest=1)
-    fitted = connection.fit(GLASS.velocity, axes, 24)
+    first = harmonics.fit(GLASS.system.velocity, axes, 24, highest=1)
+    fitted = connection.fit(GLASS.system.velocity, axes, 24)
     np.testing.assert_allclose(first.coefficients, fitted.A, atol=1e-12)
     np.testing.assert_allclose(first.residual, fitted.residual, atol=1e-12)
 
 
 def test_all_harmonics_reproduce_the_samples():
     axes, count = connection.grid(2, 5, 2.0), 12
-    full = harmonics.fit(GLASS.velocity, axes, count, highest=count - 1)
+    full = harmonics.fit(GLASS.system.velocity, axes, count, highest=count - 1)
     assert full.residual.max() < 1e-12
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[1, 2]
     for direction in connection.directions(2, count):
-        np.testing.assert_allclose(full.velocity(alpha, 2 * direction), GLASS.velocity(alpha, 2 * direction), atol=1e-8)
+        np.testing.assert_allclose(
+            full.velocity(alpha, 2 * direction), GLASS.system.velocity(alpha, 2 * direction), atol=1e-8
+        )
 
 
 def test_harmonics_fall_off_as_kinks_let_them():
     """Stick puts kinks in f(beta): coefficients fall like 1/k^2, so the rms left behind like K^-1.5; least at shapes
     where no link sticks."""
     axes = connection.grid(2, 21, 2.5)
-    left = [harmonics.fit(GLASS.velocity, axes, 96, highest=K).residual for K in (5, 15, 45)]
+    left = [harmonics.fit(GLASS.system.velocity, axes, 96, highest=K).residual for K in (5, 15, 45)]
     rms = [np.sqrt((x**2).mean()) for x in left]
     slope = np.polyfit(np.log([5, 15, 45]), np.log(rms), 1)[0]
     assert -2.0 < slope < -1.0
@@ -76,19 +83,19 @@ def test_harmonics_fall_off_as_kinks_let_them():
 
 def test_adapted_area_predicts_its_family(truth):
     """The CCF's area integral, uniform: +50 to -29 % on circles. Adapted to the family: the goal was 5 %."""
-    assert off(GLASS.displacement("area", Circle(), RADII), truth["circle"]).max() > 0.2
-    assert off(GLASS.displacement("adapted", Circle(), RADII), truth["circle"]).max() < 0.005
-    assert off(GLASS.displacement("adapted", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
+    assert off(BENCH.displacement("area", Circle(), RADII), truth["circle"]).max() > 0.2
+    assert off(BENCH.displacement("adapted", Circle(), RADII), truth["circle"]).max() < 0.005
+    assert off(BENCH.displacement("adapted", Butterfly(), SCALES), truth["butterfly"]).max() < 0.01
 
 
 def test_adapted_poses_are_in_the_body_frame_at_the_start(truth):
-    np.testing.assert_allclose(GLASS.displacement("adapted", Circle(), RADII), truth["circle"], atol=2e-4)
+    np.testing.assert_allclose(BENCH.displacement("adapted", Circle(), RADII), truth["circle"], atol=2e-4)
 
 
 def test_the_adapted_map_integrates_to_the_displacement():
     """Summing the map over its own cells of shape space gives the displacement in the family's frame."""
     gait = Circle()
-    table = family.fit(GLASS.velocity, gait, 1.5, 48, 128)
+    table = family.fit(GLASS.system.velocity, gait, 1.5, 48, 128)
     alpha, ccf = table.ccf()
     radius = np.linalg.norm(alpha[:, 0], axis=-1)
     cells = radius[:, None] * (2 * np.pi / 128) * np.gradient(radius)[:, None]
@@ -101,8 +108,8 @@ def test_the_adapted_map_integrates_to_the_displacement():
 @pytest.mark.parametrize("medium", ["viscous-2", "glass-0.3mm-loose"])
 def test_families_of_every_gait(name, medium):
     """Exact up to the table, whether or not the body turns on the whole."""
-    swimmer = Scene(MEDIA[medium], Chain(), GAITS[name], Numerics(curves=48))
-    adapted, direct = (swimmer.displacement(m, None, np.array([0.3, 0.6])) for m in ("adapted", "direct"))
+    swimmer = Scene(Swimmer(MEDIA[medium], Chain()), GAITS[name], Numerics(curves=48))
+    adapted, direct = (Study(swimmer).displacement(m, None, np.array([0.3, 0.6])) for m in ("adapted", "direct"))
     np.testing.assert_allclose(adapted[:, 2], direct[:, 2], atol=1e-3)
     assert (estimate.distance(adapted, direct) < 0.01 * np.abs(plots.net(direct)) + 1e-4).all()
 
@@ -114,20 +121,20 @@ def test_a_net_turn_leaves_nothing_to_commute():
     """On a circle off the centre, which turns the body by 0.2 rad a cycle, errors shrink with the curves as on any other:
     order 4 where nothing kinks."""
     viscous, a, counts = scenes.load("three-link-viscous"), np.linspace(0.0, 1.4, 401)[1:], np.array([8, 16, 32])
-    exact = predict.direct(viscous.velocity, TURNING, a)
+    exact = direct(viscous.system.velocity, TURNING, a)
     assert np.abs(exact[:, 2]).max() > 0.2
-    tables = [viscous.with_numerics(curves=int(n)).displacement("adapted", TURNING, a) for n in counts]
+    tables = [Study(viscous.with_numerics(curves=int(n))).displacement("adapted", TURNING, a) for n in counts]
     errors = [np.abs(found - exact).max() for found in tables]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
     a = a[39::40]
-    glass = [GLASS.displacement(tier, TURNING, a) for tier in ("adapted", "direct")]
+    glass = [BENCH.displacement(tier, TURNING, a) for tier in ("adapted", "direct")]
     assert estimate.distance(*glass).max() < 3e-4
 
 
 @pytest.mark.parametrize("gait", [TURNING, Circle(centre=(0.6, -0.6), reverse=True), Circle()])
 def test_the_map_of_a_family_integrates_to_its_area(gait):
     """Over the cells of shape space, off centre too: position in the family's frame, and the turn."""
-    table = family.fit(scenes.load("three-link-viscous").velocity, gait, 1.2, 60, 128)
+    table = family.fit(scenes.load("three-link-viscous").system.velocity, gait, 1.2, 60, 128)
     alpha, ccf = table.ccf()
     radius = np.linalg.norm(alpha[:, 0] - gait.shape(0.0, 0.0), axis=-1)
     ring = 2 * np.pi / 128 * np.gradient(radius) * radius * (-1 if gait.reverse else 1)
@@ -139,17 +146,17 @@ def test_the_map_of_a_family_integrates_to_its_area(gait):
 
 
 def test_limits_of_the_tables():
-    table = family.fit(GLASS.velocity, Circle(), 0.5, 6, 16)
+    table = family.fit(GLASS.system.velocity, Circle(), 0.5, 6, 16)
     with pytest.raises(ValueError, match="from 0 to the family's 0.5"):
         table.area([0.6])
     with pytest.raises(ValueError, match="largest amplitude"):
-        family.fit(GLASS.velocity, Circle(), 0.0)
+        family.fit(GLASS.system.velocity, Circle(), 0.0)
     with pytest.raises(ValueError, match="harmonics must be odd and below the number of directions"):
-        harmonics.fit(GLASS.velocity, connection.grid(2, 5), 24, highest=4)
+        harmonics.fit(GLASS.system.velocity, connection.grid(2, 5), 24, highest=4)
     for highest, count in ((5, 5), (7, 5)):
         with pytest.raises(ValueError, match="below the number of directions"):
-            harmonics.fit(GLASS.velocity, connection.grid(2, 5), highest=highest, count=count)
-    assert harmonics.fit(GLASS.velocity, connection.grid(2, 5), highest=5, count=6).highest == 5
+            harmonics.fit(GLASS.system.velocity, connection.grid(2, 5), highest=highest, count=count)
+    assert harmonics.fit(GLASS.system.velocity, connection.grid(2, 5), highest=5, count=6).highest == 5
 
 
 def random_scene(rng):
@@ -162,7 +169,7 @@ def random_scene(rng):
         Fourier(amplitude=0.6 * amplitude, centre=centre, cos=series[0], sin=series[1]),
     ][rng.integers(3)]
     body = Chain(tuple(rng.uniform(0.4, 1.0, 3)), frame=("mean", "link-2")[rng.integers(2)])
-    return Scene(MEDIA[names[rng.integers(len(names))]], body, gait, Numerics(extent=4.0, grid=21))
+    return Scene(Swimmer(MEDIA[names[rng.integers(len(names))]], body), gait, Numerics(extent=4.0, grid=21))
 
 
 def judged(estimates, errors):
@@ -182,8 +189,8 @@ def test_direct_estimates_cover_the_truth(truths):
         a = np.array([some.gait.amplitude])
         poses, error = estimate.direct(coarse, some.gait, a, min(2 ** rng.integers(5, 9), 128))
         estimates.append(error)
-        true = truths("estimates", exact, some.medium, some.body, some.gait, a, 1e-9)
-        errors.append(estimate.apart(poses, true, some.body.length))
+        true = truths("estimates", exact, some.system.medium, some.system.body, some.gait, a, 1e-9)
+        errors.append(estimate.apart(poses, true, some.system.body.length))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -195,11 +202,11 @@ def test_estimates_of_refinement_are_neither_short_nor_long():
     rng, ratios = np.random.default_rng(21), []
     while len(ratios) < 50:
         some = random_scene(rng).with_numerics(regularisation=1e-8)
-        if some.linear:
+        if some.system.linear:
             continue
         a = some.gait.amplitude * np.array([0.6, 0.8, 1.0])
         poses, error = estimate.direct(some, some.gait, a, 64)
-        true = predict.direct(some.velocity, some.gait, a, 512)
+        true = direct(some.system.velocity, some.gait, a, 512)
         ratios.append(estimate.distance(poses, true) / error[:, 0])
     assert 0.5 < np.percentile(ratios, 95) < 0.95
     assert 0.1 < np.median(ratios) < 0.4
@@ -210,11 +217,11 @@ def test_look_up_estimates_cover_the_truth(truths):
     for _ in range(12):
         some = random_scene(rng)
         a = some.gait.amplitude * np.linspace(0.3, 1.0, 4)
-        true = truths("estimates", exact, some.medium, some.body, some.gait, a)
-        table = some.study(a, [m for m in METHODS if m != "direct"])
+        true = truths("estimates", exact, some.system.medium, some.system.body, some.gait, a)
+        table = Study(some).study(a, [m for m in METHODS if m != "direct"])
         for method, error in table["estimate"].items():
             estimates.append(np.stack([error, table["estimate_heading"][method]], -1))
-            errors.append(estimate.apart(np.array(table[method]), true, some.body.length))
+            errors.append(estimate.apart(np.array(table[method]), true, some.system.body.length))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -226,9 +233,9 @@ MANY = np.linspace(0.3, 2.0, 201)
 @pytest.mark.parametrize("every", [100, 1])
 @pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
-    answer = estimate.cheapest(GLASS, MANY[::every], tol)
+    answer = cheapest(GLASS, MANY[::every], tol)
     assert max(answer["estimate"]) <= tol
-    true = truths("tiers", exact, GLASS.medium, GLASS.body, GLASS.gait, MANY)[::every]
+    true = truths("tiers", exact, GLASS.system.medium, GLASS.system.body, GLASS.gait, MANY)[::every]
     off = estimate.apart(np.array(answer[answer["tier"]]), true, 1.0)
     assert off[:, 0].max() <= tol
     assert (off[:, 1] <= answer["estimate_heading"]).all()
@@ -236,7 +243,7 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
 
 
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():
-    few, many = (estimate.cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3)["tier"] for n in (3, 400))
+    few, many = (cheapest(GLASS, np.linspace(0.3, 2.0, n), 2e-3)["tier"] for n in (3, 400))
     assert (few, many) == ("direct", "adapted")
 
 
@@ -245,7 +252,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
     estimate says it, in body lengths whatever the size; likewise in rad for the heading."""
     a = np.array([0.6, 1.4])
     for length in (1.0, 0.3):
-        sized = dataclasses.replace(GLASS, body=dataclasses.replace(GLASS.body, length=length))
+        sized = GLASS.changed(body=dataclasses.replace(GLASS.system.body, length=length))
         lazy, run = sized.with_numerics(tolerance=0.5), None
         run = lazy.cycle(lazy.gait, a, 64)
         left = 2 * np.pi * (run.residual * run.speed)[:, None]
@@ -253,16 +260,16 @@ def test_what_the_solver_left_counts_in_the_estimate():
         poses, error = estimate.direct(lazy, lazy.gait, a, 64)
         assert left.min() > 10 * tight.max()
         assert (error >= left).all()
-        off = estimate.apart(poses, sized.displacement("direct", None, a), length)
+        off = estimate.apart(poses, Study(sized).displacement("direct", None, a), length)
         assert (error >= off).all()
         np.testing.assert_allclose(error[:, :1], left, rtol=0.9)
 
 
 def test_impossible_tolerances_are_refused():
     with pytest.raises(SceneError, match="no tier gets to 1e-15 body lengths"):
-        estimate.cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
+        cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
     with pytest.raises(SceneError, match="--tol must be"):
-        estimate.cheapest(GLASS, [1.0], 0.0)
+        cheapest(GLASS, [1.0], 0.0)
 
 
 def test_the_map_of_a_family_gives_each_shape_its_own_value():
@@ -286,28 +293,28 @@ def test_the_map_of_a_family_gives_each_shape_its_own_value():
 
 def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
-    monkeypatch.setattr(estimate, "MOST_PHASES", 128)
+    monkeypatch.setattr("geomech.study.choose.MOST_PHASES", 128)
     with pytest.raises(SceneError, match="no tier gets to 1e-09 body lengths .* with 128 phases"):
-        estimate.cheapest(GLASS, [0.0, 1.0], 1e-9)
+        cheapest(GLASS, [0.0, 1.0], 1e-9)
 
 
 @pytest.mark.parametrize(("effects", "phases"), [((), 32), ((BodyInertia(0.1, 1.0, 1.0, 1.0),), 64)])
 def test_the_search_for_a_tier_starts_with_few_phases(effects, phases):
-    scene = dataclasses.replace(GLASS, effects=effects).with_numerics(cycles=1)
-    assert estimate.cheapest(scene, [0.5], 10.0)["settings"] == {"phases": phases}
+    scene = GLASS.changed(effects=effects).with_numerics(cycles=1)
+    assert cheapest(scene, [0.5], 10.0)["settings"] == {"phases": phases}
 
 
 def test_estimates_are_in_body_lengths():
-    tiny = dataclasses.replace(GLASS, body=dataclasses.replace(GLASS.body, length=1e-6))
+    tiny = GLASS.changed(body=dataclasses.replace(GLASS.system.body, length=1e-6))
     a = np.array([1.0])
     (poses, error), (small, same) = (estimate.direct(s, s.gait, a, 64) for s in (GLASS, tiny))
     np.testing.assert_allclose(same, error, rtol=1e-6)
     np.testing.assert_allclose(small[:, :2], 1e-6 * poses[:, :2], rtol=1e-9)
-    tables = [s.with_numerics(grid=9).study(a, ["path"]) for s in (GLASS, tiny)]
+    tables = [Study(s.with_numerics(grid=9)).study(a, ["path"]) for s in (GLASS, tiny)]
     for key in ("estimate", "estimate_heading"):  # against the direct tier
         np.testing.assert_allclose(tables[1][key]["path"], tables[0][key]["path"], rtol=1e-6, atol=1e-12)
 
 
 def test_the_adapted_tier_refuses_amplitudes_below_zero():
     with pytest.raises(SceneError, match="adapted tier takes amplitudes >= 0"):
-        GLASS.displacement("adapted", amplitudes=[-0.5, 0.5])
+        BENCH.displacement("adapted", amplitudes=[-0.5, 0.5])

@@ -9,12 +9,17 @@ import pytest
 from registry import GAITS
 
 import rft
-from geomech import connection, curvature, family, predict, reconstruct
+from geomech import connection, curvature, family, reconstruct
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.scene import Numerics, Scene
-from geomech.study import estimate
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from geomech.systems import Solver, Swimmer
+from geomech.tiers.area import area
+from geomech.tiers.direct import direct
+from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity
 
 WRONG = {
@@ -29,7 +34,8 @@ PARTS = {
     "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
     "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
-    "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Scene": Scene(Coulomb(), Chain(), Circle()),
+    "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Solver": Solver(),
+    "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
     "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
@@ -100,21 +106,21 @@ def geometries(value):
     yield "extent", lambda: connection.grid(2, 5, value)
     yield "joints", lambda: connection.directions(value, 64)
     yield "directions", lambda: connection.directions(2, value)
-    for tier in (predict.path, predict.direct):
+    for tier in (path, direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)
         yield "gait", lambda tier=tier: tier(velocity, value, [1.0])
         yield "phases", lambda tier=tier: tier(velocity, Circle(), phases=value)
-    yield "amplitudes", lambda: predict.direct(velocity, Circle(), amplitudes=value)
-    yield "gait", lambda: predict.area(curvature.ccf(fitted), value)
+    yield "amplitudes", lambda: direct(velocity, Circle(), amplitudes=value)
+    yield "gait", lambda: area(curvature.ccf(fitted), value)
     yield "gait", lambda: family.fit(velocity, value, 1.0)
     yield "largest", lambda: family.fit(velocity, Circle(), value)
     yield "curves", lambda: family.fit(velocity, Circle(), 1.0, value)
-    yield "gait of the scene", lambda: plain.displacement("direct", value)
-    yield "method", lambda: plain.displacement(value)
-    yield "amplitudes", lambda: plain.displacement("direct", amplitudes=value)
-    yield "gait of the scene", lambda: plain.study([1.0], ["direct"], value)
-    yield "amplitudes of a study", lambda: plain.study(value, ["direct"])
+    yield "gait of the scene", lambda: Study(plain).displacement("direct", value)
+    yield "method", lambda: Study(plain).displacement(value)
+    yield "amplitudes", lambda: Study(plain).displacement("direct", amplitudes=value)
+    yield "gait of the scene", lambda: Study(plain).study([1.0], ["direct"], value)
+    yield "amplitudes of a study", lambda: Study(plain).study(value, ["direct"])
     yield "gait of the scene", lambda: plain.cycle(value)
     yield "shape", lambda: fitted(value)
     yield "xi", lambda: reconstruct.displacement(value)
@@ -125,7 +131,7 @@ def geometries(value):
     yield "file", lambda: Centreline(file=value)
     for name in ("loads", "grid", "phases", "extent"):
         yield "a change", lambda name=name: plain.with_numerics(**{name: value})
-    yield "tolerance", lambda: estimate.cheapest(plain, [1.0], value)
+    yield "tolerance", lambda: cheapest(plain, [1.0], value)
 
 
 TAKEN = {
@@ -160,11 +166,14 @@ def test_the_place_is_named():
         (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e+15, got 'x'"),
         (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got [[1]]"),
         (lambda: body_velocity("sand", Chain(), STILL, STILL), "medium must be a force law"),
-        (lambda: Scene(lambda v: v, Chain(), Circle()), "medium must be a force law"),
-        (lambda: Scene(Coulomb(), Chain(), [1, 2]), "gait must be a gait such as Circle(amplitude=0.5), got [1, 2]"),
-        (lambda: predict.direct(len, [1, 2]), "gait must be a gait"),
+        (lambda: Swimmer(lambda v: v, Chain()), "medium must be a force law"),
+        (
+            lambda: Scene(Swimmer(Coulomb(), Chain()), [1, 2]),
+            "gait must be a gait such as Circle(amplitude=0.5), got [1, 2]",
+        ),
+        (lambda: direct(len, [1, 2]), "gait must be a gait"),
         (lambda: connection.grid(2, 5, "a"), "extent must be a number from 1e-09 to 1e+06, got 'a'"),
-        (lambda: Scene(Coulomb(), Chain(), Circle(), effects=["caps"]), "effects must be a list of effects"),
+        (lambda: Swimmer(Coulomb(), Chain(), effects=["caps"]), "effects must be a list of effects"),
     ):
         with pytest.raises(ValueError, match=".") as caught:
             call()

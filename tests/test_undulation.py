@@ -12,6 +12,7 @@ from geomech.gaits import Circle, Sine
 from geomech.output import plots
 from geomech.reconstruct import displacement
 from geomech.study import undulation
+from geomech.study.bench import Study
 from rft import (
     CATALOGUE,
     Backbone,
@@ -158,7 +159,7 @@ def test_endless_sine_in_loose_glass():
     place, _ = undulation.best(a, plain * Sine().wavelength(a))
     assert place == pytest.approx(0.2, abs=0.02)
     assert np.interp(0.2, a, plain) == pytest.approx(0.7, abs=0.01)
-    head = undulation.endless_sine(GLASS, 0.2, SANDFISH.effects[0])
+    head = undulation.endless_sine(GLASS, 0.2, SANDFISH.system.effects[0])
     assert 0.5 < head < np.interp(0.2, a, plain) - 0.04
 
 
@@ -189,7 +190,7 @@ def test_endless_waves_slide_or_go_sideways(name, kinematics):
 
 def test_an_end_that_goes_sideways_passes_all_of_x_alike():
     """Head drag by the time at each heading: against the mean over x."""
-    cap, a = SANDFISH.effects[0], 0.2
+    cap, a = SANDFISH.system.effects[0], 0.2
     found = undulation.endless_sine(GLASS, a, cap, kinematics="sideways")
     slope = 2 * np.pi * a * np.cos(2 * np.pi * (np.arange(4000) + 0.5) / 4000)
     root = np.sqrt(1 + slope**2)
@@ -206,7 +207,7 @@ def test_long_bodies_approach_the_endless_wave():
     endless = undulation.endless_sine(GLASS, 0.2)
     off = []
     for waves in (1.0, 3.0, 9.0):
-        plain = dataclasses.replace(SANDFISH, gait=Sine(waves=waves, elements=180), body=Backbone(180), effects=())
+        plain = SANDFISH.changed(body=Backbone(180), effects=(), gait=Sine(waves=waves, elements=180))
         off.append(abs(undulation.performance(plain, [0.2])["efficiency"][0] - endless))
     assert off[0] > off[1] > off[2]
     assert off[2] < 0.03
@@ -214,11 +215,11 @@ def test_long_bodies_approach_the_endless_wave():
 
 def test_serpenoid_has_a_connection_and_a_ccf():
     swimmer = scenes.load("serpenoid-glass").with_numerics(grid=15)
-    table = swimmer.study([6.0], swimmer.methods)
+    table = Study(swimmer).study([6.0], Study(swimmer).methods)
     direct = np.hypot(*table["direct"][0][:2])
     assert direct > 0.1
     assert np.hypot(*table["harmonic"][0][:2]) == pytest.approx(direct, rel=0.05)
-    backwards = swimmer.displacement("direct", Circle(amplitude=6.0))
+    backwards = Study(swimmer).displacement("direct", Circle(amplitude=6.0))
     np.testing.assert_allclose(backwards[0], -table["direct"][0][0], rtol=0.05)
 
 
@@ -315,7 +316,7 @@ def test_body_velocity_through_the_cycle():
     assert velocity.shape == (2, SANDFISH.numerics.phases, 3)
     np.testing.assert_allclose(np.roll(velocity, velocity.shape[1] // 2, 1), velocity * [1, -1, -1], atol=1e-8)
     np.testing.assert_allclose(np.hypot(*displacement(velocity)[:, :2].T), found["progress"], rtol=1e-12)
-    large = dataclasses.replace(SANDFISH, body=Backbone(100, length=20.0))
+    large = SANDFISH.changed(body=Backbone(100, length=20.0))
     np.testing.assert_allclose(undulation.performance(large, [0.1, 0.22])["velocity"], velocity, atol=1e-8)
     assert velocity[1, :, 0].min() > 0  # the sandfish never slides backwards
 
@@ -323,10 +324,10 @@ def test_body_velocity_through_the_cycle():
 def test_a_sweep_is_one_batch_of_everything():
     """100 elements, 100 phases and many amplitudes go to the solver in one call."""
     calls = []
-    counted = lambda a, d: calls.append(a.shape) or SANDFISH.velocity(a, d)
-    from geomech import predict
+    counted = lambda a, d: calls.append(a.shape) or SANDFISH.system.velocity(a, d)
+    from geomech.tiers.direct import direct
 
-    predict.direct(counted, SANDFISH.gait, [0.1, 0.2, 0.3], phases=100)
+    direct(counted, SANDFISH.gait, [0.1, 0.2, 0.3], phases=100)
     assert calls == [(3, 100, 99)]
 
 
@@ -339,11 +340,11 @@ def test_performance_is_refused_without_a_wave(name, kind):
 def waving(waves, elements=50, phases=64, effects=(), **gait):
     """The sandfish with that many waves on its body, without head drag unless told."""
     gait = Sine(**{"amplitude": 0.22, "waves": waves, "elements": elements, **gait})
-    plain = dataclasses.replace(SANDFISH, gait=gait, body=Backbone(elements), effects=effects)
+    plain = SANDFISH.changed(body=Backbone(elements), effects=effects, gait=gait)
     return plain.with_numerics(phases=phases)
 
 
-@pytest.mark.parametrize("case", [waving(1.0), waving(1.5), waving(1.0, effects=SANDFISH.effects), SANDFISH])
+@pytest.mark.parametrize("case", [waving(1.0), waving(1.5), waving(1.0, effects=SANDFISH.system.effects), SANDFISH])
 def test_onset_and_offset_are_where_the_moment_changes_sign(case):
     """Solved anew just before and after, between the phases that the lines were found from."""
     found = undulation.activation(case)

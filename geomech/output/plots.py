@@ -76,7 +76,11 @@ def vector_field(connection: Connection, component: int = 0, unit: str = "BL", a
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
-    arrows = ax.quiver(x, y, u, v, np.hypot(u, v), cmap="viridis", pivot="mid", width=0.007)
+    size = np.hypot(u, v)
+    if np.isnan(size).any():  # beside singular shapes arrows are cut
+        cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
+        u, v, size = cut * u, cut * v, cut * size
+    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007)
     per = "rad" if component == 2 else unit
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
     colorbar.set_label(rf"$|\mathbf{{A}}^{{{COMPONENTS[component]}}}|$ ({per}/rad)")
@@ -103,8 +107,8 @@ def ccf_map(
     ax = _axes(ax)
     field, error = drawable(field), error and drawable(error)
     values = field.values[component]
-    top = float(np.abs(values).max()) or 1.0
-    image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
+    top, smooth = largest(values), "nearest" if field.masked else "gouraud"
+    image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
     if error is not None:
         unsure = error.values[component] - np.abs(values)
         upright = "||||||"  # lines of symmetry of chains are diagonal
@@ -118,6 +122,12 @@ def ccf_map(
     colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85)
     colorbar.set_label(rf"CCF$_{{{COMPONENTS[component]}}}$ ({per}/rad$^2$)")
     return shape_space(ax, field.axes)
+
+
+def largest(values: np.ndarray) -> float:
+    """Of the magnitudes, for a scale; beside singular shapes, where these grow beyond all bounds, of nine tenths of them."""
+    size = np.abs(values[np.isfinite(values)])
+    return float(size.max() if size.size == values.size else np.quantile(size, 0.9)) or 1.0
 
 
 def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -205,7 +215,8 @@ def work_precision(results: Mapping, axes=None):
             xlabel="seconds", ylabel=f"error against the {'truth' if against == 'truth' else 'limit of the knob'} (BL)"
         )
         ax.grid(True, which="major", lw=0.3, color="0.85")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        if lines:
+            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return axes
 
 

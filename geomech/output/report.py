@@ -58,7 +58,7 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         plots.displacement(table, unit, ax, gait=gait, marker="o")
     _save(fig, folder / "displacement")
     (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
-    (folder / SCENE).write_text(scene.text, encoding="utf-8")
+    (folder / SCENE).write_text(toml(scene), encoding="utf-8")
     return tables
 
 

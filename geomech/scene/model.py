@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
-from geomech.errors import SceneError, named, short
+from geomech.errors import choose, named, short
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.systems.base import Cycle, System, checked_system
 from geomech.tiers.base import Numerics
-
-DEFAULT = Numerics()
 
 
 @dataclass(frozen=True)
@@ -21,7 +19,7 @@ class Scene:
 
     system: System
     gait: Gait
-    numerics: Numerics = DEFAULT
+    numerics: Numerics = field(default_factory=Numerics)
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
 
@@ -49,17 +47,20 @@ class Scene:
         with named(self.name):
             system = self.system.with_solver(**{k: v for k, v in changes.items() if k in own})
             rest = {k: v for k, v in changes.items() if k not in own}
+            for name in rest:
+                choose("numerics", name, [*own, *self.numerics.__dataclass_fields__])
             return dataclasses.replace(self, system=system, numerics=dataclasses.replace(self.numerics, **rest))
 
-    def with_system(self, **changes) -> Scene:
-        """This scene with some fields of its system changed."""
+    def changed(self, **changes) -> Scene:
+        """This scene with some of its parts changed, or of its system's."""
+        own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text")}
         with named(self.name):
-            return dataclasses.replace(self, system=dataclasses.replace(self.system, **changes))
+            of_system = {k: v for k, v in changes.items() if k not in own}
+            if of_system:
+                own["system"] = dataclasses.replace(own.get("system", self.system), **of_system)
+            return dataclasses.replace(self, **own)
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
         """A gait, or the scene's own, run for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
-
-
-__all__ = ["Numerics", "Scene", "SceneError"]

@@ -10,6 +10,7 @@ from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene
 from geomech.scene.read import from_tables
+from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import PARTS, Swimmer, name_in
 
 
@@ -40,7 +41,7 @@ def _anew(scene: Scene) -> dict:
         out["body"] = _of_kind(system.body, *PARTS["body"])
         effects = [_of_kind(effect, *PARTS["effects"]) for effect in system.effects]
     else:
-        out["system"], effects = {"kind": system.kind, **_fields(system)}, []
+        out["system"], effects = _of_kind(system, "kind", SYSTEMS), []
         out["system"].pop("solver", None)
     for part in (out.get("body"), out.get("system")):
         if part and "frame" in part:

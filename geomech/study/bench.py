@@ -53,6 +53,10 @@ class Study:
             make = lambda: how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
             return self._kept(how.looks_up, how.depends_on, reach, make)
 
+    def needs_field(self, method: str) -> bool:
+        """Whether a tier looks the fitted connection up on the grid."""
+        return TIERS[method].looks_up == "connection" and not TIERS[method].is_direct(self.scene.system)
+
     def compute_field(self, progress: Callable | None = None) -> None:
         """Fill `fitted` now, telling ``progress`` the fraction done."""
         self.table("path", progress=progress)
@@ -110,7 +114,7 @@ class Study:
                 tier.refuse(scene.system)
                 self._refuse_singular(tier, gait, amplitudes)
         seconds, errors, found, reference = {}, {}, {}, None
-        if any(t.looks_up == "connection" and not t.is_direct(scene.system) for t in chosen.values()):
+        if any(map(self.needs_field, methods)):
             seconds["field"] = timed(lambda: self.compute_field(progress))[1]
         for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
             if chosen[method].is_direct(scene.system):

@@ -110,9 +110,12 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
 
 def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
-    parts = {name: repr(getattr(scene, name)) for name in ("system", "gait", "numerics")}
+    system = scene.system
+    of_system = {f.name: repr(getattr(system, f.name)) for f in dataclasses.fields(system) if f.name != "solver"}
+    numerics = f"{scene.numerics}, {system.solver}"
+    parts = {"system": system.kind, **of_system, "gait": repr(scene.gait), "numerics": numerics}
     over = [[name, list(x)] for name, x in values.items()]
-    return {"geomech": __version__, "solver": SOLVER, "scene": written.toml(scene), **parts, "over": over}
+    return {"geomech": __version__, "solver": SOLVER, "scene": scene.text, **parts, "over": over}
 
 
 class _Rows(list):
@@ -199,7 +202,7 @@ def beside(scenes: list[Scene], amplitudes=None) -> Scene:
     if not isinstance(joined.system, Swimmer):
         return joined
     effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
-    return joined.with_system(effects=effects)
+    return joined.changed(effects=effects)
 
 
 @dataclasses.dataclass(frozen=True)

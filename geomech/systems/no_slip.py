@@ -47,6 +47,9 @@ class NoSlipSnake(Plain):
         rows, shape = np.stack([-m.s, m.c, m.r_n], -1).swapaxes(0, 1), alpha.shape[:-1]
         return rows.reshape(*shape, 3, 3), m.v[1].T.reshape(*shape, 3)
 
+    def about(self) -> dict:
+        return {"singular_shapes": f"nan, where {self.singular}, and where they lie between a grid point and the next"}
+
     def singularity(self, alpha) -> np.ndarray:
         """The determinant of the three equations (...,), 0 at singular shapes; no unit."""
         det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])

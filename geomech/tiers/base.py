@@ -9,7 +9,7 @@ import numpy as np
 
 from geomech.errors import number, real_array
 from geomech.gaits import Gait
-from geomech.systems.base import ALL, SHAPE_ALONE, Premise, System
+from geomech.systems.base import ALL, System
 
 WHOLE = {  # numbers of [numerics], from and to
     "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
@@ -109,6 +109,3 @@ def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
     flat, size = amplitudes.reshape(-1), max(1, size)
     found = [f(flat[k : k + size]) for k in range(0, flat.size, size)]
     return np.concatenate(found).reshape(*amplitudes.shape, -1) if found else np.zeros((*amplitudes.shape, 3))
-
-
-__all__ = ["ALL", "SHAPE_ALONE", "Numerics", "Premise", "Tier", "in_groups"]
