@@ -16,6 +16,7 @@ from rft.balance import checked_body
 from rft.bodies import KINDS as BODIES
 from rft.bodies.base import halves
 from rft.bodies.pieces import PIECES
+from rft.contact import Model
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
 from rft.effects.base import MOST_PIECES, pieced
@@ -77,7 +78,7 @@ class Swimmer(Plain):
             if kinds.count(type(effect)) > 1:
                 raise ValueError(f"[[effects]] {effect.kind} is asked for twice: keep one")
             try:
-                effect.load(None, self.medium, self.body)
+                effect.apply(Model.of(self.medium))
             except ValueError as error:
                 raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
 
@@ -133,9 +134,9 @@ class Swimmer(Plain):
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
         body = pieced(self.body, self.effects, self.solver.pieces)
-        for effect in self.effects:
-            body = effect.body(body)
-        return len(halves(body))
+        motion = body.motion(*np.zeros((2, body.joints, 1)))
+        model = rft.effects.folded(self.effects, self.medium, body)
+        return sum(len(m.half) for m in model.motions(motion).values())
 
     @property
     def evaluations(self) -> int:
@@ -187,7 +188,8 @@ class Swimmer(Plain):
         right. RuntimeError if a force balance did not converge or a march did not settle."""
         speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
         if not self.steps:
-            each = dataclasses.replace(self, effects=tuple(rft.effects.repeated(self.effects, alpha.shape[-2])))
+            samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
+            each = dataclasses.replace(self, effects=tuple(e.take(samples) for e in self.effects))
             solution = each.solve(alpha, alphadot).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
             return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
