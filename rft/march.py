@@ -60,7 +60,7 @@ class March(NamedTuple):
         if (self.status == "unsettled").any():
             raise RuntimeError(
                 f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
-                "give 'cycles' to take it as it is, or lower the mass"
+                "give 'cycles' to take it as it is, or lower the mass or the ground's weakening"
             )
         return self
 

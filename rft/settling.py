@@ -1,7 +1,8 @@
 """How far a march is from its limit cycle, and how a heavy body gets there sooner.
 
 From cycle to cycle the displacement changes by less and less; what is left is the sum of all changes to come, not the
-last of them. Without mass the last two give their ratio. A heavy body forgets over many cycles, but only what its three
+last of them. Without mass the last few give their ratio. Where the ground remembers in cells, changes at last come and go
+at random: these take turns in sign, and do not add up. A heavy body forgets over many cycles, but only what its three
 velocities at the start of a cycle are: the map from these to those at the next start is affine near its fixed point, and
 the last few cycles tell it along the ways they went (Anderson's mixing, for which nothing but the velocities is touched:
 what the ground remembers follows by itself).
@@ -14,7 +15,8 @@ import numpy as np
 DEEPEST = 6  # cycles the limit is found from; a velocity has three numbers, but the map bends
 SINGULAR = 1e-6  # of the largest singular value, below which two cycles went the same way
 UNKNOWN = 0.5  # ratio of the first change of displacement to the next, assumed
-SLOWEST = 0.95  # ratio of a change to that before, where they hardly shrink: what the ground remembers has cells
+SLOWEST = 0.95  # ratio of a change to that before, where they hardly shrink
+RATIOS = 3  # of late, whose mean counts
 ASTRAY = 100.0  # times the change of velocity before: a kick that led away from the limit
 FAILURES = 3  # after so many of these a sample goes round and round without
 
@@ -23,19 +25,21 @@ class Approach:
     """Cycle after cycle of B samples."""
 
     def __init__(self, samples: int):
-        self.moved, self.drift = None, np.full(samples, np.inf)
+        self.moved, self.change, self.drift = None, None, np.full(samples, np.inf)
+        self.ratios: list[np.ndarray] = []
 
     def after(self, start, end, moved: np.ndarray) -> np.ndarray:
         """(B,): how much displacement changes from the cycle before and in all to come, its largest component, after a cycle
         that moved so, (3, B). start, end: (3, B), body velocities at the ends of the cycle."""
-        if self.moved is None:
-            self.moved = moved
+        last, self.moved = self.moved, moved
+        if last is None:
             return self.drift
-        drift, self.moved = np.abs(moved - self.moved).max(0), moved
-        known = np.isfinite(self.drift)
-        ratio = np.where(known, drift / np.where(known & (self.drift > 0), self.drift, 1.0), UNKNOWN)
-        self.drift = drift
-        return drift / (1 - np.minimum(ratio, SLOWEST))
+        before, self.change = self.change, moved - last
+        if before is not None:
+            ratio = self.change / np.where(before == 0, 1.0, before)
+            self.ratios = [*self.ratios[1 - RATIOS :], np.clip(ratio, -1.0, 1.0)]
+        ratio = np.clip(np.mean(self.ratios, axis=0), 0.0, SLOWEST) if self.ratios else UNKNOWN
+        return np.max(np.abs(self.change) / (1 - ratio), axis=0)
 
 
 class HeavyApproach(Approach):

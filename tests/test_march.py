@@ -418,6 +418,20 @@ def test_what_is_left_is_the_sum_of_all_changes_to_come():
     assert np.isinf(Approach(2).after(None, None, size)).all()
 
 
+def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
+    """Changes of displacement as the sandfish's on disturbed ground: they shrink, then come and go at random, sample by sample
+    and in heading most."""
+    rng, slow = np.random.default_rng(2), np.array([0.5, 0.7, 0.8, 0.2, 0.6, 0.3, 0.4])
+    cells, approach, settled = np.array([0.4e-4, 0.9e-4, 3e-4]), Approach(7), []
+    for k in range(40):
+        left = 0.02 * slow**k * np.array([[1.0], [-0.5], [0.2]])
+        said = approach.after(None, None, 0.3 + left + cells[:, None] * rng.normal(size=(3, 7)))
+        settled.append((said <= 1e-3).all())
+        assert k < 2 or (said > 0.4 * np.abs(left).max(0) - 2e-4).all(), k
+    assert not any(settled[:10])
+    assert 14 < np.count_nonzero(settled[14:])
+
+
 def last_of(cycles, medium, body, gait, phases, effects):
     """(phases + 1, 3): xi through the last of so many cycles, and the pose after it."""
     found = march(medium, body, *gait.cycle(phases), effects=effects, cycles=cycles)
