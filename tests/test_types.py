@@ -119,8 +119,10 @@ def geometries(value):
     yield "gait of the scene", lambda: Study(plain).displacement("direct", value)
     yield "method", lambda: Study(plain).displacement(value)
     yield "amplitudes", lambda: Study(plain).displacement("direct", amplitudes=value)
-    yield "gait of the scene", lambda: Study(plain).study([1.0], ["direct"], value)
-    yield "amplitudes of a study", lambda: Study(plain).study(value, ["direct"])
+    for ask in (Study(plain).study, Study(plain).cost):
+        yield "gait of the scene", lambda ask=ask: ask([1.0], ["direct"], value)
+        yield "amplitudes of a study", lambda ask=ask: ask(value, ["direct"])
+        yield "methods", lambda ask=ask: ask([1.0], value)
     yield "gait of the scene", lambda: plain.cycle(value)
     yield "shape", lambda: fitted(value)
     yield "xi", lambda: reconstruct.displacement(value)
@@ -137,7 +139,7 @@ def geometries(value):
 TAKEN = {
     *itertools.product(("threads", "cycles", "amplitudes", "gait of the scene", "a change"), ["None"]),
     *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
-    *itertools.product(["amplitudes of a study"], ("empty", "list")),
+    *itertools.product(["amplitudes of a study"], ("empty", "list")), ("methods", "empty"),
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
     ("effects", "empty"),
 }  # fmt: skip

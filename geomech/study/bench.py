@@ -105,14 +105,7 @@ class Study:
         are timed on their own.
         """
         scene = self.scene
-        gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
-        if amplitudes.ndim != 1:
-            raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
-        with named(scene.name):
-            chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
-            for tier in chosen.values():
-                tier.refuse(scene.system)
-                self._refuse_singular(tier, gait, amplitudes)
+        gait, amplitudes, chosen = self._asked(gait, amplitudes, methods)
         seconds, errors, found, reference = {}, {}, {}, None
         if any(map(self.needs_field, methods)):
             seconds["field"] = timed(lambda: self.compute_field(progress))[1]
@@ -134,8 +127,24 @@ class Study:
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> cost.Cost:
         """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""
+        gait, amplitudes, _ = self._asked(gait, amplitudes, methods)
         with named(self.scene.name):
             return cost.price(cost.study(self.scene, methods, len(amplitudes), gait))
+
+    def _asked(self, gait, amplitudes, methods):
+        """(gait, or the scene's own, amplitudes (B,), tiers by name) of a request; SceneError for what makes none."""
+        scene = self.scene
+        gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
+        if amplitudes.ndim != 1:
+            raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
+        if isinstance(methods, str) or not isinstance(methods, Sequence):
+            raise SceneError(f"{scene.name}: methods must be a list of {', '.join(METHODS)}, got {short(methods)}")
+        with named(scene.name):
+            chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
+            for tier in chosen.values():
+                tier.refuse(scene.system)
+                self._refuse_singular(tier, gait, amplitudes)
+        return gait, amplitudes, chosen
 
 
 def timed(f: Callable):
