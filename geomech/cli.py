@@ -219,9 +219,14 @@ def sweep(
     with progress(f"sweep of {scene.name}") as bar:
         allow(scene, sweeping.cost(scene, axes), yes)
         results = sweeping.sweep(scene, axes, partial, bar)
-    sweeping.save(out, scene, results)
-    if plot:
-        plots.save(sweeping.draw(scene, results), plot)
+    try:
+        sweeping.save(out, scene, results)
+        if plot:
+            plots.save(sweeping.draw(scene, results), plot)
+    except BaseException as error:
+        if partial.exists():
+            error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
+        raise
     partial.unlink(missing_ok=True)
     net = plots.net(results["displacement"])
     print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.system.unit}, in {out}")
@@ -407,7 +412,7 @@ def _run(argv: list[str] | None) -> int:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
-        _tell("error: " + " ".join([text, *getattr(error, "__notes__", ())]))
+        _tell("error: " + "; ".join([text, *getattr(error, "__notes__", ())]))
         if isinstance(error, OSError):
             _deaf(sys.stdout)
     return 2

@@ -357,7 +357,11 @@ def test_a_sweep_stays_until_it_is_saved(tmp_path, monkeypatch):
     for what in ("save", "draw"):
         with monkeypatch.context() as patch:
             patch.setattr(sweep, what, full)
-            assert geomech("sweep", *args, cwd=tmp_path)[0] == 2
+            code, _, err = geomech("sweep", *args, cwd=tmp_path)
+        assert code == 2
+        assert err.endswith(
+            "left on device; what is done is kept in .s.nc.partial: the same command goes on from there\n"
+        )
         assert (tmp_path / ".s.nc.partial").exists()
     monkeypatch.setattr(sweep, "_rows", full)
     assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
