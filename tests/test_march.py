@@ -358,7 +358,7 @@ def test_estimates_cover_what_pieces_leave(kind, seeds, truths):
 @pytest.mark.soak
 @pytest.mark.timeout(3000)
 def test_estimates_cover_what_pieces_leave_of_many_random_chains():
-    """60 scenes of three amplitudes: the README's row."""
+    """60 scenes of three amplitudes; the README's row has the first four of each kind."""
     found, at_once = {}, lambda _, compute, *question: compute(*question)
     for kind in ("transient", "disturbed", "depth"):
         for k in range(20):
