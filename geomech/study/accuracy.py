@@ -20,6 +20,7 @@ from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.cost import Cost
 from geomech.study.offer import tiers
+from geomech.tiers import TIERS
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)
@@ -52,11 +53,12 @@ class Knob:
         return scene.with_numerics(**{self.setting: f"{self.rule}:{value}" if self.rule else value})
 
     def applies(self, scene: Scene) -> bool:
-        if scene.system.linear and (
-            self.setting in ("regularisation", "directions") or self.tier in ("path", "harmonic")
-        ):
+        system = scene.system
+        if system.linear and self.setting in ("regularisation", "directions"):
             return False
-        return self.tier in tiers(scene.system) and (self.setting != "pieces" or scene.system.cut > 0)
+        if self.tier != "direct" and TIERS[self.tier].is_direct(system):
+            return False
+        return self.tier in tiers(system) and (self.setting != "pieces" or system.cut > 0)
 
 
 KNOBS = (
@@ -114,7 +116,7 @@ def cost(scene: Scene, runs: int = 2) -> Cost:
 
 def _jobs(knob: Knob, scene: Scene) -> list[foretold.Job]:
     """Those of a displacement by the knob's tier."""
-    if knob.tier != "direct":
+    if TIERS[knob.tier].looks_up:
         return [foretold.built(scene, knob.tier)]
     return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
 

@@ -16,9 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.errors import SceneError
-from geomech.field import Field
 from geomech.gaits import Gait
-from geomech.harmonics import Harmonics
 from geomech.scene.model import Scene
 from geomech.study import estimate
 from geomech.study.offer import lookups as looked_up
@@ -77,7 +75,8 @@ class Job(NamedTuple):
     def kind(self) -> str:
         """The same for jobs whose balances, steps or look-ups take the same time."""
         s = self.scene
-        terms = s.numerics.harmonics if self.tier == "harmonic" else 0
+        table = TIERS[self.tier].depends_on if self.tier else ()
+        terms = [getattr(s.numerics, name) for name in table if name not in ("grid", "extent", "directions")]
         return repr((self.what, s.system.costs_as, self.gait, self.group, self.tier, terms))
 
 
@@ -110,8 +109,9 @@ def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = 
     """`Study.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
     gait, phases = gait or scene.gait, scene.numerics.phases
     lookups = [m for m in methods if m in looked_up(scene.system)]
-    jobs = [built(scene, m, gait) for m in lookups if tables and not (m == "path" and "area" in lookups)]
-    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m != "adapted"]
+    shared = {TIERS[m].looks_up: m for m in reversed(lookups)}
+    jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
+    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups]
     if len(lookups) < len(methods):
         return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
@@ -147,21 +147,20 @@ def _refinements(scene: Scene, marching: bool) -> float:
 
 def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     """The table of a tier; that of area and path is the connection with its CCF."""
-    n, joints = scene.numerics, scene.system.joints
-    if tier != "adapted":
-        axes(scene.system, n)  # refuses a field that is too large
-    values = {"harmonic": n.harmonics + 2, "adapted": 0}.get(tier, joints + 3) * 3 * n.grid**joints
-    values += n.curves * (n.phases // 2) * 3 if tier == "adapted" else 0
-    place = (gait or scene.gait) if tier == "adapted" else None
-    memory = BASE + 8 * TABLES * values
-    return Job("balances", scene, place, TIERS[tier].solves(scene.system, n, 1, n.phases), memory=memory)
+    how, system, n, gait = TIERS[tier], scene.system, scene.numerics, gait or scene.gait
+    family = how.reach(gait, [0.0])
+    if not family:
+        axes(system, n)  # refuses a field that is too large
+    memory = BASE + 8 * TABLES * how.size(system, n)
+    return Job("balances", scene, gait if family else None, how.solves(system, n, 1, n.phases), memory=memory)
 
 
 def _per_sample(job: Job, count: float) -> float:
     """Seconds a force balance, or a look-up, takes."""
     scene = job.scene
     if job.what == "look-ups":
-        return 0.0 if count < 1e5 else _grown(_look(scene, job.tier), 64, count)
+        look = TIERS[job.tier].sample(scene.system, scene.numerics) if count >= 1e5 else None
+        return _grown(look, 64, count) if look else 0.0
     prior = SLOW * scene.system.evaluations
     if prior * count < FREE:
         return prior / 2
@@ -175,18 +174,6 @@ def _per_sample(job: Job, count: float) -> float:
         return scene.system.sample(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
 
     return _grown(solve, max(8, 3072 // scene.system.elements), count)
-
-
-def _look(scene: Scene, tier: str) -> Callable:
-    """Looks n shapes up in a table of zeros, as large as a shape touches."""
-    joints, degree = scene.system.joints, scene.numerics.interpolation
-    axes = (np.linspace(-1.0, 1.0, degree + 3),) * joints
-    size = [len(a) for a in axes]
-    if tier == "harmonic":
-        table = Harmonics(axes, np.zeros((3, scene.numerics.harmonics + 1, *size)), np.zeros((3, *size)), degree)
-        return lambda n: table.velocity(np.zeros((n, joints)), np.ones((n, joints)))
-    field = Field(axes, np.zeros((3, joints if tier == "path" else 1, *size)), degree)
-    return lambda n: field(np.zeros((n, joints)))
 
 
 def _per_step(job: Job, count: float) -> tuple[float, int]:

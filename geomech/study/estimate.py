@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.errors import named
 from geomech.gaits import Gait
 from geomech.reconstruct import displacement
 from geomech.scene.model import Scene
@@ -42,11 +43,12 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
 
 def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier; None: the gait's own amplitude."""
-    if amplitudes is None:
-        return _direct(scene, gait, None, phases)
     size = scene.system.at_once(phases)
-    groups = [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
-    return tuple(np.concatenate(x) for x in zip(*(_direct(scene, gait, some, phases) for some in groups)))
+    groups = (
+        [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
+    )
+    with named(scene.name):
+        return tuple(np.concatenate(x) for x in zip(*(_direct(scene, gait, some, phases) for some in groups)))
 
 
 def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):

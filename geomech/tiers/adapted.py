@@ -32,5 +32,8 @@ class Adapted(Tier):
     def solves(self, system, numerics, count, phases):
         return numerics.curves * (numerics.phases // 2)
 
+    def size(self, system, numerics):
+        return numerics.curves * (numerics.phases // 2) * 3
+
     def predict(self, table, system, gait, amplitudes, numerics):
         return table.area(np.asarray(gait.amplitude if amplitudes is None else amplitudes, float))

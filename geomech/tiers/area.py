@@ -10,7 +10,7 @@ from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.tiers.base import in_groups
-from geomech.tiers.path import Path
+from geomech.tiers.path import Path, zeros
 from rft import se2
 
 
@@ -42,6 +42,10 @@ class Area(Path):
 
     def is_direct(self, system):
         return False
+
+    def sample(self, system, numerics):
+        field = zeros(system, numerics, (3, 1))
+        return lambda n: field(np.zeros((n, 2)))
 
     def predict(self, table, system, gait, amplitudes, numerics):
         return area(ccf(table), gait, amplitudes, numerics.phases)

@@ -98,6 +98,14 @@ class Tier:
         """Velocities that it asks for in all: its cost, look-ups being cheap beside it."""
         raise NotImplementedError
 
+    def size(self, system: System, numerics: Numerics) -> int:
+        """Numbers that the table holds."""
+        return 0
+
+    def sample(self, system: System, numerics: Numerics) -> Callable | None:
+        """Looks n shapes up in a table of zeros, as large as a shape touches, to be timed; None if that costs nothing."""
+        return None
+
     def predict(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray:
         """Net poses (..., 3) for amplitudes (...,), or the gait's own."""
         raise NotImplementedError

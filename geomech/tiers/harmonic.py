@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from geomech import harmonics
-from geomech.tiers.path import Path, axes, path, shapes
+from geomech.tiers.path import Path, axes, path, shapes, zeros
 
 
 class Harmonic(Path):
@@ -27,6 +29,14 @@ class Harmonic(Path):
 
     def solves(self, system, numerics, count, phases):
         return shapes(system, numerics) * self.directions(system, numerics)
+
+    def size(self, system, numerics):
+        return (numerics.harmonics + 2) * 3 * numerics.grid**2
+
+    def sample(self, system, numerics):
+        field = zeros(system, numerics, (3, numerics.harmonics + 1))
+        table = harmonics.Harmonics(field.axes, field.values, field.values[:, 0], field.degree)
+        return lambda n: table.velocity(np.zeros((n, 2)), np.ones((n, 2)))
 
     def predict(self, table, system, gait, amplitudes, numerics):
         return path(system.velocity if self.is_direct(system) else table.velocity, gait, amplitudes, numerics.phases)

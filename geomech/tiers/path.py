@@ -6,6 +6,7 @@ import numpy as np
 
 from geomech import connection
 from geomech.connection import Connection, Velocity
+from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
@@ -34,6 +35,12 @@ def shapes(system, numerics) -> int:
     return numerics.grid**system.joints // (2 if system.mirror else 1)
 
 
+def zeros(system, numerics, components: tuple[int, ...]) -> Field:
+    """A field of zeros on as many points as a spline through one touches."""
+    axes = (np.linspace(-1.0, 1.0, numerics.interpolation + 3),) * system.joints
+    return Field(axes, np.zeros((*components, *map(len, axes))), numerics.interpolation)
+
+
 class Path(Tier):
     """Looks the least-squares connection up. Where xi = A alphadot holds exactly it needs none, and is the direct tier."""
 
@@ -58,6 +65,13 @@ class Path(Tier):
 
     def solves(self, system, numerics, count, phases):
         return shapes(system, numerics) * self.directions(system, numerics)
+
+    def size(self, system, numerics):
+        return (system.joints + 3) * 3 * numerics.grid**system.joints
+
+    def sample(self, system, numerics):
+        field = zeros(system, numerics, (3, system.joints))
+        return lambda n: field(np.zeros((n, system.joints)))
 
     def predict(self, table, system, gait, amplitudes, numerics):
         return path(system.velocity if self.is_direct(system) else table, gait, amplitudes, numerics.phases)
