@@ -349,11 +349,11 @@ def test_onset_and_offset_are_where_the_moment_changes_sign(case):
     """Solved anew just before and after, between the phases that the lines were found from."""
     found = undulation.activation(case)
     assert (found["changes"] == 2).all()
-    joints = np.arange(case.body.joints)
+    joints = np.arange(case.system.body.joints)
     for key, sign in (("onset", 1.0), ("offset", -1.0)):
         for step in (-0.02, 0.02):
             alpha, alphadot = case.gait.shape(found[key] + step), case.gait.rate(found[key] + step)
-            moment = case.work(alpha, alphadot, case.velocity(alpha, alphadot)).moment[joints, joints]
+            moment = case.system.work(alpha, alphadot, case.system.velocity(alpha, alphadot)).moment[joints, joints]
             assert (np.sign(moment) == -sign * np.sign(step)).all()
     np.testing.assert_allclose(found["offset"] - found["onset"], np.pi, atol=1e-6)  # left and right are alike
 
