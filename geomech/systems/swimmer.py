@@ -78,7 +78,7 @@ class Swimmer(Plain):
             if kinds.count(type(effect)) > 1:
                 raise ValueError(f"[[effects]] {effect.kind} is asked for twice: keep one")
             try:
-                effect.apply(Model.of(self.medium))
+                effect.apply(Model.of(self.medium, self.solver.loads))
             except ValueError as error:
                 raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
 
@@ -135,7 +135,7 @@ class Swimmer(Plain):
         """Straight elements of the body, as its effects cut it."""
         body = pieced(self.body, self.effects, self.solver.pieces)
         motion = body.motion(*np.zeros((2, body.joints, 1)))
-        model = rft.effects.folded(self.effects, self.medium, body)
+        model = rft.effects.folded(self.effects, self.medium, body, self.solver.loads)
         return sum(len(m.half) for m in model.motions(motion).values())
 
     @property

@@ -95,31 +95,29 @@ class Ground:
 
     def _cells(self, i, j):
         """Flat places in the arrays of the cells (i, j) of the plane, and the patches they belong to."""
-        patch = (i // self.size + 2**20) * 2**21 + j // self.size + 2**20
-        return (i % self.size) * self.size + j % self.size, patch
+        (row_patch, row), (column_patch, column) = np.divmod(i, self.size), np.divmod(j, self.size)
+        return row * self.size + column, (row_patch + 2**20) * 2**21 + (column_patch + 2**20)
 
     def at(self, place: np.ndarray) -> np.ndarray:
         """Disturbance at complex places (..., B), bilinear between cell centres."""
         x, y = place.real / self.cell - 0.5, place.imag / self.cell - 0.5
-        i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        i, j = np.floor(x), np.floor(y)
         x, y = x - i, y - j
-        out = 0.0
-        for di, dj, share in ((0, 0, (1 - x) * (1 - y)), (1, 0, x * (1 - y)), (0, 1, (1 - x) * y), (1, 1, x * y)):
-            where, patch = self._cells(i + di, j + dj)
-            here = self.owner[where, self.sample] == patch
-            out = out + np.where(here, share * self.value[where, self.sample], 0.0)
-        return out
+        i, j = i.astype(np.int64), j.astype(np.int64)
+        where, patch = self._cells(np.stack([i, i + 1])[:, None], np.stack([j, j + 1]))  # (2, 2, ..., B)
+        share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
+        here = self.owner[where, self.sample] == patch
+        return np.where(here, share * self.value[where, self.sample], 0.0).sum((0, 1))
 
     def mark(self, place: np.ndarray, radius: float) -> None:
         """Disturb the ground around complex places (..., B): wholly up to radius / 2, not at all beyond 3 radius / 2."""
         reach = int(np.ceil(1.5 * radius / self.cell))
-        around = np.arange(-reach, reach + 1)
-        di, dj = (d.reshape(-1, *([1] * place.ndim)) for d in np.meshgrid(around, around))
-        i = np.floor(place.real / self.cell).astype(np.int64) + di
-        j = np.floor(place.imag / self.cell).astype(np.int64) + dj
+        around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
+        i, j = (np.floor(x / self.cell).astype(np.int64) + around for x in (place.real, place.imag))
+        i = i[:, None]
         distance = np.hypot((i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag)
         value = np.clip(1.5 - distance / radius, 0.0, 1.0)
-        where, patch = self._cells(i, j)
+        where, patch = self._cells(i, j)  # (cells along, cells across, ..., B)
         sample = np.broadcast_to(self.sample, where.shape)
         stale = self.owner[where, sample] != patch
         self.value[where[stale], sample[stale]] = 0.0
