@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion
+from rft.bodies.base import Body, Kinematics
 from rft.bodies.pieces import PIECES
 from rft.effects.base import Effect, broken, engine, folded, pieced
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
@@ -79,7 +79,7 @@ def body_velocity(
         shape, rate, model = alpha[:, moving], alphadot[:, moving], problem.model.take(moving)
 
         def motion(index):
-            return Motion.stacked(list(model.motions(body.motion(shape[:, index], rate[:, index])).values()))
+            return Kinematics.stacked(list(model.motions(body.motion(shape[:, index], rate[:, index])).values()))
 
         solved = problem.solve(motion, speed[moving], threads, model=model)
         xi[:, moving] = solved.xi * [[body.length], [body.length], [1.0]]

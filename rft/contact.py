@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.loads import element_load, parse
 from rft.media.base import Medium
 from rft.sides import sided
@@ -75,7 +75,7 @@ class Term(Protocol):
 
     def __call__(self, xi) -> np.ndarray: ...
     def take(self, index) -> Term: ...
-    def on_elements(self, xi, motion: Motion, v) -> np.ndarray:
+    def on_elements(self, xi, motion: Kinematics, v) -> np.ndarray:
         """(3, n, B): the part of it that each element of the body's side bears, velocities v (3, n, B)."""
 
 
@@ -100,7 +100,7 @@ class Averages(PerSample):
         return self.averages(v_t, v_n, spin, eps)
 
 
-def everywhere(motion: Motion) -> Motion:
+def everywhere(motion: Kinematics) -> Kinematics:
     return motion
 
 
@@ -108,13 +108,13 @@ def everywhere(motion: Motion) -> Motion:
 class Contact:
     """A group of elements and what acts on them: factors x (the law, each side of it times its shares) + additions.
 
-    elements: of the plain body's `Motion`, that of the contact's own elements. stations: (n,), where they hang on the body,
+    elements: of the plain body's `Kinematics`, that of the contact's own elements. stations: (n,), where they hang on the body,
     0 its tail, 1 its head; None for the body's elements themselves, each at its centre. buried: whether it lies at the
     body's depth.
     """
 
     law: Law
-    elements: Callable[[Motion], Motion] = everywhere
+    elements: Callable[[Kinematics], Kinematics] = everywhere
     stations: tuple[float, ...] | None = None
     buried: bool = True
     factors: tuple[Factor, ...] = ()
@@ -138,8 +138,8 @@ class Contact:
             out += extra(v_t, v_n, spin, eps)
         return out
 
-    def places(self, motion: Motion) -> np.ndarray:
-        """(n,): stations of the elements, whose `Motion` is given."""
+    def places(self, motion: Kinematics) -> np.ndarray:
+        """(n,): stations of the elements, whose `Kinematics` is given."""
         if self.stations is not None:
             return np.array(self.stations)
         half = motion.half[:, 0]
@@ -198,7 +198,7 @@ class Model:
     def rate_independent(self) -> bool:
         return not self.terms and all(c.rate_independent for c in self.contacts.values())
 
-    def motions(self, plain: Motion) -> dict[str, Motion]:
+    def motions(self, plain: Kinematics) -> dict[str, Kinematics]:
         """Elements of every contact, from those of the plain body."""
         return {name: contact.elements(plain) for name, contact in self.contacts.items()}
 
@@ -216,7 +216,7 @@ class Model:
         return replace(self, contacts=dict(zip(self.contacts, contacts)), terms=terms)
 
 
-def rows(motions: dict[str, Motion]) -> list[slice]:
+def rows(motions: dict[str, Kinematics]) -> list[slice]:
     """Where every contact's elements are among all of them, one contact after the other."""
     ends = np.cumsum([0, *(len(m.half) for m in motions.values())]).tolist()
     return [slice(*pair) for pair in itertools.pairwise(ends)]

@@ -1,16 +1,16 @@
 """Force of the medium on straight elements: exact where a closed form exists, by quadrature elsewhere.
 
-An element of unit length slides along itself with speed ``a`` and sideways with ``u(s) = m + w s``,
-``s`` in [-1, 1] from tail to head, so ``w`` is its rate of turning times its half length. A load takes
-(a, m, w), arrays of one shape, and returns the averages over s
+An element of unit length slides along itself with speed ``v_t`` and sideways with ``u(s) = v_n + s spin``,
+``s`` in [-1, 1] from tail to head, so ``spin`` is its rate of turning times its half length. A load takes
+(v_t, v_n, spin), arrays of one shape, and returns the averages over s
 
     f[0] = <f_t>,  f[1] = <f_n>,  f[2] = <s f_n>
 
 of the drag per unit length, positive along the velocity it opposes, beside their tangent: an array
-(3, 4, ...) whose column 0 is f and whose columns 1 to 3 are d f / d (a, m, w).
+(3, 4, ...) whose column 0 is f and whose columns 1 to 3 are d f / d (v_t, v_n, spin).
 
-Closed form. With R = sqrt(A^2 + u^2), A^2 = q^2 a^2 + eps^2, the end values R1, R2 and S = R1 + R2 give
-elliptic coordinates mu = 2 m / S, t = 2 w / S in which A^2 = S^2 (1 - mu^2)(1 - t^2) / 4, and every average
+Closed form. With R = sqrt(A^2 + u^2), A^2 = q^2 v_t^2 + eps^2, the end values R1, R2 and S = R1 + R2 give
+elliptic coordinates mu = 2 v_n / S, t = 2 spin / S in which A^2 = S^2 (1 - mu^2)(1 - t^2) / 4, and every average
 is elementary in mu, t and one function k(t) = (atanh t - t) / t^3:
 
     <1/R> = (2/S)(1 + t^2 k)    <u/R> = mu    <s u/R> = (1 - mu^2) t h / 2,   h = 1 - (1 - t^2) k.
@@ -31,7 +31,7 @@ SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses a
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
-# (a, m, w, eps) -> (3, 4, n, B)
+# (v_t, v_n, spin, eps) -> (3, 4, n, B)
 LoadLaw = Callable[..., np.ndarray]
 
 
@@ -60,16 +60,16 @@ class Ends:
     h: np.ndarray
 
     @classmethod
-    def of(cls, A2: np.ndarray, m: np.ndarray, w: np.ndarray) -> Ends:
-        abs_m, abs_w = np.abs(m), np.abs(w)
-        lead = abs_m - abs_w
-        u_near, u_far = np.abs(lead), abs_m + abs_w
+    def of(cls, A2: np.ndarray, v_n: np.ndarray, spin: np.ndarray) -> Ends:
+        abs_n, abs_spin = np.abs(v_n), np.abs(spin)
+        lead = abs_n - abs_spin
+        u_near, u_far = np.abs(lead), abs_n + abs_spin
         R_near, R_far = np.sqrt(A2 + u_near * u_near), np.sqrt(A2 + u_far * u_far)
         S = R_near + R_far + TINY
-        # S - 2 max(|m|, |w|) as a sum of positive terms: S - 2|m| and S - 2|w| would cancel.
+        # S - 2 max(|v_n|, |spin|) as a sum of positive terms: S - 2|v_n| and S - 2|spin| would cancel.
         excess = A2 / (R_near + u_near + TINY) + A2 / (R_far + u_far + TINY)
         inv = 1.0 / S
-        mu, t = 2.0 * m * inv, 2.0 * w * inv
+        mu, t = 2.0 * v_n * inv, 2.0 * spin * inv
         c_mu = (excess + (u_near - lead)) * (1.0 + np.abs(mu)) * inv
         c_t = (excess + (u_near + lead)) * (1.0 + np.abs(t)) * inv
         k = k_function(t * t, c_t)
@@ -88,54 +88,54 @@ def exact(medium: Medium) -> LoadLaw:
     q, k_t, k_n = np.array(terms).reshape(-1, 3).T
     q2, k_t = (q * q)[:, None, None], k_t[:axial]
 
-    def load(a, m, w, eps):
+    def load(v_t, v_n, spin, eps):
         if not terms:
-            out = np.zeros((3, 4, *a.shape))
+            out = np.zeros((3, 4, *v_t.shape))
         else:
-            out = _dry(Ends.of(q2 * (a * a) + eps * eps, m, w), a, q2 * a, k_t, k_n)
+            out = _dry(Ends.of(q2 * (v_t * v_t) + eps * eps, v_n, spin), v_t, q2 * v_t, k_t, k_n)
         if any(medium.viscous):
-            _add_viscous(out, medium.viscous, a, m, w)
+            _add_viscous(out, medium.viscous, v_t, v_n, spin)
         return out
 
     return load
 
 
-def _add_viscous(out, coefficients, a, m, w) -> None:
+def _add_viscous(out, coefficients, v_t, v_n, spin) -> None:
     c_t, c_n = coefficients
-    for i, (c, x) in enumerate(((c_t, a), (c_n, m), (c_n / 3.0, w))):
+    for i, (c, x) in enumerate(((c_t, v_t), (c_n, v_n), (c_n / 3.0, spin))):
         out[i, 0] += c * x
         out[i, i + 1] += c
 
 
-def _dry(e: Ends, a, qa, k_t, k_n) -> np.ndarray:
-    """Sum over terms of f_t = k_t a / R, f_n = k_n u / R; ``e`` and ``qa`` = q^2 a have the terms on axis 0."""
-    out = np.empty((3, 4, *a.shape))
+def _dry(e: Ends, v_t, q2_v_t, k_t, k_n) -> np.ndarray:
+    """Sum over terms of f_t = k_t v_t / R, f_n = k_n u / R; ``e`` and ``q2_v_t`` = q^2 v_t have the terms on axis 0."""
+    out = np.empty((3, 4, *v_t.shape))
     two_S = 2.0 / e.S
     mt = e.mu * e.t
     p = 1.0 / (e.c_mu + e.mu * e.mu * e.c_t + TINY)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
     cmp = e.c_mu * p
     four_S2 = two_S * two_S
     per_c_t = four_S2 / (e.c_t + TINY)
-    d_m = -four_S2 * e.mu * p  # d<1/R>/dm = -<u/R^3>
-    d_w = per_c_t * e.t * (e.h - cmp)  # d<1/R>/dw = -<s u/R^3>
+    by_n = -four_S2 * e.mu * p  # d<1/R>/dv_n = -<u/R^3>
+    by_spin = per_c_t * e.t * (e.h - cmp)  # d<1/R>/dspin = -<s u/R^3>
     first = k_t.size
-    rows = np.empty((first, 4, *a.shape))
+    rows = np.empty((first, 4, *v_t.shape))
     if first:
         inverse = two_S[:first] * (1.0 + e.t[:first] * e.t[:first] * e.k[:first])  # <1/R>
-        d_a = -qa[:first] * per_c_t[:first] * two_S[:first] * p[:first]  # -q^2 a <1/R^3>
-        np.multiply(a, inverse, out=rows[:, 0])
-        np.add(inverse, a * d_a, out=rows[:, 1])
-        np.multiply(a, d_m[:first], out=rows[:, 2])
-        np.multiply(a, d_w[:first], out=rows[:, 3])
+        by_t = -q2_v_t[:first] * per_c_t[:first] * two_S[:first] * p[:first]  # -q^2 v_t <1/R^3>
+        np.multiply(v_t, inverse, out=rows[:, 0])
+        np.add(inverse, v_t * by_t, out=rows[:, 1])
+        np.multiply(v_t, by_n[:first], out=rows[:, 2])
+        np.multiply(v_t, by_spin[:first], out=rows[:, 3])
     _weigh(k_t, rows, out[0])
-    rows = np.empty((k_n.size, 2, 4, *a.shape))
+    rows = np.empty((k_n.size, 2, 4, *v_t.shape))
     across, turning = rows[:, 0], rows[:, 1]
     across[:, 0] = e.mu
-    np.multiply(qa, d_m, out=across[:, 1])
+    np.multiply(q2_v_t, by_n, out=across[:, 1])
     np.multiply(two_S, cmp, out=across[:, 2])
     np.multiply(-mt, across[:, 2], out=across[:, 3])
     np.multiply(0.5 * e.c_mu * e.t, e.h, out=turning[:, 0])
-    np.multiply(qa, d_w, out=turning[:, 1])
+    np.multiply(q2_v_t, by_spin, out=turning[:, 1])
     turning[:, 2] = across[:, 3]
     np.multiply(two_S * e.c_mu, p - e.h, out=turning[:, 3])
     _weigh(k_n, rows, out[1:])
@@ -153,10 +153,10 @@ def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLa
     if medium.dry and any(medium.viscous):
         return _sum(quadrature(_dry_part(medium), nodes, weights), medium)
 
-    def load(a, m, w, eps):
-        u = m + w * s
-        a = np.broadcast_to(a, u.shape)
-        (f_t, f_n), slopes = _pointwise(medium, a, u, eps)
+    def load(v_t, v_n, spin, eps):
+        u = v_n + spin * s
+        v_t = np.broadcast_to(v_t, u.shape)
+        (f_t, f_n), slopes = _pointwise(medium, v_t, u, eps)
         (tt, tn), (nt, nn) = slopes
 
         def mean(x):
@@ -177,9 +177,9 @@ def _dry_part(medium: Medium) -> Medium:
 def _sum(dry: LoadLaw, medium: Medium) -> LoadLaw:
     """The load of dry terms with the medium's viscous ones, which are polynomials in s and need no rule."""
 
-    def load(a, m, w, eps):
-        out = dry(a, m, w, eps)
-        _add_viscous(out, medium.viscous, a, m, w)
+    def load(v_t, v_n, spin, eps):
+        out = dry(v_t, v_n, spin, eps)
+        _add_viscous(out, medium.viscous, v_t, v_n, spin)
         return out
 
     return load

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Motion, halves
+from rft.bodies.base import Body, Kinematics, halves
 from rft.bodies.pieces import PIECES
 from rft.contact import Model
 from rft.effects.base import Effect, Site, broken, folded, pieced, under_way
@@ -199,7 +199,11 @@ class _Steps:
             self.states = [p.begin(site) for p in self.processes]
         model = self._model(site)
         solved = self.balance.solve(
-            Motion.stacked(list(motions.values())).take, self.scales[k], 1, guess=None if first else guess, model=model
+            Kinematics.stacked(list(motions.values())).take,
+            self.scales[k],
+            1,
+            guess=None if first else guess,
+            model=model,
         )
         self.limit = max(self.limit, self.balance.limit)
         xi = solved.xi

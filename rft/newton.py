@@ -11,10 +11,7 @@ all its digits. What decides about a step, or an end, is the same in every frame
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -22,23 +19,16 @@ import numpy as np
 
 from rft.bodies.base import Body
 from rft.contact import SIDE, Model, rows
+from rft.linear import solve3
 from rft.path import follow
 from rft.samples import Samples
+from rft.workers import each, keep_freed_memory, workers
 
 LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
 LENGTHEN = 2.0  # the next part to try, after a success
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
-
-LARGE_BLOCK = 2**24  # bytes; glibc learns from blocks of up to 32 MB
-
-
-def keep_freed_memory() -> None:
-    """Let glibc see a large block freed: until then it hands freed memory back to the system, page by page; from then on
-    it keeps up to twice that much for the next temporaries. Half the solver's time on Linux, nothing elsewhere."""
-    np.empty(LARGE_BLOCK, np.uint8)
-
 
 keep_freed_memory()
 
@@ -112,7 +102,6 @@ class Balance:
         self.nodes = model.contacts[SIDE].law.nodes
         medium = model.medium
         lateral = abs(float(medium.traction(0.0, 1.0)[1]))
-        self.viscous_unit = medium.viscous[0] if medium.dry and medium.viscous else 0.0
         self.base = tolerance + 1e-14 * max(1.0, lateral / model.unit)  # rounding of the largest forces
         self.limit, self.linear = self.base, medium.dry == ()
 
@@ -123,8 +112,8 @@ class Balance:
         return cls(model, rows(model.motions(body.motion(zero, zero))), regularisation, tolerance)
 
     def solve(self, motion: Callable, scale, threads=None, guess=None, model: Model | None = None) -> Solved:
-        """Body velocities of B samples. motion(index): `Motion` of all contacts' elements of those samples. scale: (B,), the
-        size of their velocities. guess: (3, B), tried first. model: of this batch, if it is not the balance's own."""
+        """Body velocities of B samples. motion(index): `Kinematics` of all contacts' elements of those samples. scale:
+        (B,), the size of their velocities. guess: (3, B), tried first. model: of this batch, if not the balance's own."""
         self.motion, self.scale, self.guess = motion, scale, None if guess is None else guess / scale
         self.model = self.model if model is None else model
         self.scaled = not self.model.rate_independent
@@ -149,8 +138,12 @@ class Balance:
         if self.linear:
             return unit * scale
         if medium.dry is None:
-            return np.maximum(*(np.abs(x) for x in medium.traction(scale, 0.0 * scale)[:1] * 2))
-        return unit + self.viscous_unit * np.maximum(scale - 1.0, 0.0)
+            along, across = (
+                np.abs(medium.traction(*v)[k]) for k, v in enumerate(((scale, 0 * scale), (0 * scale, scale)))
+            )
+            return np.where(along > 0, along, across)
+        viscous = medium.viscous[0] if medium.viscous else 0.0
+        return unit + viscous * np.maximum(scale - 1.0, 0.0)
 
     def samples(self, index: np.ndarray) -> Samples:
         """Those of the batch."""
@@ -188,7 +181,7 @@ class Balance:
                     state = fresh if state is None else _State.join([state, fresh], self.model)
                 state = self._advance(state, descent, out)
 
-        _map(work, np.array_split(todo, _workers(threads, todo.size // (2 * batch))))
+        each(work, np.array_split(todo, workers(threads, todo.size // (2 * batch))))
 
     def _start(self, descent: Descent, of: Samples) -> _State:
         """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
@@ -202,13 +195,13 @@ class Balance:
     def viscous(self, of: Samples) -> np.ndarray:
         """(3, B): the solution with kinks rounded off almost without end."""
         net = self._net(of, of.motion.v, np.zeros((3, of.size)), np.full(of.size, 1e3))[1]
-        return -_solve3(net[:, 1:], net[:, 0])
+        return -solve3(net[:, 1:], net[:, 0])
 
     def with_slope(self, of: Samples, xi, v, eps) -> tuple[np.ndarray, np.ndarray, int]:
         """What comes to the frame, (3, 4, B), its derivative with respect to log eps, (3, B), and the evaluations taken."""
         load, net = self._net(of, v, xi, eps)
         if not self.scaled:
-            return net, -of.motion.total(_along(load, v)), 1
+            return net, -of.motion.wrench(_along(load, v)), 1
         more = self._net(of, v, xi, (1.0 + DIFFERENCE) * eps)[1]
         return net, (more[:, 0] - net[:, 0]) / DIFFERENCE, 2
 
@@ -272,8 +265,8 @@ class Balance:
             # in proportion to eps; one that slides feels eps^2.
             slope = _along(load[..., d], s.v[..., d]) * (s.of.scale[d] if self.scaled else 1.0)
             change = s.eps_next[d] / s.eps[d]
-            right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.of.motion.take(d).total(slope)
-        dx = _solve3(net[:, 1:], right)
+            right[:, d] += np.where(free, (change**2 - 1.0) / 2.0, change - 1.0) * s.of.motion.take(d).wrench(slope)
+        dx = solve3(net[:, 1:], right)
         if np.abs(dx).max(initial=0.0) <= 1.0:  # then no place within a body length moves by LARGEST_STEP
             return dx
         x, y, turn = dx
@@ -290,43 +283,10 @@ class Balance:
 
 def _slowest(v: np.ndarray) -> np.ndarray:
     """(B,): the speed of the slowest element, each by its faster end, from velocities (3, n, B)."""
-    a, m, w = v
-    return np.sqrt((a * a + (np.abs(m) + np.abs(w)) ** 2).min(0))
+    v_t, v_n, spin = v
+    return np.sqrt((v_t * v_t + (np.abs(v_n) + np.abs(spin)) ** 2).min(0))
 
 
 def _along(load: np.ndarray, v: np.ndarray) -> np.ndarray:
     """(3, n, B): the change of element loads (3, 4, n, B) along their velocities, tangent times v."""
     return np.einsum("ijnb,jnb->inb", load[:, 1:], v)
-
-
-def _workers(threads: int | None, useful: int) -> int:
-    return max(1, min(threads or os.cpu_count() or 1, useful))
-
-
-def _map(f: Callable, shares: list) -> None:
-    """f(share, stop) of each share, side by side: NumPy lets go of the interpreter inside its loops. What is raised here, by
-    a signal among others, sets ``stop``, so that no share goes on for more than a step."""
-    stop = threading.Event()
-    if len(shares) == 1:
-        return f(shares[0], stop)
-    with ThreadPoolExecutor(len(shares)) as pool:
-        try:
-            list(pool.map(lambda share: f(share, stop), shares))
-        except BaseException:
-            stop.set()
-            raise
-
-
-def _solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """x (3, B) with matrix x = right, by Cramer's rule on (3, 3, B); a singular matrix gives no step."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix
-    A, B, C = e * i - f * h, f * g - d * i, d * h - e * g
-    det = a * A + b * B + c * C
-    inverse = np.where(det == 0.0, 0.0, 1.0 / np.where(det == 0.0, 1.0, det))
-    x, y, z = right
-    rows = (
-        A * x + (c * h - b * i) * y + (b * f - c * e) * z,
-        B * x + (a * i - c * g) * y + (c * d - a * f) * z,
-        C * x + (b * g - a * h) * y + (a * e - b * d) * z,
-    )
-    return np.stack(rows) * inverse

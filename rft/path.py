@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
+from rft.linear import solve4
 from rft.samples import Samples
 
 WIDE = 10.0  # rounding to start from, body lengths per radian: no element is that fast
@@ -39,7 +40,7 @@ class _Point(NamedTuple):
     v: np.ndarray
     eps: np.ndarray
 
-    def moved(self, motion: Motion, change: np.ndarray) -> _Point:
+    def moved(self, motion: Kinematics, change: np.ndarray) -> _Point:
         """After a change (4, B) of (xi, log eps)."""
         return _Point(self.xi + change[:3], self.v + motion.carried(change[:3]), self.eps * np.exp(change[3]))
 
@@ -52,10 +53,10 @@ class _Point(NamedTuple):
 
     def speed2(self) -> np.ndarray:
         """(n, B): squares of the elements' speeds, each at its faster end, and of eps."""
-        a, m, w = self.v
-        return a * a + (np.abs(m) + np.abs(w)) ** 2 + self.eps**2
+        v_t, v_n, spin = self.v
+        return v_t * v_t + (np.abs(v_n) + np.abs(spin)) ** 2 + self.eps**2
 
-    def size(self, motion: Motion, change: np.ndarray) -> np.ndarray:
+    def size(self, motion: Kinematics, change: np.ndarray) -> np.ndarray:
         """(B,): the size of a change (4, B), as the module's heading has it."""
         v = motion.carried(change[:3])
         return np.maximum(np.sqrt(((v * v).sum(0) / self.speed2()).max(0)), np.abs(change[3]))
@@ -142,12 +143,12 @@ def _correct(s: _Walk, new: _Point, net, slope, wanted: float, target: float) ->
     matrix = _bordered(s, net, slope)
     right = np.zeros((4, 2, s.of.size))
     right[:3, 0], right[3, 1] = -net[:, 0], 1.0
-    correction, tangent = np.moveaxis(_solve4(matrix, right), 1, 0)
+    correction, tangent = np.moveaxis(solve4(matrix, right), 1, 0)
     size = new.size(s.of.motion, correction)
     first, fine = s.tries == 0, s.step < FINE
     s.miss = np.where(first, size, s.miss)
     # With the matrix of the point before, a correction must be smaller by about half the part that was taken.
-    before = s.point.size(s.of.motion, _solve4(np.where(first, np.eye(4)[..., None], s.matrix), right[:, :1])[:, 0])
+    before = s.point.size(s.of.motion, solve4(np.where(first, np.eye(4)[..., None], s.matrix), right[:, :1])[:, 0])
     smaller = first | (before <= (1.0 - 0.5 * s.part) * s.size) | (s.part <= LEAST)
     most = np.where(fine, PATIENCE, np.where(s.last, AT_THE_END, CORRECTIONS))
     failed = ~np.isfinite(size) | (first & (size > LONGEST)) | ~(smaller | fine) | (s.tries >= most)
@@ -180,15 +181,7 @@ def _stand(s: _Walk, who: np.ndarray, new: _Point, correction, tangent) -> None:
     """Take the corrected points of the samples ``who`` for points of the curve, and the tangents there."""
     foot = new.moved(s.of.motion, np.where(who, correction, 0.0))
     tangent = tangent / foot.size(s.of.motion, tangent)
-    border = s.of.motion.total(s.of.motion.carried(tangent[:3]) / foot.speed2())
+    border = s.of.motion.wrench(s.of.motion.carried(tangent[:3]) / foot.speed2())
     s.foot = foot.where(who, s.foot)
     s.tangent = np.where(who, tangent, s.tangent)
     s.border = np.where(who, np.concatenate([border, tangent[3:]]), s.border)
-
-
-def _solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """x (4, k, B) with matrix (4, 4, B) x = right; a matrix that is singular, or no number, gives a step that fails."""
-    matrix, right = np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0)
-    sound = np.abs(np.linalg.det(matrix)) > 0
-    x = np.linalg.solve(np.where(sound[:, None, None], matrix, np.eye(4)), right)
-    return np.moveaxis(np.where(sound[:, None, None], x, np.nan), 0, -1)

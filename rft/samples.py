@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.contact import Model
 
 
@@ -15,7 +15,7 @@ class Samples(NamedTuple):
     centre: (2, B), the body's mean place. scale: (B,). unit: (B,), of the residual. model: with their parameters."""
 
     index: np.ndarray
-    motion: Motion
+    motion: Kinematics
     centre: np.ndarray
     scale: np.ndarray
     unit: np.ndarray
@@ -35,4 +35,4 @@ class Samples(NamedTuple):
         index, motions, centre, scale, unit, _ = zip(*some)
         index = np.concatenate(index)
         rest = (np.concatenate(x, -1) for x in (centre, scale, unit))
-        return Samples(index, Motion.join(list(motions)), *rest, model.take(index))
+        return Samples(index, Kinematics.join(list(motions)), *rest, model.take(index))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Motion, halves
+from rft.bodies.base import Body, Kinematics, halves
 from rft.bodies.pieces import PIECES
 from rft.contact import SIDE, Model
 from rft.effects.base import Effect, folded, pieced
@@ -53,7 +53,7 @@ def work(
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 
 
-def done_by(model: Model, whole: np.ndarray, motions: dict[str, Motion], xi, eps) -> Work:
+def done_by(model: Model, whole: np.ndarray, motions: dict[str, Kinematics], xi, eps) -> Work:
     """`Work` of B samples from body velocities xi (3, B), in body lengths. motions: of the contacts' elements, of which the
     body's own may be pieces of elements with the half lengths ``whole``: moments are those between the latter. eps: (B,),
     the rounding."""

@@ -295,7 +295,7 @@ def test_yield_stress_and_viscosity_together(speed, loads):
         at = lambda s: np.array(Mud().traction(a[k], m[k] + w[k] * s))
         x, weights = np.polynomial.legendre.leggauss(400)
         f = np.array([at(s) for s in x]).T * weights / 2
-        total = motion.total(
+        total = motion.wrench(
             np.array([f[0].sum(), f[1].sum(), (x * f[1]).sum()])[:, None, None] * (np.arange(3) == k)[:, None]
         )
         net += total[:, 0]
@@ -305,3 +305,22 @@ def test_yield_stress_and_viscosity_together(speed, loads):
     assert np.abs(slow - fast).max() > 1e-3  # one is a yield stress, the other a viscous medium
     viscous = body_velocity(Viscous(2.0), Chain(), alpha, alphadot / speed).xi
     np.testing.assert_allclose(fast, viscous, atol=1e-7)
+
+
+class Hidden:
+    """The same law as mud's, without its terms."""
+
+    dry = viscous = None
+    mirror = True
+
+    def traction(self, v_t, v_n, eps=0.0):
+        return Mud().traction(v_t, v_n, eps)
+
+
+@pytest.mark.parametrize("speed", [1e-6, 0.3, 1e3])
+def test_laws_of_unknown_form_are_taken_at_true_velocities(speed):
+    alpha, alphadot = samples(THREE, 40)
+    found, wanted = (
+        body_velocity(law(), THREE, alpha, speed * alphadot, loads="gauss:12").checked() for law in (Hidden, Mud)
+    )
+    np.testing.assert_allclose(found.xi / speed, wanted.xi / speed, atol=1e-6)

@@ -57,16 +57,16 @@ def test_velocities_are_the_rates_of_places(name):
     np.testing.assert_allclose(motion.v[..., 0], own, atol=1e-9)
 
 
-def test_carried_and_total_are_transposes():
+def test_carried_and_wrench_are_transposes():
     body, rng = BODIES["uneven"], np.random.default_rng(2)
     motion = body.motion(*rng.normal(size=(2, 2, 6)))
     xi, force = rng.normal(size=(3, 6)), rng.normal(size=(3, 3, 6))
     power = (2 * motion.half * force * motion.carried(xi)).sum((0, 1))
-    np.testing.assert_allclose(power, (xi * motion.total(force)).sum(0), rtol=1e-12)
+    np.testing.assert_allclose(power, (xi * motion.wrench(force)).sum(0), rtol=1e-12)
     H, load = rng.normal(size=(3, 3, 3, 6)), np.empty((3, 4, 3, 6))
     load[:, 0], load[:, 1:] = force, H
-    columns = [motion.total(np.einsum("ijnb,jnb->inb", H, motion.carried(e[:, None] * np.ones(6)))) for e in np.eye(3)]
-    np.testing.assert_allclose(motion.assembled(load), np.stack([motion.total(force), *columns], 1), rtol=1e-12)
+    columns = [motion.wrench(np.einsum("ijnb,jnb->inb", H, motion.carried(e[:, None] * np.ones(6)))) for e in np.eye(3)]
+    np.testing.assert_allclose(motion.assembled(load), np.stack([motion.wrench(force), *columns], 1), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

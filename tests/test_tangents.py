@@ -8,7 +8,7 @@ from test_balance import Mud
 from test_loads import CubicDrag
 
 from rft import Granular
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.contact import rows
 from rft.effects.base import Process, Site, folded
 from rft.loads import element_load
@@ -64,7 +64,7 @@ def test_effects(name, medium):
     if not isinstance(medium, Granular):
         effects = [e for e in effects if e.kind not in ("end-caps", "towed-sled")]
     model, motions = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
-    n = len(Motion.stacked(list(motions.values())).half)
+    n = len(Kinematics.stacked(list(motions.values())).half)
     v, eps = rng.normal(size=(3, n, samples)), rng.uniform(0.05, 0.2, samples)
     v[0] = np.sign(v[0]) * (0.01 + np.abs(v[0]))  # skin friction steps where an element slides neither way
     load = lambda v: model.load(v, rows(motions), eps)

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.bodies.chain import Chain
 from rft.media.base import in_range, is_number, require, shown
 
@@ -43,7 +43,7 @@ class Backbone:
         shape variables themselves."""
         return None
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion:
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
         """Elements in the body frame while that is held still; alpha, alphadot: (joints, B)."""
         if self.bends is None:
             return self.chain.motion(alpha, alphadot)

@@ -8,12 +8,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 
-class Motion(NamedTuple):
+class Kinematics(NamedTuple):
     """Elements of a body, in body lengths, in the body frame; each array (n, B): elements by samples.
 
     c, s: cosine and sine of the element's heading. r_t, r_n: along and across the element, the velocity its centre
     takes from a unit turn of the frame. half: half lengths (n, 1), 0 for a point such as an end cap. weight: (n, 1), what
-    an element's force counts, its length for a piece of body. v: (3, n, B), the element's own (a, m, w) of `rft.loads`
+    an element's force counts, its length for a piece of body. v: (3, n, B), the element's own (v_t, v_n, spin) of `rft.loads`
     while the frame is held still.
     """
 
@@ -26,7 +26,7 @@ class Motion(NamedTuple):
     v: np.ndarray
 
     @classmethod
-    def of(cls, along, place, velocity, turn, half) -> Motion:
+    def of(cls, along, place, velocity, turn, half) -> Kinematics:
         """From complex headings, places and velocities (n, B), turning rates (n, B) and half lengths (n, 1)."""
         own = velocity * along.conj()
         lever = 1j * place * along.conj()
@@ -45,41 +45,41 @@ class Motion(NamedTuple):
         x, y = self.r_t * self.s + self.r_n * self.c, self.r_n * self.s - self.r_t * self.c
         return np.stack([(part * x).sum(0), (part * y).sum(0)])
 
-    def points(self, elements: list[int], ahead: np.ndarray, weight: np.ndarray) -> Motion:
+    def points(self, elements: list[int], ahead: np.ndarray, weight: np.ndarray) -> Kinematics:
         """Of points (k,) that are fixed to some of the elements, so far ahead of their centres, (k, 1) each."""
         at = np.array(elements)
         v_t, v_n, spin = self.v[:, at]
         v = np.stack([v_t, v_n + spin * ahead / self.half[at], np.zeros_like(v_t)])
-        return Motion(self.c[at], self.s[at], self.r_t[at], self.r_n[at] + ahead, np.zeros_like(ahead), weight, v)
+        return Kinematics(self.c[at], self.s[at], self.r_t[at], self.r_n[at] + ahead, np.zeros_like(ahead), weight, v)
 
     @staticmethod
-    def stacked(motions: list[Motion]) -> Motion:
+    def stacked(motions: list[Kinematics]) -> Kinematics:
         """The elements of several motions of the same samples, one after the other."""
         if len(motions) == 1:
             return motions[0]
         *parts, v = zip(*motions)
-        return Motion(*(np.concatenate(x) for x in parts), np.concatenate(v, 1))
+        return Kinematics(*(np.concatenate(x) for x in parts), np.concatenate(v, 1))
 
     def wrenches(self, force: np.ndarray) -> np.ndarray:
-        """(3, n, B): force and moment on the frame of each element, from its averages; `total` is their sum."""
+        """(3, n, B): force and moment on the frame of each element, from its averages; `wrench` is their sum."""
         f_t, f_n, f_s = self.weight * force
         c, s = self.c, self.s
         return np.stack([c * f_t - s * f_n, s * f_t + c * f_n, self.r_t * f_t + self.r_n * f_n + self.half * f_s])
 
-    def take(self, keep: np.ndarray) -> Motion:
+    def take(self, keep: np.ndarray) -> Kinematics:
         """The samples that ``keep`` (an index or mask over B) selects."""
         c, s, r_t, r_n, half, weight, v = self
-        return Motion(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, weight, v[:, :, keep])
+        return Kinematics(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, weight, v[:, :, keep])
 
     @staticmethod
-    def join(motions: list[Motion]) -> Motion:
+    def join(motions: list[Kinematics]) -> Kinematics:
         """The samples of several motions of one body, side by side."""
         c, s, r_t, r_n, halves, weights, v = zip(*motions)
         fixed = halves[0], weights[0]
-        return Motion(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), *fixed, np.concatenate(v, -1))
+        return Kinematics(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), *fixed, np.concatenate(v, -1))
 
     def carried(self, xi: np.ndarray) -> np.ndarray:
-        """(3, n, B): what the body velocity xi (3, B) adds to every element's (a, m, w)."""
+        """(3, n, B): what the body velocity xi (3, B) adds to every element's (v_t, v_n, spin)."""
         x, y, turn = xi
         out = np.empty_like(self.v)
         np.add(self.c * x + self.s * y, self.r_t * turn, out=out[0])
@@ -87,7 +87,7 @@ class Motion(NamedTuple):
         np.multiply(self.half, turn, out=out[2])
         return out
 
-    def total(self, force: np.ndarray) -> np.ndarray:
+    def wrench(self, force: np.ndarray) -> np.ndarray:
         """(3, ..., B): force and moment on the frame from element averages (3, ..., n, B); the transpose of `carried`."""
         f_t, f_n, f_s = force
         weight = self.weight
@@ -107,7 +107,7 @@ class Motion(NamedTuple):
         np.subtract(self.c * to_t, self.s * to_n, out=columns[:, 1])
         np.add(self.s * to_t, self.c * to_n, out=columns[:, 2])
         np.add(self.r_t * to_t + self.r_n * to_n, self.half * to_w, out=columns[:, 3])
-        return self.total(columns)
+        return self.wrench(columns)
 
 
 class Body(Protocol):
@@ -116,7 +116,7 @@ class Body(Protocol):
     length: float
     joints: int
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion: ...
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics: ...
 
 
 @dataclass(frozen=True, eq=False)

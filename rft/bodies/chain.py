@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.media.base import in_range, real_array, require, shown
 
 
@@ -75,10 +75,10 @@ class Chain:
         place, velocity = _centres(half_links, zero), _centres(half_links * (1j * turn), zero)
         return heading, turn, *(x - self._of_frame(x, self.frame) for x in (place, velocity))
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Motion:
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
         """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
         heading, turn, place, velocity = self._links(alpha, alphadot)
-        return Motion.of(np.exp(1j * heading), place, velocity, turn, (self.fractions / 2)[:, None])
+        return Kinematics.of(np.exp(1j * heading), place, velocity, turn, (self.fractions / 2)[:, None])
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Pose h of another frame of this body in the body's own, and dh/dt: each (..., 3), in length units and rad.

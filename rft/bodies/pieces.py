@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion, Wrapped, halves
+from rft.bodies.base import Body, Kinematics, Wrapped, halves
 
 PIECES = 40  # to a body length, where nothing else is asked for; what they leave is estimated, not assumed
 
@@ -26,13 +26,15 @@ class Pieces(Wrapped):
         rank = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
         return owner, ((2 * rank + 1) / counts[owner] - 1)[:, None], (1 / counts[owner])[:, None]
 
-    def motion(self, alpha, alphadot) -> Motion:
+    def motion(self, alpha, alphadot) -> Kinematics:
         owner, centre, share = self._cuts
         c, s, r_t, r_n, half, weight, v = self.inner.motion(alpha, alphadot)
-        a, m, w = v[:, owner]
+        v_t, v_n, spin = v[:, owner]
         at = half[owner] * centre
-        v = np.stack([a, m + w * centre, w * share])
-        return Motion(c[owner], s[owner], r_t[owner], r_n[owner] + at, half[owner] * share, weight[owner] * share, v)
+        v = np.stack([v_t, v_n + spin * centre, spin * share])
+        return Kinematics(
+            c[owner], s[owner], r_t[owner], r_n[owner] + at, half[owner] * share, weight[owner] * share, v
+        )
 
 
 def cut(body: Body, pieces: int) -> Body:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, Motion
+from rft.bodies.base import Body, Kinematics
 from rft.bodies.pieces import PIECES, cut
 from rft.contact import Model, PerSample
 from rft.media.base import in_range, require, shown
@@ -34,7 +34,7 @@ class Site(NamedTuple):
 
     dt: float
     pose: np.ndarray
-    motions: dict[str, Motion]
+    motions: dict[str, Kinematics]
     before: dict[str, np.ndarray]
 
     def place(self, name: str) -> np.ndarray:

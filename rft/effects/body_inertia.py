@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.contact import SIDE, Model, PerSample
 from rft.effects.base import Process, Site
 from rft.media.base import check_ranges, require
@@ -57,9 +57,9 @@ class BodyInertia(Process):
         motion = site.motions[SIDE]
         mass = _uniform(motion)
         units = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, motion.c.shape[1]))
-        M = np.stack([mass.total(UNIT_MASS * motion.carried(unit)) for unit in units], 1)
+        M = np.stack([mass.wrench(UNIT_MASS * motion.carried(unit)) for unit in units], 1)
         rate, past = _difference(state, site.dt)
-        return Momentum(self.inertia, M, mass.total(UNIT_MASS * motion.v), rate, past, past.sum(1))
+        return Momentum(self.inertia, M, mass.wrench(UNIT_MASS * motion.v), rate, past, past.sum(1))
 
     def after(self, state: tuple, site: Site, v) -> tuple:
         return *state[-1:], _uniform(site.motions[SIDE]).wrenches(UNIT_MASS * v[SIDE])
@@ -104,13 +104,13 @@ class Momentum(PerSample):
             out[:, k + 1] += _coadjoint(unit, momentum[:, 0])
         return self.inertia * self.unit * out
 
-    def on_elements(self, xi: np.ndarray, motion: Motion, v: np.ndarray) -> np.ndarray:
+    def on_elements(self, xi: np.ndarray, motion: Kinematics, v: np.ndarray) -> np.ndarray:
         momenta = _uniform(motion).wrenches(UNIT_MASS * v)
         change = self.rate * momenta - self.pasts + _coadjoint(xi[:, None], momenta)
         return self.inertia * self.unit * change
 
 
-def _uniform(motion: Motion) -> Motion:
+def _uniform(motion: Kinematics) -> Kinematics:
     """The elements, each counting as its length."""
     return motion._replace(weight=2 * motion.half)
 

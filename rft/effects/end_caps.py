@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.contact import Contact, Model, PerSample
 from rft.effects.base import Effect
 from rft.media.base import TermLaw, check_ranges, require
@@ -65,8 +65,8 @@ class EndCaps(Effect):
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
         return model.touching("ends", Contact(_Caps(medium), self.ends, (0.0, 1.0)))
 
-    def ends(self, motion: Motion) -> Motion:
-        """Two points, at the tail and at the head of a body whose `Motion` is given."""
+    def ends(self, motion: Kinematics) -> Kinematics:
+        """Two points, at the tail and at the head of a body whose `Kinematics` is given."""
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
         return motion.points([0, -1], motion.half[[0, -1]] * [[-1.0], [1.0]], weight)

@@ -76,14 +76,13 @@ def squared_speed_load(v_n: np.ndarray, spin: np.ndarray) -> np.ndarray:
 
     The parts on either side of the pivot s0, where u changes sign, are polynomials in s.
     """
-    m, w = v_n, spin
-    inside = np.abs(w) > np.abs(m)
-    pivot = np.where(inside, -m / np.where(inside, w, 1.0), -1.0)
-    beyond = np.sign(np.where(inside, w, m))  # sign of u for s > s0
+    inside = np.abs(spin) > np.abs(v_n)
+    pivot = np.where(inside, -v_n / np.where(inside, spin, 1.0), -1.0)
+    beyond = np.sign(np.where(inside, spin, v_n))  # sign of u for s > s0
     moments = [beyond * (1 - (-1) ** k - 2 * pivot ** (k + 1)) / (2 * (k + 1)) for k in range(4)]  # <sign(u) s^k>
     s0, s1, s2, s3 = moments
-    zero = np.zeros_like(m)
-    flux = m * m * s0 + 2 * m * w * s1 + w * w * s2
-    turning = m * m * s1 + 2 * m * w * s2 + w * w * s3
-    d0, d1, d2 = (2 * (m * x + w * y) for x, y in ((s0, s1), (s1, s2), (s2, s3)))
+    zero = np.zeros_like(v_n)
+    flux = v_n * v_n * s0 + 2 * v_n * spin * s1 + spin * spin * s2
+    turning = v_n * v_n * s1 + 2 * v_n * spin * s2 + spin * spin * s3
+    d0, d1, d2 = (2 * (v_n * x + spin * y) for x, y in ((s0, s1), (s1, s2), (s2, s3)))
     return np.stack([np.stack([flux, zero, d0, d1]), np.stack([turning, zero, d1, d2])])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Motion
+from rft.bodies.base import Kinematics
 from rft.contact import Averages, Contact, Model
 from rft.effects.base import Effect
 from rft.media.base import check_ranges, require
@@ -40,8 +40,8 @@ class TowedSled(Effect):
         sled = Contact(Averages(Coulomb()), self.behind, stations=(0.0,), buried=False, factors=(self,))
         return model.touching("sled", sled)
 
-    def behind(self, motion: Motion) -> Motion:
-        """The sled's point, of a body whose `Motion` is given."""
+    def behind(self, motion: Kinematics) -> Kinematics:
+        """The sled's point, of a body whose `Kinematics` is given."""
         return motion.points([0], -(motion.half[:1] + self.distance), np.ones((1, 1)))
 
     def __call__(self, v_t, v_n, spin):
