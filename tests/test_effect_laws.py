@@ -108,6 +108,18 @@ def test_sides_are_parts_of_the_whole():
         np.testing.assert_allclose(left[1:, column][:, inner], slope[:, inner], rtol=1e-3, atol=1e-3)
 
 
+def test_elements_are_split_once_however_many_effects_tell_their_sides_apart():
+    """Two shares of a half and a third are one of a sixth; the law is asked once, for no more than two parts an element."""
+    rng, asked = np.random.default_rng(7), []
+    v, eps, law = rng.normal(size=(3, 4, 50)), np.full(50, 1e-3), element_load(GLASS)
+    share = lambda part: lambda v_n, spin: (np.full((2, *v_n.shape), part), None, None)
+    counted = lambda v_t, *rest: asked.append(len(v_t)) or law(v_t, *rest)
+    both = sided(counted, (share(1 / 2), share(1 / 3)), *v, eps)
+    np.testing.assert_allclose(both, sided(law, (share(1 / 6),), *v, eps), rtol=1e-12)
+    np.testing.assert_allclose(both[1:], law(*v, eps)[1:] / 6, atol=1e-12)
+    assert asked == [8]
+
+
 def test_transients_follow_their_equation():
     """An oscillating rod: shares against dh/dx = 3 (1 - h) / travel one way and -3 h / travel the other, of order 2 in the
     step; 95 % is there after the travel."""

@@ -536,6 +536,23 @@ def test_a_march_that_fails_says_so(monkeypatch):
         found.checked()
 
 
+def test_what_does_not_change_is_not_built_again(monkeypatch):
+    """One balance a march and one motion a step, work and several effects included."""
+    made = []
+    for owner, what in ((Balance, "__init__"), (Chain, "motion")):
+        original = getattr(owner, what)
+        counted = lambda *args, f=original, what=what: made.append(what) or f(*args)
+        monkeypatch.setattr(owner, what, counted)
+    effects, counts = (Transient(travel=0.05), DisturbedGround(0.05, 0.2), EndCaps(radius=0.05), heavy(1.0)), []
+    for phases in (8, 16):
+        made.clear()
+        march(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
+        assert made.count("__init__") == 1
+        counts.append(made.count("motion"))
+    assert counts[1] - counts[0] == 2 * 8
+    assert counts[0] < 2 * 8 + 10
+
+
 def test_halves_are_the_whole_body():
     for body in BODIES.values():
         assert 2 * halves(body).sum() == pytest.approx(1)
