@@ -1,7 +1,7 @@
 """Phase after phase through a gait, for what a shape and its rate of change do not settle: place, past and mass.
 
-At every phase the balance of forces is solved for the body velocity, implicitly: a memory is that at the end of the step,
-and momentum changes by the backward difference of order 2, which forgets an error at any step size. So without memory,
+At every phase the balance of forces is solved for the body velocity. Each step is implicit: memory is taken at its end,
+momentum by BDF2, the backward difference of order 2, which damps errors at any step. So without memory,
 slope or mass the answer is that of `rft.body_velocity` at every phase, and with them it comes near as they go to zero.
 All samples (amplitudes, parameters) go side by side. The march starts from that answer on untouched ground and goes
 round the gait until the displacement of a cycle is that of the cycle before.
