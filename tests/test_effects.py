@@ -234,6 +234,27 @@ def test_all_effects_commute():
         np.testing.assert_allclose(run(order), first, atol=1e-13)
 
 
+@pytest.mark.parametrize("name", ONE_OF_EACH)
+def test_every_sample_of_a_batch_has_its_own_parameters(name):
+    """Those that may differ, all at once, against every sample alone, through a march and at single shapes."""
+    effect, body, how = (
+        ONE_OF_EACH[name],
+        Chain((1, 1.4, 0.8)),
+        {"regularisation": 1e-3, "tolerance": 1e-13, "pieces": 10},
+    )
+    alpha, alphadot = OFF_CENTRE.cycle(8, [0.7, 1.0, 1.2])
+    given = {k: getattr(effect, k) for k in effect.batched if getattr(effect, k) is not None}
+    batch = effect.having(**{k: value * np.array([1.0, 0.6, 0.8]) for k, value in given.items()})
+    each = [effect.having(**{k: value * part for k, value in given.items()}) for part in (1.0, 0.6, 0.8)]
+    alone = [march(GLASS, body, a, d, effects=(e,), cycles=1, **how).xi for a, d, e in zip(alpha, alphadot, each)]
+    found = march(GLASS, body, alpha, alphadot, effects=(batch,), cycles=1, **how).xi
+    np.testing.assert_allclose(found, alone, atol=1e-9)
+    if engine((effect,)) == "algebraic":
+        samples = np.repeat(np.arange(3), 8)
+        found = body_velocity(GLASS, body, alpha, alphadot, effects=(batch.take(samples),), **how).xi
+        np.testing.assert_allclose(found, alone, atol=1e-9)
+
+
 def test_explain_names_effects_engine_and_losses():
     told = explain(scenes.load("shovel-nosed-snake"))
     assert "on:  skin-friction" in told
