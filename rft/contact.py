@@ -94,7 +94,7 @@ class Averages(PerSample):
 
     @property
     def rate_independent(self) -> bool:
-        return bool(self.medium.dry) and not any(self.medium.viscous)
+        return bool(self.medium.dry) and not any(self.medium.viscous or ())
 
     def __call__(self, v_t, v_n, spin, eps):
         return self.averages(v_t, v_n, spin, eps)
