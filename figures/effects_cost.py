@@ -34,13 +34,13 @@ SETS = {
     **{name: (effect,) for name, effect in MARCHING.items()},
     "all but the slope": (*ALGEBRAIC.values(), *list(MARCHING.values())[1:]),
 }
-COLOURS = {"algebraic": "#0072B2", "marching": "#D55E00", "dynamic": "#009E73"}
+COLOURS = {"algebraic": "#0072B2", "time stepping": "#D55E00", "dynamic": "#009E73"}
 
 
 def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> dict:
     """{name: {"ratio": median over rounds of time over the plain time of that round, "engine", "cycles"}}.
 
-    cycles: of a march; None: as many as it takes to settle."""
+    cycles: of time stepping; None: as many as it takes to reach the limit cycle."""
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}

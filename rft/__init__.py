@@ -12,9 +12,9 @@ from rft.effects import (
     TowedSled,
     Transient,
 )
-from rft.march import March, march
 from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
-from rft.work import Work, work
+from rft.time_stepping import TimeSteps, time_steps
+from rft.work import Work, work_done
 
 SOLVER = 3  # raised with every change that moves a number: what was computed before is not taken up after it
 
@@ -32,16 +32,16 @@ __all__ = [
     "EndCaps",
     "GrainInertia",
     "Granular",
-    "March",
     "Medium",
     "Serpenoid",
     "SkinFriction",
     "Solution",
+    "TimeSteps",
     "TowedSled",
     "Transient",
     "Viscous",
     "Work",
     "body_velocity",
-    "march",
-    "work",
+    "time_steps",
+    "work_done",
 ]

@@ -62,7 +62,7 @@ def body_velocity(
     """
     if engine(effects) != "algebraic":
         lost = not_so(broken(effects))
-        raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.march")
+        raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.time_steps")
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require_drag(medium)
     if threads is not None:

@@ -91,7 +91,7 @@ class _State:
 
 
 class Balance:
-    """How finely to solve the balance of forces of a `rft.contact.Model`; one serves for a whole march.
+    """How finely to solve the balance of forces of a `rft.contact.Model`; one serves for all time steps.
 
     Within, velocities are over a scale of each sample, so that they, and the rounding, are of size 1; what laws and terms
     are given, and `solve` takes and returns, are true ones. rows: of each contact's elements among all of them.

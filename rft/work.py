@@ -17,18 +17,18 @@ from rft.media.base import Medium, real_array, require
 
 class Work(NamedTuple):
     """power: (...), rate of work against the medium, >= 0, in units of (the whole body's axial drag) x (length / time).
-    moment: (..., n - 1), internal moment at the points between the n elements that holds against the medium, and moves
-    the mass where the body has any, in axial drag x body length: positive where the body works to bend to the left
-    (counter-clockwise, tail to head), as muscles on its left side do; moment . d(bend)/dt x length sums to the power, with
-    mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an element's
-    direction and the velocity of its centre, 0 to pi/2 rad."""
+    bending_moment: (..., n - 1), at the points between the n elements: what holds against the medium, and moves the
+    mass where the body has any, in axial drag x body length: positive where the body works to bend to the left
+    (counter-clockwise, tail to head), as muscles on its left side do; bending_moment . d(bend)/dt x length sums to the
+    power, with mass in the mean over a cycle that repeats. slip: (...), mean over the body of the angle between an
+    element's direction and the velocity of its centre, 0 to pi/2 rad."""
 
     power: np.ndarray
-    moment: np.ndarray
+    bending_moment: np.ndarray
     slip: np.ndarray
 
 
-def work(
+def work_done(
     medium: Medium,
     body: Body,
     alpha,

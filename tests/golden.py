@@ -56,8 +56,8 @@ def velocities():
         alpha, alphadot = shapes(body.joints)
         xi = rft.body_velocity(law, body, alpha, alphadot, **SOLVED).checked().xi
         yield f"velocity, {medium}, {name}", xi
-        done = rft.work(law, body, alpha[:1], alphadot[:1], xi[:1], regularisation=SOLVED["regularisation"])
-        yield f"work, {medium}, {name}", [*done.power, *done.slip, *done.moment[0]]
+        done = rft.work_done(law, body, alpha[:1], alphadot[:1], xi[:1], regularisation=SOLVED["regularisation"])
+        yield f"work, {medium}, {name}", [*done.power, *done.slip, *done.bending_moment[0]]
 
 
 def tiers():
@@ -77,10 +77,10 @@ def marches():
     pairs = [(a, b) for a, b in itertools.combinations(EFFECTS, 2) if kind(a) != kind(b)]
     for names in [(name,) for name in EFFECTS] + pairs:
         effects = [EFFECTS[name][0](0.05) for name in names]
-        found = rft.march(
+        found = rft.time_steps(
             MEDIA["glass-0.3mm-loose"], body, *gait.cycle(8), effects=effects, cycles=2, with_work=True, **SOLVED
         )
-        moments = found.work.moment[[2, 6]].ravel()
+        moments = found.work.bending_moment[[2, 6]].ravel()
         yield f"march, {' + '.join(names)}", [*found.displacement, *found.xi[3], *found.work.power[[2, 6]], *moments]
 
 

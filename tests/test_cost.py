@@ -96,7 +96,7 @@ LARGE = {
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
     "phases": ["run", "phases.toml", "-o", "out"],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
-    "a march": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
+    "time stepping": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
     "a tolerance": ["displacement", "three-link-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-4"],
     "accuracy": ["accuracy", "phases.toml", "-o", "out"],
 }

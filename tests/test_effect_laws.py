@@ -21,10 +21,10 @@ from rft import (
     Transient,
     Viscous,
     body_velocity,
-    march,
-    work,
+    time_steps,
+    work_done,
 )
-from rft.bodies.pieces import Pieces, cut
+from rft.bodies.pieces import Pieces, subdivide
 from rft.contact import Averages, Contact, Model
 from rft.effects.base import Site, folded
 from rft.effects.disturbed import Ground
@@ -209,12 +209,12 @@ def test_ground_remembers_where_the_body_was():
 def test_a_body_that_finds_fresh_ground_is_not_weakened():
     """The first steps of a straight-ahead chain: its own track lies behind and under it, not at its sides."""
     effect = DisturbedGround(radius=0.03, weakening=1.0)
-    body = cut(Chain((1, 1, 1)), 40)
+    body = subdivide(Chain((1, 1, 1)), 40)
     motion = body.motion(np.zeros((2, 1)), np.ones((2, 1)))
     site = Site(0.1, np.zeros((3, 1)), {"side": motion}, {})
     untouched = effect.after(effect.begin(site), site._replace(dt=0.0), {"side": motion.v})
     aside = site._replace(pose=np.array([[0.0], [0.06], [0.0]]))
-    assert (effect.at(untouched, aside).left == 1.0).all()  # where a march starts there is no track
+    assert (effect.at(untouched, aside).left == 1.0).all()  # at the first step there is no track
     ground = effect.after(untouched, site, {"side": motion.v})
     np.testing.assert_allclose(effect.at(ground, site).left, 1.0, atol=1e-12)
     left, right = effect.at(ground, aside).left
@@ -255,7 +255,7 @@ def test_depth_along_the_body():
         np.testing.assert_allclose(level, plain, atol=1e-8)
     heads = Backbone(20), *Sine(elements=20).cycle(32)
     up, down = (
-        march(GLASS, heads[0], sign * heads[1], sign * heads[2], effects=(DepthProfile(slope=0.5, towards=way),))
+        time_steps(GLASS, heads[0], sign * heads[1], sign * heads[2], effects=(DepthProfile(slope=0.5, towards=way),))
         for sign, way in ((1, 0.8), (-1, -0.8))
     )
     np.testing.assert_allclose(up.pose, down.pose * [1, -1, -1], atol=1e-7)
@@ -315,16 +315,18 @@ def test_the_first_step_of_a_march_knows_no_inertia():
     """Before it nothing is known to have moved: its moments are those that hold against the medium alone."""
     body, gait = Chain((1, 1.4, 0.8)), Circle(amplitude=0.8, centre=(0.2, -0.1))
     alpha, alphadot = gait.cycle(16)
-    found = march(GLASS, body, alpha, alphadot, effects=(BodyInertia(2.0, 0.5, 1.0, 1.0),), cycles=1, with_work=True)
-    alone = work(GLASS, body, alpha, alphadot, found.xi)
-    np.testing.assert_allclose(found.work.moment[0], alone.moment[0], atol=1e-7)
-    assert np.abs(found.work.moment[1:] - alone.moment[1:]).max() > 0.1
+    found = time_steps(
+        GLASS, body, alpha, alphadot, effects=(BodyInertia(2.0, 0.5, 1.0, 1.0),), cycles=1, with_work=True
+    )
+    alone = work_done(GLASS, body, alpha, alphadot, found.xi)
+    np.testing.assert_allclose(found.work.bending_moment[0], alone.bending_moment[0], atol=1e-7)
+    assert np.abs(found.work.bending_moment[1:] - alone.bending_moment[1:]).max() > 0.1
 
 
 def test_drift_counts_all_of_a_cycle():
     """What two cycles differ by, and as much again that is to come as long as no ratio is known."""
     body, gait = Chain((1, 1.4, 0.8)), Circle(amplitude=0.8, centre=(0.2, -0.1))
-    one, two = (march(GLASS, body, *gait.cycle(16), effects=(Transient(travel=0.3),), cycles=n) for n in (1, 2))
+    one, two = (time_steps(GLASS, body, *gait.cycle(16), effects=(Transient(travel=0.3),), cycles=n) for n in (1, 2))
     changed = np.abs(two.displacement - one.displacement).max()
     assert changed > 1e-4
     assert two.drift == pytest.approx(2 * changed, rel=1e-6)
@@ -362,8 +364,8 @@ def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
     pull = sled.pull * v / abs(v)
     assert abs(force.sum() + pull) < 2e-4
     assert abs((links.conj() * force).imag.sum() + (place.conj() * pull).imag) < 2e-4
-    done = work(GLASS, body, alpha, alphadot, xi, effects=(sled,))
-    assert done.moment @ alphadot * body.length == pytest.approx(done.power, rel=1e-6)
+    done = work_done(GLASS, body, alpha, alphadot, xi, effects=(sled,))
+    assert done.bending_moment @ alphadot * body.length == pytest.approx(done.power, rel=1e-6)
     assert done.power / body.length == pytest.approx(
         (force.conj() * (u * along[:, None])).real.sum() + sled.pull * abs(v), rel=1e-4
     )

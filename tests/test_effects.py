@@ -23,7 +23,7 @@ from rft import (
     GrainInertia,
     Transient,
     body_velocity,
-    march,
+    time_steps,
 )
 from rft.contact import Model
 from rft.effects import KINDS, engine, side_by_side
@@ -60,7 +60,7 @@ def test_effects_say_what_they_are(name):
     if "," not in name:  # the limit it declares, not one more
         assert order == effect.order
     alpha, alphadot = Circle(centre=(0.3, -0.2)).cycle(8)
-    run = lambda *effects: march(GLASS, Chain((1, 1.4, 0.8)), alpha, alphadot, effects=effects, cycles=2).xi
+    run = lambda *effects: time_steps(GLASS, Chain((1, 1.4, 0.8)), alpha, alphadot, effects=effects, cycles=2).xi
     # Of a balance the body cut in pieces has its own rounding.
     np.testing.assert_allclose(run(at_its_limit(effect)), run(), atol=1e-7)
     assert np.abs(run(effect) - run()).max() > 1e-3
@@ -97,7 +97,7 @@ def test_effects_are_the_same_on_a_body_of_any_size(name):
     effect = EFFECTS[name][0](0.3)
     alpha, alphadot = Ellipse(semi_axes=(1.1, 0.7), tilt=0.4, centre=(0.3, -0.2)).cycle(12)
     one, small = (
-        march(
+        time_steps(
             GLASS, Chain((1, 1.4, 0.8), length=length, frame="link-1"), alpha, alphadot, effects=(effect,), cycles=2,
             tolerance=1e-13, with_work=True,
         )
@@ -106,7 +106,7 @@ def test_effects_are_the_same_on_a_body_of_any_size(name):
     np.testing.assert_allclose(small.xi, one.xi * [0.3, 0.3, 1.0], rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(small.pose, one.pose * [0.3, 0.3, 1.0], rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(small.work.power, 0.3 * one.work.power, rtol=1e-12)
-    np.testing.assert_allclose(small.work.moment, one.work.moment, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(small.work.bending_moment, one.work.bending_moment, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(small.drift, one.drift, rtol=1e-9)
 
 
@@ -124,7 +124,7 @@ def test_effects_vanish_at_their_limit(name):
 
     def off(effect, count=1):
         many = (np.broadcast_to(x, (count, *x.shape)) for x in (alpha, alphadot))
-        return np.abs(march(GLASS, body, *many, effects=(effect,), cycles=cycles).xi - plain).mean((1, 2))
+        return np.abs(time_steps(GLASS, body, *many, effects=(effect,), cycles=cycles).xi - plain).mean((1, 2))
 
     effects = [make(x) for x in sizes]
     if fine:  # side by side
@@ -148,7 +148,9 @@ def test_effects_vanish_on_chains_too(name):
 
     def off(x):
         effects = (make(x),)
-        return np.abs(march(GLASS, UNEVEN, alpha, alphadot, effects=effects, cycles=2, pieces=12).xi - plain).mean()
+        return np.abs(
+            time_steps(GLASS, UNEVEN, alpha, alphadot, effects=effects, cycles=2, pieces=12).xi - plain
+        ).mean()
 
     sizes = np.array([1e-2, 1e-3, 1e-4, 1e-6])[: 4 if order == 1 else 2]  # below is the solver
     slopes = np.diff(np.log([off(x) for x in sizes])) / np.diff(np.log(sizes))
@@ -164,7 +166,9 @@ def test_effects_vanish_on_chains_too(name):
 def test_no_travel_is_no_transient_however_long_the_pieces(pieces):
     alpha, alphadot = Circle(amplitude=1.2).cycle(64)
     none, hardly = (
-        march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=t),), cycles=2, pieces=pieces).displacement
+        time_steps(
+            GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=t),), cycles=2, pieces=pieces
+        ).displacement
         for t in (0.0, 1e-6)
     )
     np.testing.assert_allclose(hardly, none, atol=1e-5)
@@ -192,19 +196,19 @@ def test_effects_that_are_off_are_not_evaluated(monkeypatch, name):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_engines(name):
-    """What needs no march gets none; a march agrees with the algebraic engine there."""
+    """What needs no time stepping gets none; time stepping agrees with the algebraic engine there."""
     effect = EFFECTS[name][0](0.01)
-    needs = {"body-inertia": "dynamic", "transient": "marching", "disturbed-ground": "marching"}
-    wanted = "marching" if name == "depth-profile, slope" else needs.get(name.partition(",")[0], "algebraic")
+    needs = {"body-inertia": "dynamic", "transient": "time stepping", "disturbed-ground": "time stepping"}
+    wanted = "time stepping" if name == "depth-profile, slope" else needs.get(name.partition(",")[0], "algebraic")
     assert engine((effect,)) == wanted
     assert engine((effect, BodyInertia(1, 1, 1, 1))) == "dynamic"
     body, (alpha, alphadot) = Backbone(12), Sine(elements=12).cycle(16)
     if wanted == "algebraic":
-        marched = march(GLASS, body, alpha, alphadot, effects=(effect,), cycles=1, tolerance=1e-12).xi
+        marched = time_steps(GLASS, body, alpha, alphadot, effects=(effect,), cycles=1, tolerance=1e-12).xi
         at_once = body_velocity(GLASS, body, alpha, alphadot, effects=(effect,), tolerance=1e-12).xi
         np.testing.assert_allclose(marched, at_once, atol=1e-9)
     else:
-        with pytest.raises(ValueError, match=re.escape(f"effects are {not_so(effect.breaks)}: use rft.march")):
+        with pytest.raises(ValueError, match=re.escape(f"effects are {not_so(effect.breaks)}: use rft.time_steps")):
             body_velocity(GLASS, body, alpha, alphadot, effects=(effect,))
 
 
@@ -214,11 +218,11 @@ ONE_OF_EACH["depth-profile"] = DepthProfile(along=(0.8, 1.0, 1.3), slope=0.1)
 
 @pytest.mark.parametrize("pair", list(itertools.combinations(ONE_OF_EACH, 2)), ids=" + ".join)
 def test_any_two_effects_commute(pair):
-    """In both orders: body velocities where shape settles them, and a short march, which every pair has."""
+    """In both orders: body velocities where shape settles them, and a few time steps, which every pair has."""
     body, (alpha, alphadot) = Chain((1, 1.4, 0.8), frame="link-1"), OFF_CENTRE.cycle(8)
     both = [ONE_OF_EACH[name] for name in pair]
     how = {"regularisation": 1e-3, "tolerance": 1e-12, "pieces": 10}
-    short = functools.partial(march, cycles=1)
+    short = functools.partial(time_steps, cycles=1)
     for one in (short, body_velocity) if engine(both) == "algebraic" else (short,):
         first, second = (one(GLASS, body, alpha, alphadot, effects=order, **how).xi for order in (both, both[::-1]))
         np.testing.assert_allclose(second, first, rtol=0, atol=1e-13)
@@ -228,7 +232,7 @@ def test_any_two_effects_commute(pair):
 
 def test_all_effects_commute():
     effects, body, (alpha, alphadot) = tuple(ONE_OF_EACH.values()), Backbone(10), Sine(elements=10).cycle(8)
-    run = lambda order: march(GLASS, body, alpha, alphadot, effects=order, cycles=1, regularisation=1e-3).xi
+    run = lambda order: time_steps(GLASS, body, alpha, alphadot, effects=order, cycles=1, regularisation=1e-3).xi
     first = run(effects)
     for order in itertools.islice(itertools.permutations(effects), 1, None, 7919):
         np.testing.assert_allclose(run(order), first, atol=1e-13)
@@ -236,7 +240,7 @@ def test_all_effects_commute():
 
 @pytest.mark.parametrize("name", ONE_OF_EACH)
 def test_every_sample_of_a_batch_has_its_own_parameters(name):
-    """Those that may differ, all at once, against every sample alone, through a march and at single shapes."""
+    """Those that may differ, all at once, against every sample alone, through time stepping and at single shapes."""
     effect, body, how = (
         ONE_OF_EACH[name],
         Chain((1, 1.4, 0.8)),
@@ -246,8 +250,8 @@ def test_every_sample_of_a_batch_has_its_own_parameters(name):
     given = {k: getattr(effect, k) for k in effect.batched if getattr(effect, k) is not None}
     batch = effect.having(**{k: value * np.array([1.0, 0.6, 0.8]) for k, value in given.items()})
     each = [effect.having(**{k: value * part for k, value in given.items()}) for part in (1.0, 0.6, 0.8)]
-    alone = [march(GLASS, body, a, d, effects=(e,), cycles=1, **how).xi for a, d, e in zip(alpha, alphadot, each)]
-    found = march(GLASS, body, alpha, alphadot, effects=(batch,), cycles=1, **how).xi
+    alone = [time_steps(GLASS, body, a, d, effects=(e,), cycles=1, **how).xi for a, d, e in zip(alpha, alphadot, each)]
+    found = time_steps(GLASS, body, alpha, alphadot, effects=(batch,), cycles=1, **how).xi
     np.testing.assert_allclose(found, alone, atol=1e-9)
     if engine((effect,)) == "algebraic":
         samples = np.repeat(np.arange(3), 8)
@@ -375,7 +379,7 @@ def test_the_cost_of_effects_draws(tmp_path):
 
     numbers = effects_cost.compute(phases=16, repeats=1, cycles=2)
     assert numbers["none"]["engine"] == numbers["these four"]["engine"] == "algebraic"
-    assert numbers["transient"]["engine"] == "marching"
+    assert numbers["transient"]["engine"] == "time stepping"
     assert numbers["body inertia"]["engine"] == "dynamic"
     assert numbers["transient"]["cycles"] > 1
     assert numbers["none"]["ratio"] == 1.0

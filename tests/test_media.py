@@ -8,7 +8,7 @@ import pytest
 from registry import DRY, MEDIA
 
 from geomech.gaits import Circle
-from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, march
+from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, time_steps
 from rft.contact import Model
 from rft.media.base import TermLaw, require_drag
 from rft.newton import Balance
@@ -118,7 +118,7 @@ PUSHING = {
 
 
 @pytest.mark.parametrize("name", PUSHING)
-@pytest.mark.parametrize("solve", [body_velocity, march])
+@pytest.mark.parametrize("solve", [body_velocity, time_steps])
 def test_a_medium_that_pushes_is_refused(name, solve):
     medium, said = PUSHING[name]
     alpha, alphadot = Circle().cycle(8)

@@ -132,19 +132,19 @@ def test_numerics_reach_the_solver_and_the_work():
     np.testing.assert_allclose(found.xi, wanted.xi, atol=1e-13)
     default = scenes.load("three-link-glass-close").system.velocity(alpha, alphadot)
     assert np.abs(default - wanted.xi).max() > 1e-3
-    moments = rft.work(*given, wanted.xi, **n)
+    moments = rft.work_done(*given, wanted.xi, **n)
     for got, want in zip(scene.system.work(alpha, alphadot, wanted.xi), moments):
         np.testing.assert_allclose(got, want, rtol=1e-12)
     for other in ({"loads": n["loads"]}, {"regularisation": n["regularisation"]}):
-        assert np.abs(rft.work(*given, wanted.xi, **other).moment - moments.moment).max() > 1e-4
+        assert np.abs(rft.work_done(*given, wanted.xi, **other).bending_moment - moments.bending_moment).max() > 1e-4
     cycle = scene.cycle(amplitudes=1.3, work=True)
-    np.testing.assert_allclose(cycle.work.moment, moments.moment, atol=1e-12)
+    np.testing.assert_allclose(cycle.work.bending_moment, moments.bending_moment, atol=1e-12)
     heavy = scene.changed(effects=(rft.BodyInertia(0.7, 0.5, 1.0, 1.3),)).with_numerics(cycles=2)
-    marched = rft.march(*given, effects=heavy.system.effects, cycles=2, tolerance=1e-13, with_work=True, **n)
+    marched = rft.time_steps(*given, effects=heavy.system.effects, cycles=2, tolerance=1e-13, with_work=True, **n)
     cycle = heavy.cycle(amplitudes=1.3, work=True)
     np.testing.assert_allclose(cycle.xi, marched.xi, atol=1e-12)
     np.testing.assert_allclose(cycle.net, marched.displacement, atol=1e-12)
-    np.testing.assert_allclose(cycle.work.moment, marched.work.moment, atol=1e-12)
+    np.testing.assert_allclose(cycle.work.bending_moment, marched.work.bending_moment, atol=1e-12)
 
 
 def test_the_path_of_a_linear_medium_needs_no_field():

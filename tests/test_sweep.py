@@ -89,7 +89,7 @@ def without_estimates(monkeypatch):
 
 
 def test_a_level_ground_is_no_gentle_slope(without_estimates):
-    """Without a slope a march settles, with one it is one cycle: they do not share a batch."""
+    """Without a slope cycles become periodic, with one there is one cycle: they do not share a batch."""
     text = scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 16")
     effects = PAST + '"transient"\ntravel = 0.03' + PAST + '"depth-profile"\nslope = 0.0'
     parse = lambda text: scenes.parse(text).with_numerics(phases=64, pieces=12)

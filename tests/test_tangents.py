@@ -38,7 +38,7 @@ def test_laws(law, how):
 
 
 def at_one_step(effects, body, medium, samples, rng):
-    """(model, motions) of effects within a march whose ground, place and past are not those of its start."""
+    """(model, motions) of effects within a gait whose ground, place and past are not those of its start."""
     model = folded([e for e in effects if not isinstance(e, Process)], medium, body)
     processes = [e for e in effects if isinstance(e, Process)]
     motions = model.motions(body.motion(*rng.uniform(-1, 1, (2, body.joints, samples))))

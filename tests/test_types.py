@@ -60,7 +60,7 @@ def test_no_constructor_takes_a_wrong_type(kind, field):
 
 def test_every_public_class_is_in_the_table():
     public = [getattr(rft, name) for name in rft.__all__] + list(KINDS.values())
-    outputs = {rft.Solution, rft.March, rft.Work}
+    outputs = {rft.Solution, rft.TimeSteps, rft.Work}
     made = {c for c in public if isinstance(c, type) and not getattr(c, "_is_protocol", False)} - outputs
     assert made - {type(part) for part in PARTS.values()} == {Coulomb, Centreline}  # without parameters; with a file
 
@@ -84,15 +84,15 @@ def body_velocities(value):
     yield "alphadot", lambda: body_velocity(Coulomb(), Chain(), STILL, value)
     for name in ("loads", "regularisation", "tolerance", "threads", "effects"):
         yield name, lambda name=name: body_velocity(Coulomb(), Chain(), STILL, STILL + 1, **{name: value})
-    march = np.zeros((8, 2))
+    still = np.zeros((8, 2))
     for name in ("loads", "regularisation", "tolerance", "cycles", "effects"):
-        yield name, lambda name=name: rft.march(Coulomb(), Chain(), march, march + 1, **{name: value})
-    yield "medium", lambda: rft.march(value, Chain(), march, march + 1)
-    yield "body", lambda: rft.march(Coulomb(), value, march, march)
-    yield "alpha of a march", lambda: rft.march(Coulomb(), Chain(), value, march)
-    yield "medium", lambda: rft.work(value, Chain(), STILL, STILL, np.zeros(3))
-    yield "body", lambda: rft.work(Coulomb(), value, STILL, STILL, np.zeros(3))
-    yield "xi", lambda: rft.work(Coulomb(), Chain(), STILL, STILL, value)
+        yield name, lambda name=name: rft.time_steps(Coulomb(), Chain(), still, still + 1, **{name: value})
+    yield "medium", lambda: rft.time_steps(value, Chain(), still, still + 1)
+    yield "body", lambda: rft.time_steps(Coulomb(), value, still, still)
+    yield "alpha of a gait", lambda: rft.time_steps(Coulomb(), Chain(), value, still)
+    yield "medium", lambda: rft.work_done(value, Chain(), STILL, STILL, np.zeros(3))
+    yield "body", lambda: rft.work_done(Coulomb(), value, STILL, STILL, np.zeros(3))
+    yield "xi", lambda: rft.work_done(Coulomb(), Chain(), STILL, STILL, value)
 
 
 def geometries(value):

@@ -24,7 +24,7 @@ from rft import (
     SkinFriction,
     Viscous,
     body_velocity,
-    work,
+    work_done,
 )
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -89,8 +89,8 @@ def test_internal_moments_do_the_work():
     ):
         alpha, alphadot = rng.uniform(-0.5, 0.5, (20, body.joints)), rng.normal(size=(20, body.joints))
         solution = body_velocity(GLASS, body, alpha, alphadot, effects=effects, tolerance=1e-13)
-        done = work(GLASS, body, alpha, alphadot, solution.xi, effects=effects)
-        put_in = (done.moment * alphadot).sum(-1) * body.length
+        done = work_done(GLASS, body, alpha, alphadot, solution.xi, effects=effects)
+        put_in = (done.bending_moment * alphadot).sum(-1) * body.length
         np.testing.assert_allclose(put_in, done.power, rtol=1e-5)
         assert (done.power > 0).all()
 
@@ -107,7 +107,7 @@ def drawn_out(body, alpha):
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
 def test_internal_moments_by_quadrature(medium):
     """The medium's moment on the tail's side of a joint, from `traction` at many points and velocities by differences;
-    that on the head's side is the opposite. No part of `rft.loads`, of the body's motion or of `rft.work` is used."""
+    that on the head's side is the opposite. No part of `rft.loads`, of the body's motion or of `rft.work_done` is used."""
     rng, pieces, h = np.random.default_rng(2), 4000, 1e-6
     body = Chain((2.0, 1.0, 3.0, 1.0, 2.0))
     for _ in range(3):
@@ -125,7 +125,7 @@ def test_internal_moments_by_quadrature(medium):
         v = (v + xi[0] + 1j * xi[1] + 1j * xi[2] * place) * along.conj()[:, None]
         f_t, f_n = medium.traction(v.real, v.imag, 1e-6)
         force = -(f_t + 1j * f_n) * along[:, None] * body.fractions[:, None] / pieces
-        moment = work(medium, body, alpha, alphadot, xi).moment
+        moment = work_done(medium, body, alpha, alphadot, xi).bending_moment
         for k in range(4):
             about = ((place - ends[k + 1]).conj() * force).imag.sum(1)
             assert about[: k + 1].sum() == pytest.approx(moment[k], abs=1e-6)
@@ -287,7 +287,7 @@ def test_arc_efficiency_is_progress_over_the_arc_of_a_wave():
 def test_slip_counts_every_link_by_its_length():
     body, alpha, alphadot = Chain((1, 8, 1)), np.array([0.4, 0.9]), np.array([1.0, -0.3])
     xi = body_velocity(GLASS, body, alpha, alphadot).xi
-    found = work(GLASS, body, alpha, alphadot, xi).slip
+    found = work_done(GLASS, body, alpha, alphadot, xi).slip
     h = 1e-6
     (ends, along), *near = (drawn_out(body, alpha + step * alphadot) for step in (0, h, -h))
     middle = lambda ends: (ends[1:] + ends[:-1]) / 2
@@ -353,7 +353,9 @@ def test_onset_and_offset_are_where_the_moment_changes_sign(case):
     for key, sign in (("onset", 1.0), ("offset", -1.0)):
         for step in (-0.02, 0.02):
             alpha, alphadot = case.gait.shape(found[key] + step), case.gait.rate(found[key] + step)
-            moment = case.system.work(alpha, alphadot, case.system.velocity(alpha, alphadot)).moment[joints, joints]
+            moment = case.system.work(alpha, alphadot, case.system.velocity(alpha, alphadot)).bending_moment[
+                joints, joints
+            ]
             assert (np.sign(moment) == -sign * np.sign(step)).all()
     np.testing.assert_allclose(found["offset"] - found["onset"], np.pi, atol=1e-6)  # left and right are alike
 

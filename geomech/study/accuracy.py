@@ -26,7 +26,7 @@ FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)
 ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
 TRUTH_PHASES = 4096
-TRUTH_STEPS = 1024  # of a march, which takes them one by one
+TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
 GRIDS = (7, 11, 15, 21, 31, 45, 61)
@@ -87,7 +87,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     """{"scene", "amplitudes", "lines": [{"label", "tier", "knob", "order", "against", "value", "error", "seconds",
     "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}.
 
-    runs: each setting is timed so often, and the quickest counts; a march once, it is long enough for that to tell."""
+    runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell."""
     amplitudes = scene.gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
     finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest

@@ -34,7 +34,7 @@ def cheapest(
     system, study = scene.system, Study(scene)
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
     if tol <= system.settling:
-        raise SceneError(f"{scene.name}: a march with these effects repeats to {system.settling:g} only: raise --tol")
+        raise SceneError(f"{scene.name}: cycles with these effects repeat to {system.settling:g} only: raise --tol")
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.steps else 32, 8 * gait.harmonics)
     if study.lookups:

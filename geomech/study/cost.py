@@ -27,9 +27,9 @@ LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 PILOT = 0.15  # s after which a pilot has seen enough
-FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a step of a march STEP besides
+FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
 SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
-CYCLES = 3  # of a march that settles
+CYCLES = 3  # that it takes to reach a limit cycle
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
 TABLES = 4  # of a table while it is built, interpolated and written
@@ -60,7 +60,7 @@ class Cost(NamedTuple):
 
 
 class Job(NamedTuple):
-    """Part of a request. what: "balances" solved side by side, "steps" of one cycle of a march of ``group`` samples, or
+    """Part of a request. what: "balances" solved side by side, "steps" of one cycle of ``group`` samples, or
     "look-ups" in a tier's table. gait: whose shapes, None for those all over the field. memory: bytes at the peak."""
 
     what: str
@@ -123,24 +123,24 @@ def direct(
 ) -> list[Job]:
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
     (`estimate.direct`) or, if not ``checked``, without."""
-    system, marching = scene.system, scene.system.steps
+    system, stepping = scene.system, scene.system.steps
     if checked:
-        phases = max(estimate.FEWEST_STEPS if marching else 32, 8 * -(-phases // 8))
+        phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, system.at_once(phases))
-    solved, held = phases * (_refinements(scene, marching) if checked else 1.0), 0
-    if marching:
+    solved, held = phases * (_refinements(scene, stepping) if checked else 1.0), 0
+    if stepping:
         held = group * (60 * system.elements + system.held)
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
-    if marching:
+    if stepping:
         return [Job("steps", scene, gait, solved * count / group, group, memory=memory)]
     return [Job("balances", scene, gait, solved * count, memory=memory)]
 
 
-def _refinements(scene: Scene, marching: bool) -> float:
-    """Balances that `estimate.direct` solves over those of the gait at its phases: a march again at a half, a quarter and
+def _refinements(scene: Scene, stepping: bool) -> float:
+    """Balances that `estimate.direct` solves over those of the gait at its phases: time stepping again at a half, a quarter and
     an eighth of them, and a quarter with a finer model where there is one. Pieces of body are doubled on the quarter, and
     halved and quartered at all phases: as much as half and a half and a quarter."""
-    again = 0.5 + 0.25 + 0.125 if marching else 0.0
+    again = 0.5 + 0.25 + 0.125 if stepping else 0.0
     again += 0.5 + 0.5 + 0.25 if scene.system.cut else 0.0
     return 1.0 + again + (0.25 if scene.system.finer() else 0.0)
 
@@ -177,7 +177,7 @@ def _per_sample(job: Job, count: float) -> float:
 
 
 def _per_step(job: Job, count: float) -> tuple[float, int]:
-    """(seconds a step of a march takes, cycles until it settles)."""
+    """(seconds a time step takes, cycles until they are periodic)."""
     system, gait = job.scene.system, job.gait
     prior, cycles = STEP + SLOW * system.evaluations * job.group, system.solver.cycles or CYCLES
     if prior * count * cycles < FREE:
@@ -185,12 +185,12 @@ def _per_step(job: Job, count: float) -> tuple[float, int]:
     phases = max(16, 8 * -(-gait.harmonics // 3))
     some = min(job.group, max(1, system.together // system.evaluations))
 
-    def march(samples: int, cycles: int | None):
+    def time_steps(samples: int, cycles: int | None):
         start = time.process_time()
-        found = system.march(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
+        found = system.time_steps(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    return march(some, 1)[1] * job.group / some, system.solver.cycles or march(1, None)[0]
+    return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or time_steps(1, None)[0]
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:

@@ -18,7 +18,7 @@ from geomech.scene.model import Scene
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
 )
-FEWEST_STEPS = 64  # of a march that is refined: an eighth of them still makes one
+FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still makes a gait
 REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
 MOST_PIECES = 10_000  # to a body length
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
@@ -54,17 +54,17 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
 def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier."""
     phases = max(32, 8 * -(-phases // 8))
-    system, marching = scene.system, scene.system.steps
-    shapes = gait.cycle(max(FEWEST_STEPS, phases) if marching else phases, amplitudes)
+    system, stepping = scene.system, scene.system.steps
+    shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
     every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
-    if marching:  # a step rests on the one before: fewer phases are another march
+    if stepping:  # a step rests on the one before: fewer phases are other steps
         eighth, coarse, half, full = *(system.run(*fewer).net for fewer in every[:3]), run.net
     else:
         eighth, coarse, half, full = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2, 1))
     error = _left(
         *(apart(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
-        marching or system.kinks,
+        stepping or system.kinks,
     )
     error += 2 * np.pi * (run.residual * run.speed)[:, None]
     if finer := system.finer():

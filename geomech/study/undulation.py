@@ -135,7 +135,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     if gait.amplitude == 0:
         raise ValueError("activation takes a wave of amplitude > 0: a straight body at rest needs no muscles")
     bend, rate = gait.cycle(scene.numerics.phases)
-    moment = scene.system.run(bend, rate, work=True).work.moment
+    moment = scene.system.run(bend, rate, work=True).work.bending_moment
     s = np.arange(1, gait.elements) / gait.elements
     onset, offset, changes = _zeros(moment)
     right, left, _ = _zeros(bend)

@@ -21,7 +21,7 @@ VALUES_TOGETHER = 1 << 22  # of gaits run side by side, angles and velocities: s
 class Cycle(NamedTuple):
     """A gait run once, for amplitudes (...,). xi: (..., N, 3), body velocity by phase. net: (..., 3), pose after the cycle
     in the frame at its start. residual: (...), the largest of the cycle. speed: (...), mean |alphadot|, 1. work: power,
-    internal moments and slip, (..., N) each (`rft.work`), or None. cycles: how many time stepping took, 1 without it.
+    internal moments and slip, (..., N) each (`rft.work_done`), or None. cycles: how many time stepping took, 1 without it.
     to_come: (...), change of displacement still to come where cycles go on until they repeat, body lengths or rad; 0
     elsewhere."""
 

@@ -32,9 +32,9 @@ MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name
 @dataclass(frozen=True)
 class Solver:
     """How the balance of forces is solved; part of [numerics]. loads: "exact", "midpoint:N", "gauss:N" (rft.loads).
-    regularisation: body lengths per radian (rft.balance). tolerance: normalised residual. cycles: of a march (rft.march);
-    if left out until they repeat, one where effects break symmetry. pieces: to a body length, 1 to 10,000, into which
-    effects that vary along an element cut it (`rft.effects`)."""
+    regularisation: body lengths per radian (rft.balance). tolerance: normalised residual. cycles: of time stepping
+    (`rft.time_steps`); if left out until they are periodic, one where effects break symmetry. pieces: to a body length,
+    1 to 10,000, into which effects that vary along an element cut it (`rft.effects`)."""
 
     loads: str = "exact"
     regularisation: float = 1e-6
@@ -174,18 +174,18 @@ class Swimmer(Plain):
         return {"xi": s.xi.tolist(), **told}
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
-        """Power, internal moments and slip of a solution of `solve`; see `rft.work`."""
-        return rft.work(self.medium, self.body, alpha, alphadot, xi, **self._settings())
+        """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
+        return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
 
-    def march(self, alpha, alphadot, cycles: int | None, work: bool = False) -> rft.March:
-        """The gait phase after phase (`rft.march`), unchecked."""
-        return rft.march(
+    def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False) -> rft.TimeSteps:
+        """The gait phase after phase (`rft.time_steps`), unchecked."""
+        return rft.time_steps(
             self.medium, self.body, alpha, alphadot, cycles=cycles, with_work=work, **self._settings("tolerance")
         )
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
-        right. RuntimeError if a force balance did not converge or a march did not settle."""
+        right. RuntimeError if a force balance did not converge or cycles did not become periodic."""
         speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
         if not self.steps:
             samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
@@ -193,20 +193,20 @@ class Swimmer(Plain):
             solution = each.solve(alpha, alphadot).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
             return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
-        march = self.march(alpha, alphadot, self.solver.cycles, work).checked()
+        steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
-        repeats = not self.lacks & Premise.SE2_SYMMETRIC and (march.status == "settled").all()
-        net = displacement(march.xi) if repeats else march.displacement
-        to_come = march.drift if self.settles else 0.0 * speed
-        return Cycle(march.xi, net, march.residual, speed, march.work, march.cycles, to_come)
+        repeats = not self.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
+        net = displacement(steps.xi) if repeats else steps.displacement
+        to_come = steps.drift if self.settles else 0.0 * speed
+        return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
     def at_once(self, phases: int) -> int:
         batched = [getattr(e, name) for e in self.effects for name in e.batched]
         if any(map(np.ndim, batched)):
             return sys.maxsize  # a parameter for each amplitude: they belong together
-        # A march has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-        marched = 4 * self.elements + self.held // 8 if self.steps else 0
-        return max(1, VALUES_TOGETHER // max(phases * (self.joints + 6), marched))
+        # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
+        stepped = 4 * self.elements + self.held // 8 if self.steps else 0
+        return max(1, VALUES_TOGETHER // max(phases * (self.joints + 6), stepped))
 
     def finer(self) -> Swimmer | None:
         rule, _, count = self.solver.loads.partition(":")

@@ -37,7 +37,7 @@ class Pieces(Wrapped):
         )
 
 
-def cut(body: Body, pieces: int) -> Body:
+def subdivide(body: Body, pieces: int) -> Body:
     """``body`` in pieces, so many to its length or more, or as it is where its elements are short enough."""
     longest = 1 / pieces
     return Pieces(body, longest) if (2 * halves(body) > longest * (1 + 1e-9)).any() else body

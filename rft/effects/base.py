@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.bodies.base import Body, Kinematics
-from rft.bodies.pieces import PIECES, cut
+from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import Model, PerSample
 from rft.media.base import in_range, require, shown
 from rft.premise import NONE, SHAPE_ALONE, Premise
@@ -20,7 +20,7 @@ MOST_PIECES = 10_000  # to a body length
 
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
-    "marching": "the balance of forces phase after phase, place and past carried along",
+    "time stepping": "the balance of forces step after step through the gait, place and past carried along",
     "dynamic": "the equation of motion phase after phase, implicit in time",
 }
 
@@ -55,8 +55,8 @@ class Effect(PerSample):
     scene without it comes back at ``order``.
 
     batched: parameters that may be arrays (B,), one for each sample of a batch. settles: change of
-    displacement from cycle to cycle, body lengths, below which a march with this effect has settled. held: numbers that a
-    march remembers for each sample, beside some for each element. varies: along an element, of which it takes means:
+    displacement from cycle to cycle, body lengths, below which cycles with this effect count as periodic. held: numbers that
+    time stepping remembers for each sample, beside some for each element. varies: along an element, of which it takes means:
     longer elements are cut into pieces (`pieced`).
     """
 
@@ -116,7 +116,7 @@ def folded(effects: Sequence[Effect], medium, body: Body, rule: str = "exact") -
 
 
 def under_way(effects: Sequence[Effect]) -> list[Process]:
-    """The processes that differ from step to step of a march."""
+    """The processes that differ from step to step."""
     return [e for e in effects if isinstance(e, Process) and e.breaks & SHAPE_ALONE]
 
 
@@ -146,10 +146,10 @@ def engine(effects: Sequence[Effect]) -> str:
     lost = broken(effects)
     if lost & Premise.QUASI_STATIC:
         return "dynamic"
-    return "marching" if lost & SHAPE_ALONE else "algebraic"
+    return "time stepping" if lost & SHAPE_ALONE else "algebraic"
 
 
 def pieced(body: Body, effects: Sequence[Effect], pieces: int = PIECES) -> Body:
     """The body as finely cut as its effects need. ValueError for no number of pieces."""
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
-    return cut(body, pieces) if any(e.varies for e in effects) else body
+    return subdivide(body, pieces) if any(e.varies for e in effects) else body

@@ -54,7 +54,7 @@ class DisturbedGround(Process):
         return Weakened(1 - self.weakening * np.stack(found))
 
     def after(self, state: Ground, site: Site, v) -> Ground:
-        if site.dt > 0:  # a march starts on untouched ground
+        if site.dt > 0:  # the first step is on untouched ground
             state.mark(self._points(site), self.radius)
         return state
 

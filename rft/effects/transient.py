@@ -43,7 +43,7 @@ class Transient(Process):
         check_ranges(self, travel=(0, 10))
 
     def begin(self, site: Site) -> np.ndarray:
-        """(2, n, B): shares to the left and right; a march starts where the ground resists fully either way."""
+        """(2, n, B): shares to the left and right; time stepping starts where the ground resists fully either way."""
         return np.ones((2, *site.motions[SIDE].c.shape))
 
     def at(self, state: np.ndarray, site: Site) -> Developed:

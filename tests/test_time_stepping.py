@@ -29,14 +29,14 @@ from rft import (
     Transient,
     Viscous,
     body_velocity,
-    march,
-    work,
+    time_steps,
+    work_done,
 )
 from rft.bodies.base import halves
 from rft.effects import folded
-from rft.march import _Steps
+from rft.limit_cycle import Approach
 from rft.newton import Balance
-from rft.settling import Approach
+from rft.time_stepping import _Steps
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
@@ -49,12 +49,12 @@ def heavy(inertia):
 
 
 @pytest.mark.parametrize("medium", MEDIA)
-def test_without_effects_a_march_is_the_balance(medium):
+def test_without_effects_time_stepping_is_the_balance(medium):
     for body in (BODIES["uneven"], BODIES["serpenoid"], BODIES["backbone"]):
         t = 2 * np.pi * np.arange(16) / 16
         k = np.arange(body.joints)
         alpha, alphadot = 0.4 * np.cos(t[:, None] - k), -0.4 * np.sin(t[:, None] - k)
-        found = march(MEDIA[medium], body, alpha, alphadot, cycles=1, tolerance=1e-12).checked()
+        found = time_steps(MEDIA[medium], body, alpha, alphadot, cycles=1, tolerance=1e-12).checked()
         wanted = body_velocity(MEDIA[medium], body, alpha, alphadot, tolerance=1e-12).xi
         np.testing.assert_allclose(found.xi, wanted, atol=1e-8)
 
@@ -111,7 +111,9 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
     speed = np.sqrt(np.mean(np.sum(gait.rate(np.zeros(1)) ** 2)))
     wanted = truths("newton", newton, medium, inertia, gait, 8, eps * speed)[-1]
     alpha, alphadot = gait.cycle(128)
-    found = march(medium, Chain(), alpha, alphadot, effects=(heavy(inertia),), regularisation=max(eps, 1e-6)).checked()
+    found = time_steps(
+        medium, Chain(), alpha, alphadot, effects=(heavy(inertia),), regularisation=max(eps, 1e-6)
+    ).checked()
     np.testing.assert_allclose(displacement(found.xi), wanted, atol=2e-5)
     plain = displacement(body_velocity(medium, Chain(), alpha, alphadot).xi)
     assert np.abs(plain - wanted).max() > 3e-4  # mass matters here
@@ -120,7 +122,7 @@ def test_motion_by_an_independent_integrator(medium, inertia, eps, truths):
 def test_a_body_in_almost_nothing_keeps_its_momentum():
     """With a millionth of drag the momentum over the ground stays what it was at the start."""
     alpha, alphadot = Circle(amplitude=1.0).cycle(256)
-    found = march(Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e6),), cycles=1)
+    found = time_steps(Viscous(2.0), Chain(), alpha, alphadot, effects=(heavy(1e6),), cycles=1)
     xi, theta = found.xi, found.pose[:-1, 2]
     over_ground = (xi[:, 0] + 1j * xi[:, 1]) * np.exp(1j * theta)  # the mean frame moves with the centre of mass
     np.testing.assert_allclose(over_ground, over_ground[0], atol=1e-4)
@@ -131,15 +133,17 @@ def test_a_body_in_almost_nothing_keeps_its_momentum():
 def test_massless_comes_back_at_order_one(medium):
     """Net displacement: quasi-static as the mass goes to zero, at order 1."""
     alpha, alphadot = Sine(elements=30).cycle(32)
-    plain = march(medium, Backbone(30), alpha, alphadot, cycles=1).xi
+    plain = time_steps(medium, Backbone(30), alpha, alphadot, cycles=1).xi
     sizes = np.array([0.04, 0.02, 0.01])
-    off = [np.abs(march(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi - plain).max() for m in sizes]
+    off = [
+        np.abs(time_steps(medium, Backbone(30), alpha, alphadot, effects=(heavy(m),)).xi - plain).max() for m in sizes
+    ]
     assert np.polyfit(np.log(sizes), np.log(off), 1)[0] == pytest.approx(1, abs=0.05)
 
 
 def net(effects, gait, body, phases):
     """Pose after a cycle in loose glass."""
-    return march(GLASS, body, *gait.cycle(phases), effects=effects).displacement
+    return time_steps(GLASS, body, *gait.cycle(phases), effects=effects).displacement
 
 
 @pytest.mark.parametrize(
@@ -169,21 +173,21 @@ def test_transients_slow_the_sandfish():
 
 def test_the_built_in_march_is_slower_than_the_plain_sandfish():
     slowed = scenes.load("sandfish-transient")
-    assert slowed.system.engine == "marching"
+    assert slowed.system.engine == "time stepping"
     found = undulation.performance(slowed, [0.15, 0.22])
     plain = undulation.performance(SANDFISH, [0.15, 0.22])
     assert (found["efficiency"] < 0.95 * plain["efficiency"]).all()
     assert (found["cost_of_transport"] > 0).all()
 
 
-def test_work_is_done_by_the_joints_in_a_march_too():
+def test_work_is_done_by_the_joints_in_time_stepping_too():
     """Without mass, what the joints put in goes into the ground at every phase, memories and caps included."""
     alpha, alphadot = Butterfly(amplitude=0.8).cycle(32)
     effects = (Transient(travel=0.05), EndCaps(radius=0.05), DisturbedGround(radius=0.05, weakening=0.2))
-    found = march(GLASS, Chain((1, 2, 1), length=0.2), alpha, alphadot, effects=effects, cycles=2, with_work=True)
-    put_in = (found.work.moment * alphadot).sum(-1) * 0.2
+    found = time_steps(GLASS, Chain((1, 2, 1), length=0.2), alpha, alphadot, effects=effects, cycles=2, with_work=True)
+    put_in = (found.work.bending_moment * alphadot).sum(-1) * 0.2
     np.testing.assert_allclose(put_in, found.work.power, rtol=1e-6)
-    assert found.work.moment.shape == (32, 2)
+    assert found.work.bending_moment.shape == (32, 2)
 
 
 @pytest.mark.parametrize(("medium", "phases"), [(GLASS, 128), (Viscous(2.0), 64)])
@@ -192,12 +196,16 @@ def test_work_moves_the_mass(medium, phases):
     the links are counted: the moments include what moves them."""
     gait, effects = Ellipse(semi_axes=(1, 0.5), tilt=0.7, centre=(0.2, -0.3)), (heavy(3.0),)
     alpha, alphadot = gait.cycle(phases)
-    found = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True).checked().work
-    assert (found.moment * alphadot).sum(-1).mean() == pytest.approx(found.power.mean(), rel=1e-3)
-    turned = march(medium, Chain((1.5, 2, 1)), alpha[:, ::-1], alphadot[:, ::-1], effects=effects, with_work=True).work
-    np.testing.assert_allclose(found.moment, turned.moment[:, ::-1], atol=2e-3 * np.abs(found.moment).max())
-    light = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, with_work=True).work
-    assert np.abs(found.moment - light.moment).max() > 0.05 * np.abs(light.moment).max()
+    found = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=effects, with_work=True).checked().work
+    assert (found.bending_moment * alphadot).sum(-1).mean() == pytest.approx(found.power.mean(), rel=1e-3)
+    turned = time_steps(
+        medium, Chain((1.5, 2, 1)), alpha[:, ::-1], alphadot[:, ::-1], effects=effects, with_work=True
+    ).work
+    np.testing.assert_allclose(
+        found.bending_moment, turned.bending_moment[:, ::-1], atol=2e-3 * np.abs(found.bending_moment).max()
+    )
+    light = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, with_work=True).work
+    assert np.abs(found.bending_moment - light.bending_moment).max() > 0.05 * np.abs(light.bending_moment).max()
 
 
 def test_a_first_cycle_is_of_order_two_as_well(truths):
@@ -214,23 +222,23 @@ def test_a_first_cycle_is_of_order_two_as_well(truths):
 def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
     slow = scenes.load("three-link-glass").changed(effects=(heavy(20.0),)).with_numerics(cycles=1, phases=64)
     alpha, alphadot = slow.gait.cycle(64)
-    wanted = march(GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1).displacement
+    wanted = time_steps(GLASS, slow.system.body, alpha, alphadot, effects=slow.system.effects, cycles=1).displacement
     np.testing.assert_allclose(Study(slow).displacement("direct"), wanted, atol=1e-12)
 
 
-def test_a_tolerance_below_what_a_march_repeats_to_is_refused():
+def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
-    with pytest.raises(SceneError, match="repeats to 1e-06 only: raise --tol"):
+    with pytest.raises(SceneError, match="repeat to 1e-06 only: raise --tol"):
         cheapest(slowed, [0.2], 1e-7)
 
 
 def test_pauses_and_empty_batches():
     alpha, alphadot = Circle().cycle(16)
     alphadot[3] = [1e-99, 0.0]
-    found = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),)).checked()
+    found = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),)).checked()
     assert np.isfinite(found.xi).all()
     assert np.abs(found.xi[3]).max() < 1e-8
-    nothing = march(GLASS, Chain(), alpha[None][:0], alphadot[None][:0], effects=(Transient(travel=0.1),))
+    nothing = time_steps(GLASS, Chain(), alpha[None][:0], alphadot[None][:0], effects=(Transient(travel=0.1),))
     assert nothing.xi.shape == (0, 16, 3)
 
 
@@ -263,7 +271,7 @@ def test_hard_marches_converge(case, medium):
     }
     alpha = np.stack(list(gaits.values()))
     alphadot = (np.roll(alpha, -1, 1) - np.roll(alpha, 1, 1)) / (2 * t[1])
-    found = march(MEDIA[medium], Chain(), alpha, alphadot, effects=HARD[case], cycles=2)
+    found = time_steps(MEDIA[medium], Chain(), alpha, alphadot, effects=HARD[case], cycles=2)
     assert (found.status != "unconverged").all()
     assert found.residual.max() < 1e-9
     assert np.isfinite(found.xi).all()
@@ -272,31 +280,31 @@ def test_hard_marches_converge(case, medium):
 
 def test_status_and_refusals():
     alpha, alphadot = Circle().cycle(16)
-    running = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.3),), cycles=1)
+    running = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.3),), cycles=1)
     assert running.status == "running"
     assert np.isinf(running.drift)
     running.checked()
-    coasting = march(Viscous(2.0), Chain(), alpha[::2], alphadot[::2], effects=(heavy(1e4),))
-    assert coasting.status == "unsettled"
+    coasting = time_steps(Viscous(2.0), Chain(), alpha[::2], alphadot[::2], effects=(heavy(1e4),))
+    assert coasting.status == "not periodic"
     with pytest.raises(RuntimeError, match="give 'cycles' to take it as it is, or lower the mass"):
         coasting.checked()
-    once = march(GLASS, Chain(), alpha, alphadot, effects=(DepthProfile(slope=0.1),))
+    once = time_steps(GLASS, Chain(), alpha, alphadot, effects=(DepthProfile(slope=0.1),))
     assert once.cycles == 1
     with pytest.raises(ValueError, match="takes 8 phases or more"):
-        march(GLASS, Chain(), alpha[:4], alphadot[:4])
+        time_steps(GLASS, Chain(), alpha[:4], alphadot[:4])
     with pytest.raises(ValueError, match="cycles must be a whole number"):
-        march(GLASS, Chain(), alpha, alphadot, cycles=0)
+        time_steps(GLASS, Chain(), alpha, alphadot, cycles=0)
     with pytest.raises(ValueError, match="alpha must be finite"):
-        march(GLASS, Chain(), alpha * np.nan, alphadot)
+        time_steps(GLASS, Chain(), alpha * np.nan, alphadot)
 
 
 def test_batches_march_as_each_alone():
     effects = (Transient(travel=0.04), EndCaps(radius=0.05), heavy(0.2))
     gait, amplitudes = Sine(elements=15), np.array([[0.1, 0.2], [0.3, 0.4]])
-    together = march(GLASS, Backbone(15), *gait.cycle(16, amplitudes), effects=effects, cycles=2, tolerance=1e-12)
+    together = time_steps(GLASS, Backbone(15), *gait.cycle(16, amplitudes), effects=effects, cycles=2, tolerance=1e-12)
     assert together.xi.shape == (2, 2, 16, 3)
     assert together.pose.shape == (2, 2, 17, 3)
-    alone = march(GLASS, Backbone(15), *gait.cycle(16, 0.3), effects=effects, cycles=2, tolerance=1e-12)
+    alone = time_steps(GLASS, Backbone(15), *gait.cycle(16, 0.3), effects=effects, cycles=2, tolerance=1e-12)
     np.testing.assert_allclose(together.xi[1, 0], alone.xi, atol=1e-9)
 
 
@@ -434,14 +442,14 @@ def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
 
 def last_of(cycles, medium, body, gait, phases, effects):
     """(phases + 1, 3): xi through the last of so many cycles, and the pose after it."""
-    found = march(medium, body, *gait.cycle(phases), effects=effects, cycles=cycles)
+    found = time_steps(medium, body, *gait.cycle(phases), effects=effects, cycles=cycles)
     return [*found.xi, found.displacement]
 
 
 def test_heavy_bodies_know_how_far_they_are(truths):
     """Plain cycles of a viscous swimmer that forgets slowly: after each, what is left of the way is what is said."""
     problem = Viscous(2.0), Chain((1, 2, 1.5)), HEAVY, 16, (heavy(20.0),)
-    march_on = lambda **how: march(*problem[:2], *HEAVY.cycle(16), effects=problem[4], **how)
+    march_on = lambda **how: time_steps(*problem[:2], *HEAVY.cycle(16), effects=problem[4], **how)
     limit = march_on().checked()
     assert limit.cycles < 15
     for cycles in (8, 12):
@@ -457,7 +465,7 @@ def test_heavy_bodies_know_how_far_they_are(truths):
 def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
     scene = Scene(Swimmer(Viscous(2.0), Chain((1, 2, 1.5)), (heavy(5.0),)), HEAVY).with_numerics(phases=64)
     a, shapes = np.array([1.0]), HEAVY.cycle(64, np.array([1.0]))
-    left = march(scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects).drift
+    left = time_steps(scene.system.medium, scene.system.body, *shapes, effects=scene.system.effects).drift
     assert scene.system.run(*shapes).to_come == left > 0
     assert (scene.with_numerics(cycles=3).system.run(*shapes).to_come == 0).all()
     scene = scene.with_numerics(cycles=1)
@@ -493,8 +501,10 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     body frame, with the differences in time of the march."""
     body, inertia, N = Chain((1, 1.4, 0.8), frame="link-1"), 3.0, 32
     alpha, alphadot = HEAVY.cycle(N)
-    found = march(medium, body, alpha, alphadot, effects=(heavy(inertia),), cycles=1, tolerance=1e-13, with_work=True)
-    medium_alone = work(medium, body, alpha, alphadot, found.xi).moment
+    found = time_steps(
+        medium, body, alpha, alphadot, effects=(heavy(inertia),), cycles=1, tolerance=1e-13, with_work=True
+    )
+    medium_alone = work_done(medium, body, alpha, alphadot, found.xi).bending_moment
     motion, (x, y, turn) = body.motion(alpha.T, alphadot.T), found.xi.T
     along, half, place, xi = motion.c + 1j * motion.s, motion.half, motion.place, x + 1j * y
     velocity = (motion.v[0] + 1j * motion.v[1]) * along + xi + 1j * turn * place
@@ -506,7 +516,7 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     torque = inertia * (rate(L) + (xi.conj() * p).imag[:, 2:])
     joints = (place + half * along)[:-1, 2:]
     wanted = (joints.conj() * np.cumsum(force, 0)[:-1]).imag - np.cumsum(torque, 0)[:-1]
-    got = (found.work.moment - medium_alone)[2:].T
+    got = (found.work.bending_moment - medium_alone)[2:].T
     np.testing.assert_allclose(got, wanted, atol=off * np.abs(wanted).max())
     assert np.abs(wanted).max() > 0.01
 
@@ -515,12 +525,12 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
 def test_heavy_bodies_settle_in_tens_of_cycles(medium):
     alpha, alphadot = HEAVY.cycle(16, np.linspace(0.3, 1.2, 6))
     for inertia in (60.0, 300.0):
-        found = march(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(inertia),)).checked()
+        found = time_steps(medium, Chain((1, 2, 1.5)), alpha, alphadot, effects=(heavy(inertia),)).checked()
         assert found.cycles <= 40
         assert found.drift.max() <= 1e-6
 
 
-def test_a_march_that_fails_says_so(monkeypatch):
+def test_time_stepping_that_fails_says_so(monkeypatch):
     """Starved descents: the status, and RuntimeError by `checked`."""
     import rft.newton
 
@@ -529,7 +539,7 @@ def test_a_march_that_fails_says_so(monkeypatch):
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(rft.newton, name, ())
     alpha, alphadot = Circle().cycle(8, np.array([0.0, 1.0]))
-    found = march(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1)
+    found = time_steps(GLASS, Chain(), alpha, alphadot, effects=(Transient(travel=0.1),), cycles=1)
     assert list(found.status) == ["running", "unconverged"]
     assert found.residual[1] > 1e-9
     with pytest.raises(RuntimeError, match="did not converge"):
@@ -546,7 +556,7 @@ def test_what_does_not_change_is_not_built_again(monkeypatch):
     effects, counts = (Transient(travel=0.05), DisturbedGround(0.05, 0.2), EndCaps(radius=0.05), heavy(1.0)), []
     for phases in (8, 16):
         made.clear()
-        march(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
+        time_steps(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
         assert made.count("__init__") == 1
         counts.append(made.count("motion"))
     assert counts[1] - counts[0] == 2 * 8
@@ -593,7 +603,7 @@ def test_two_hundred_thousand_steps_of_random_marches():
     for _ in range(800):
         medium, body, alpha, alphadot, effects = random_march(rng)
         try:
-            found = march(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11)
+            found = time_steps(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11)
         except ValueError as error:
             if "comes to the surface" not in str(error):
                 raise

@@ -1,9 +1,9 @@
-"""Phase after phase through a gait, for what a shape and its rate of change do not settle: place, past and mass.
+"""Time stepping through a gait, for what shape and its rate of change leave open: place, past and mass.
 
 At every phase the balance of forces is solved for the body velocity. Each step is implicit: memory is taken at its end,
 momentum by BDF2, the backward difference of order 2, which damps errors at any step. So without memory,
 slope or mass the answer is that of `rft.body_velocity` at every phase, and with them it comes near as they go to zero.
-All samples (amplitudes, parameters) go side by side. The march starts from that answer on untouched ground and goes
+All samples (amplitudes, parameters) go side by side. Time stepping starts from that answer on untouched ground and goes
 round the gait until the displacement of a cycle is that of the cycle before.
 """
 
@@ -20,22 +20,22 @@ from rft.bodies.base import Body, Kinematics, halves
 from rft.bodies.pieces import PIECES
 from rft.contact import Model
 from rft.effects.base import Effect, Site, broken, folded, pieced, under_way
+from rft.limit_cycle import Approach, HeavyApproach
 from rft.media.base import Medium, in_range, require, require_drag
 from rft.newton import Balance
 from rft.premise import Premise
-from rft.settling import Approach, HeavyApproach
 from rft.work import Work, done_by
 
 MOST_CYCLES = 60
 PAUSE = 1e-9  # of the usual joint speed, below which a phase is a pause and has no scale of its own
 
 
-class March(NamedTuple):
-    """The last cycle of a march of N phases. xi: (..., N, 3), body frame, length/rad, length/rad, 1. pose: (..., N + 1, 3),
-    on the ground, whose origin and x axis are the frame's at the start of the march. residual: (...), the largest, as in
-    `rft.Solution`. status: (...), "settled", "running" (as many cycles as were asked for, but not settled), "unsettled"
-    or "unconverged". drift: (...), how much displacement, body lengths, and heading, rad, will yet change in all cycles
-    to come. cycles: how many. work: (..., N) each, None unless asked for."""
+class TimeSteps(NamedTuple):
+    """The last cycle of time stepping at N phases. xi: (..., N, 3), body frame, length/rad, length/rad, 1. pose: (...,
+    N + 1, 3), on the ground, whose origin and x axis are the frame's at the first step. residual: (...), the largest,
+    as in `rft.Solution`. status: (...), "periodic", "running" (as many cycles as were asked for, but not periodic),
+    "not periodic" or "unconverged". drift: (...), how much displacement, body lengths, and heading, rad, will yet
+    change in all cycles to come. cycles: how many. work: (..., N) each, None unless asked for."""
 
     xi: np.ndarray
     pose: np.ndarray
@@ -50,14 +50,14 @@ class March(NamedTuple):
         """(..., 3): pose after the cycle in the frame at its start."""
         return np.moveaxis(_between(*(np.moveaxis(self.pose[..., k, :], -1, 0) for k in (0, -1))), 0, -1)
 
-    def checked(self) -> March:
-        """This march, or RuntimeError if any sample is unconverged or has not settled."""
+    def checked(self) -> TimeSteps:
+        """These steps, or RuntimeError if any sample is unconverged or not periodic."""
         if (self.status == "unconverged").any():
             raise RuntimeError(
-                f"a force balance of the march did not converge (residual {np.max(self.residual):.1e}): "
+                f"a force balance did not converge in time stepping (residual {np.max(self.residual):.1e}): "
                 "raise 'regularisation', or report the scene"
             )
-        if (self.status == "unsettled").any():
+        if (self.status == "not periodic").any():
             raise RuntimeError(
                 f"after {self.cycles} cycles displacement is still {np.max(self.drift):.1e} body lengths from its limit: "
                 "give 'cycles' to take it as it is, or lower the mass or the ground's weakening"
@@ -65,7 +65,7 @@ class March(NamedTuple):
         return self
 
 
-def march(
+def time_steps(
     medium: Medium,
     body: Body,
     alpha,
@@ -78,16 +78,16 @@ def march(
     tolerance: float = 1e-10,
     pieces: int = PIECES,
     with_work: bool = False,
-) -> March:
+) -> TimeSteps:
     """Body velocities through a gait given over one cycle: alpha, alphadot (..., N, joints), rad and per rad of phase, at
     N >= 8 equally spaced phases. Of order 2 in 1/N.
 
-    cycles: exactly so many; if left out, as many as it takes to settle, and one where effects break symmetry (there no
-    cycle is like another). Other arguments as in `rft.body_velocity`. ValueError for what makes no sense.
+    cycles: exactly so many; if left out, as many as it takes to reach the limit cycle, and one where effects break
+    symmetry (there no cycle is like another). Other arguments as in `rft.body_velocity`. ValueError for what makes no sense.
     """
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require_drag(medium)
-    require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"a march takes 8 phases or more, got alpha {alpha.shape}")
+    require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"time stepping takes 8 phases or more, got alpha {alpha.shape}")
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
@@ -103,15 +103,15 @@ def march(
     return _shaped(found, batch, body.length)
 
 
-def _nothing(batch: tuple, phases: int) -> March:
-    """The march of no samples."""
+def _nothing(batch: tuple, phases: int) -> TimeSteps:
+    """The steps of no samples."""
     none = np.zeros(batch)
-    return March(
+    return TimeSteps(
         np.zeros((*batch, phases, 3)), np.zeros((*batch, phases + 1, 3)), none, none.astype(str), none, 0, None
     )
 
 
-def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> March:
+def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> TimeSteps:
     """Cycles until they repeat, or as many as asked for; samples on the last axis."""
     enough = max([1e-6, *(e.settles for e in steps.effects)])
     approach = (HeavyApproach if steps.heavy else Approach)(steps.pose.shape[1])
@@ -122,16 +122,16 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
         pose = np.stack([*pose, steps.foreseen()[1]])
         moved = _between(pose[0], pose[-1])
         drift = approach.after(start, steps.xi[-1], moved)
-        settled = drift <= enough
-        if done == (cycles or MOST_CYCLES) or (cycles is None and settled.all()):
+        periodic = drift <= enough
+        if done == (cycles or MOST_CYCLES) or (cycles is None and periodic.all()):
             break
         if cycles is None and steps.heavy:
-            steps.kick(approach.kick(~settled))
+            steps.kick(approach.kick(~periodic))
     worst = np.max(residual, 0)
-    status = np.where(settled, "settled", "unsettled" if cycles is None else "running")
+    status = np.where(periodic, "periodic", "not periodic" if cycles is None else "running")
     status = np.where(worst <= steps.limit, status, "unconverged")
     work = Work(*(np.stack(x) for x in zip(*work))) if with_work else None
-    return March(np.stack(xi), pose, worst, status, drift, done, work)
+    return TimeSteps(np.stack(xi), pose, worst, status, drift, done, work)
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -147,7 +147,7 @@ def _moved(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     return pose + np.stack([z.real, z.imag, dt * xi[2]])
 
 
-def _shaped(found: March, batch: tuple, length: float) -> March:
+def _shaped(found: TimeSteps, batch: tuple, length: float) -> TimeSteps:
     """Samples to the leading axes, body lengths to the body's unit."""
     units = np.array([length, length, 1.0])
     xi, pose = (np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units for x in found[:2])
@@ -156,11 +156,11 @@ def _shaped(found: March, batch: tuple, length: float) -> March:
         power, moment, slip = (np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work)
         work = Work(power * length, moment, slip)
     residual, status, drift = (x.reshape(batch) for x in found[2:5])
-    return March(xi, pose, residual, status, drift, found.cycles, work)
+    return TimeSteps(xi, pose, residual, status, drift, found.cycles, work)
 
 
 class _Steps:
-    """The march itself: `next` takes one step. All lengths in body lengths, samples on the last axis. whole: (n,), half
+    """The steps themselves: `next` takes one. All lengths in body lengths, samples on the last axis. whole: (n,), half
     lengths of the body's elements, of which ``body`` may be pieces."""
 
     def __init__(self, problem: Balance, body: Body, whole: np.ndarray, alpha, alphadot, effects):

@@ -1,4 +1,4 @@
-"""How far a march is from its limit cycle, and how a heavy body gets there sooner.
+"""How far time stepping is from its limit cycle, and how a heavy body gets there sooner.
 
 From cycle to cycle the displacement changes by less and less; what is left is the sum of all changes to come, not the
 last of them. Without mass the last few give their ratio. Where the ground remembers in cells, changes at last come and go
