@@ -13,7 +13,7 @@ from figures import main
 from geomech.gaits import Sine
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.sweep import beside
+from geomech.study.batch import beside
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda

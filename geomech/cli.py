@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import logging
-import math
-import os
-import re
-import signal
 import sys
-import threading
-import time
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
+from geomech import terminal
 from geomech.errors import SceneError, choose, named
-from geomech.files import refuse_inputs, whole_file, whole_folder
+from geomech.files import whole_folder
+from geomech.options import (
+    ExtentOption,
+    FolderOption,
+    GridOption,
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    check_netcdf,
+    check_outputs,
+    numbers,
+    spread,
+)
 
 app = typer.Typer(
     add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
@@ -26,26 +32,6 @@ app = typer.Typer(
 )  # fmt: skip
 
 DEFAULT_SCENE = "three-link-glass"
-SceneArgument = Annotated[
-    str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")
-]
-GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
-ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
-PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
-
-
-def _folder(text: str | Path) -> Path:
-    if not str(text):
-        raise typer.BadParameter("an empty name: name a folder, '.' for this one")
-    return Path(text)
-
-
-FolderOption = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=_folder)
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
-YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
-PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
 @app.command()
@@ -61,7 +47,7 @@ def run(
 
     scene = load(name)
     report.refuse_folder(scene, out, inputs(scene))
-    with whole_folder(out, inputs(scene)) as folder, progress(f"field of {scene.name}") as bar:
+    with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"field of {scene.name}") as bar:
         allow(scene, report.cost(scene), yes)
         tables = report.write(Study(scene), folder, bar)
     for title, table in tables.items():
@@ -81,7 +67,7 @@ def velocity(
 
     scene = load(name)
     with named(scene.name):
-        out = scene.system.single(_numbers("--alpha", alpha), _numbers("--alphadot", alphadot))
+        out = scene.system.single(numbers("--alpha", alpha), numbers("--alphadot", alphadot))
     if as_json:
         print(json.dumps({k: v for k, v in out.items() if k != "iterations"}))
         return
@@ -104,7 +90,7 @@ def connection(
     from geomech.output import plots
     from geomech.output.netcdf import save_connection
 
-    _is_netcdf(out)
+    check_netcdf(out)
     study = _field(name, grid, extent, out, plot, plot is not None, yes)
     save_connection(out, study)
     if plot:
@@ -145,11 +131,11 @@ def displacement(
     from geomech.study.bench import METHODS, Study
     from geomech.study.choose import cheapest
 
-    values = _sweep("--amplitudes", amplitudes)
+    values = spread("--amplitudes", amplitudes)
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
     scene = _loaded(name, grid, extent)
-    _check_outputs(scene, None, plot)
-    with progress(f"displacement of {scene.name}") as bar:
+    check_outputs(scene, None, plot)
+    with terminal.progress(f"displacement of {scene.name}") as bar:
         if tol is None:
             study = Study(scene)
             allow(scene, study.cost(values, chosen or study.methods), yes)
@@ -179,7 +165,7 @@ def accuracy(
     from geomech.study import accuracy as study
 
     scene = _loaded(name, None, None)
-    with whole_folder(out, inputs(scene)) as folder, progress(f"accuracy of {scene.name}") as bar:
+    with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"accuracy of {scene.name}") as bar:
         allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)
         text = "\n".join([study.table(results), "", *study.sentences(results)])
@@ -200,7 +186,7 @@ def sweep(
     yes: YesOption = False,
 ):
     """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
-    from geomech.output import plots
+    from geomech.output import plots, sweeps
     from geomech.study import kept
     from geomech.study import sweep as sweeping
 
@@ -209,20 +195,20 @@ def sweep(
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
             raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
-        axes[parameter] = _sweep(f"--over {parameter}", values)
-    _is_netcdf(out)
+        axes[parameter] = spread(f"--over {parameter}", values)
+    check_netcdf(out)
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
     scene = _loaded(name, None, None)
     partial = kept.beside(out)
-    _check_outputs(scene, out, plot, partial)
-    with progress(f"sweep of {scene.name}") as bar:
+    check_outputs(scene, out, plot, partial)
+    with terminal.progress(f"sweep of {scene.name}") as bar:
         allow(scene, sweeping.cost(scene, axes), yes)
         results = sweeping.sweep(scene, axes, partial, bar)
     try:
-        sweeping.save(out, scene, results)
+        sweeps.save(out, scene, results)
         if plot:
-            plots.save(sweeping.draw(scene, results), plot)
+            plots.save(sweeps.draw(scene, results), plot)
     except BaseException as error:
         if partial.exists():
             error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
@@ -260,21 +246,7 @@ def allow(scene, cost, yes: bool) -> None:
     """Say what is to come if it takes long; SceneError if it takes too long to be begun without --yes."""
     cost.check(scene.name, yes)
     if not cost.small:
-        _tell(f"{scene.name}: {cost}")
-
-
-@contextlib.contextmanager
-def progress(title: str):
-    """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
+        terminal.tell(f"{scene.name}: {cost}")
 
 
 def _loaded(name: str, grid: int | None, extent: float | None):
@@ -295,163 +267,13 @@ def _field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes:
         TIERS["path"].refuse(scene.system)
         if maps and joints != 2:
             raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {joints}")
-        _check_outputs(scene, output, plot)
+        check_outputs(scene, output, plot)
         allow(scene, price([built(scene, "path")]), yes)
-    with progress(f"field of {scene.name}") as bar:
+    with terminal.progress(f"field of {scene.name}") as bar:
         study.compute_field(bar)
     return study
 
 
-def _is_netcdf(path: Path) -> None:
-    if path.suffix != ".nc":
-        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc")
-
-
-def _check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
-    """SceneError unless the output and the plot can be written and are, like ``more``, no input of the scene."""
-    from geomech.output import plots
-    from geomech.scene import inputs
-
-    if plot:
-        plots.check_format(plot)
-    outputs = list(filter(None, {output, plot}))
-    refuse_inputs([*outputs, *more], inputs(scene))
-    if len(outputs) == 2:
-        refuse_inputs(outputs[:1], outputs[1:])
-    for path in outputs:
-        with contextlib.suppress(_Unused), whole_file(path):
-            raise _Unused
-
-
-class _Unused(Exception):
-    """Leaves `whole_file` without writing."""
-
-
-def _numbers(option: str, text: str, count: int | None = None) -> list[float]:
-    try:
-        values = [float(x) for x in text.split(",")]
-        if count not in (None, len(values)):
-            raise ValueError
-    except ValueError:
-        raise SceneError(
-            f"{option}: {text!r} is not {'a number' if count else 'a list of numbers such as 0.5,0.3'}"
-        ) from None
-    return values
-
-
-def _sweep(option: str, text: str) -> list[float]:
-    """0.5,1.0 or START:STOP:COUNT, all finite."""
-    parts = text.split(":")
-    if len(parts) == 1:
-        values = _numbers(option, text)
-    elif len(parts) == 3 and re.fullmatch(r"[1-9]\d{0,4}", parts[2]):
-        (start,), (stop,), count = _numbers(option, parts[0], 1), _numbers(option, parts[1], 1), int(parts[2])
-        values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
-    else:
-        raise SceneError(f"{option}: {text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10")
-    if not all(map(math.isfinite, values)):
-        raise SceneError(f"{option}: {text!r} must be finite")
-    return values
-
-
-class Stopped(BaseException):
-    """A signal asked to stop."""
-
-    def __init__(self, number: int):
-        self.name, self.code = signal.Signals(number).name, 128 + number
-
-
-@contextlib.contextmanager
-def stoppable():
-    """INT, TERM and HUP raise `Stopped`, so that nothing half-written stays behind. Those that are ignored, as HUP is under
-    nohup, stay so."""
-    heard = [-math.inf]
-
-    def stop(number, frame):
-        if time.monotonic() > heard[0] + PATIENCE:
-            heard[0] = time.monotonic()
-            raise Stopped(number)
-
-    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {n: signal.getsignal(n) for n in numbers if threading.current_thread() is threading.main_thread()}
-    before = {n: handler for n, handler in before.items() if handler not in (signal.SIG_IGN, None)}
-    for n in before:
-        signal.signal(n, stop)
-    try:
-        yield
-    finally:
-        for n, handler in before.items():
-            signal.signal(n, handler)
-
-
 def main(argv: list[str] | None = None) -> None:
     """Entry point: one line on standard error and exit code 2 for what the user can mend, 128 + its number for a signal."""
-    with stoppable():
-        _any_letters()
-        code = _run(argv)
-    sys.exit(code)
-
-
-def _run(argv: list[str] | None) -> int:
-    try:
-        code = app(args=(sys.argv[1:] if argv is None else argv) or ["--help"], standalone_mode=False)
-        if code == 130:  # an interrupt that typer caught
-            raise KeyboardInterrupt
-        if sys.stdout:
-            sys.stdout.flush()
-        return code or 0
-    except SystemExit as ended:  # what typer makes of a closed pipe
-        return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
-    except (Stopped, KeyboardInterrupt, typer.Abort) as stopped:
-        return _stopped(stopped)
-    except MemoryError:
-        _tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
-    except BrokenPipeError:
-        return _unheard()
-    except Exception as error:
-        text = error.format_message() if hasattr(error, "format_message") else str(error)
-        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
-            raise
-        _tell("error: " + "; ".join([text, *getattr(error, "__notes__", ())]))
-        if isinstance(error, OSError):
-            _deaf(sys.stdout)
-    return 2
-
-
-def _stopped(by: BaseException) -> int:
-    kept = " ".join(getattr(by, "__notes__", ())) or "nothing is kept"
-    _tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {kept}")
-    return getattr(by, "code", 130)
-
-
-def _unheard() -> int:
-    """What we said was not wanted to the end: `geomech scenes | head -1`. Files are written by then: no failure."""
-    _deaf(sys.stdout)
-    return 0
-
-
-def _tell(text: str) -> None:
-    """One line on standard error, if anybody listens."""
-    try:
-        print(" ".join(text.split()), file=sys.stderr, flush=True)
-    except OSError:
-        _deaf(sys.stderr)
-
-
-def _deaf(stream) -> None:
-    """Lead a stream that cannot be written to nowhere, so that Python does not complain of it at the end."""
-    with contextlib.suppress(AttributeError, OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _any_letters() -> None:
-    """What a terminal has no letters for is escaped, and matplotlib keeps its folders to itself: nothing fails for the sake
-    of what is said beside the results."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, ValueError):
-            stream.reconfigure(errors="backslashreplace")
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    try:
-        Path.home()
-    except RuntimeError:  # nowhere: matplotlib then takes a temporary folder if it is told of one that cannot be
-        os.environ.setdefault("MPLCONFIGDIR", os.devnull)
+    sys.exit(terminal.ended(app, (sys.argv[1:] if argv is None else argv) or ["--help"]))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from test_cli import geomech as run
 
-from geomech import cli, connection, harmonics
+from geomech import connection, harmonics, terminal
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.field import Field
@@ -189,11 +189,11 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     def stopping(at, amplitudes):
         calls.append((at[0].system.medium.ratio, len(amplitudes)))
         if len(calls) == 5:
-            raise cli.Stopped(signal.SIGTERM)
+            raise terminal.Stopped(signal.SIGTERM)
         return rows(at, amplitudes)
 
     monkeypatch.setattr(sweep, "_rows", stopping)
-    with pytest.raises(cli.Stopped) as stopped:
+    with pytest.raises(terminal.Stopped) as stopped:
         sweep.sweep(VISCOUS, over, kept)
     assert stopped.value.__notes__ == [f"10 of 14 points are kept in {kept}: the same command goes on from there"]
     again = sweep.sweep(VISCOUS, over, kept)
@@ -256,22 +256,22 @@ def test_a_signal_stops_the_solvers_threads(large):
     """One batch of a million balances, solved on both cores: nobody waits for its shares."""
     code = """if True:
         import os, signal, sys, threading, numpy as np
-        from geomech import cli
-        from geomech.cli import stoppable
+        from geomech import terminal
+        from geomech.terminal import stoppable
         from rft import Chain, Granular, body_velocity
         shapes = np.random.default_rng(0).uniform(-2, 2, (2, 2_000_000, 2))
         threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGTERM)).start()
         try:
             with stoppable():
                 body_velocity(Granular(1.8, .24), Chain(), *shapes, threads=2)
-        except cli.Stopped as stopped:
+        except terminal.Stopped as stopped:
             print(stopped.code)
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20)
     assert (done.returncode, done.stdout, done.stderr) == (0, "143\n", "")
 
 
-@pytest.mark.parametrize("raised", [KeyboardInterrupt(), cli.Stopped(signal.SIGINT)])
+@pytest.mark.parametrize("raised", [KeyboardInterrupt(), terminal.Stopped(signal.SIGINT)])
 def test_an_interrupt_is_no_success(raised, monkeypatch):
     def stop(name):
         raise raised
@@ -285,7 +285,7 @@ def test_what_was_ignored_stays_ignored():
     """nohup geomech ... outlives its terminal."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with cli.stoppable():
+        with terminal.stoppable():
             os.kill(os.getpid(), signal.SIGHUP)
             assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
@@ -301,7 +301,7 @@ def test_a_second_signal_does_not_disturb_the_keeping():
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(0.01)
 
-    with pytest.raises(cli.Stopped) as stopped, cli.stoppable():
+    with pytest.raises(terminal.Stopped) as stopped, terminal.stoppable():
         work()
     assert stopped.value.code == 130
 

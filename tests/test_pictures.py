@@ -10,8 +10,7 @@ from geomech import scene as scenes
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Ellipse
-from geomech.output import plots
-from geomech.study import sweep
+from geomech.output import plots, sweeps
 from geomech.study.bench import Study
 from geomech.tiers import TIERS
 from rft import CATALOGUE
@@ -128,14 +127,14 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     moved[..., 0] = [[1, -2], [3, 4], [5, 6]]
     errors = np.ones((3, 2)), np.ones((3, 2))
     results = {"over": over, "displacement": moved, "estimate": errors[0], "estimate_heading": errors[1]}
-    ax = sweep.draw(scene, results).axes[0]
+    ax = sweeps.draw(scene, results).axes[0]
     x, y, values = mesh(ax)
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
     np.testing.assert_allclose(y[:, 0], over["body.length"])
     np.testing.assert_allclose(values, moved[..., 0].T)
     assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "body.length")
     one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.1, 0.2])}
-    ax = sweep.draw(scene, one).axes[0]
+    ax = sweeps.draw(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
     np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.9], [2, 1.1]], [[5, -2.2], [5, -1.8]]])
 

@@ -7,7 +7,7 @@ import mutants
 
 ROOT = pathlib.Path(__file__).parents[1]
 # Beside the systems: the command lists the named media, and a sweep puts effects side by side.
-KNOW_MECHANICS = {"cli.py", "study/sweep.py"}
+KNOW_MECHANICS = {"cli.py", "study/batch.py", "study/sweep.py"}
 
 
 def imports(path):

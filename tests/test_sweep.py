@@ -15,6 +15,7 @@ from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech.errors import SceneError
+from geomech.output import sweeps
 from geomech.study import estimate, kept, sweep
 from geomech.study.bench import Study
 
@@ -356,7 +357,7 @@ def test_a_sweep_stays_until_it_is_saved(tmp_path, monkeypatch):
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--plot", "s.png"]
     for what in ("save", "draw"):
         with monkeypatch.context() as patch:
-            patch.setattr(sweep, what, full)
+            patch.setattr(sweeps, what, full)
             code, _, err = geomech("sweep", *args, cwd=tmp_path)
         assert code == 2
         assert err.endswith(

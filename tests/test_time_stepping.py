@@ -11,9 +11,9 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.reconstruct import displacement
 from geomech.scene import Scene
 from geomech.study import accuracy, estimate, undulation
+from geomech.study.batch import beside
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
-from geomech.study.sweep import beside
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,

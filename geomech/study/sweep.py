@@ -12,17 +12,14 @@ import numpy as np
 
 from geomech import __version__
 from geomech.errors import SceneError
-from geomech.files import note, whole_file
-from geomech.gaits import Gait
-from geomech.output.netcdf import COMPONENTS, attribute
+from geomech.files import note
 from geomech.scene import write as written
 from geomech.scene.model import Scene
 from geomech.scene.read import from_tables
 from geomech.study import estimate, kept
+from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, price
-from geomech.systems import Swimmer
 from rft import SOLVER
-from rft.effects import side_by_side
 
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
@@ -173,7 +170,7 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
     together."""
     groups: dict = {}
     for k, scene in enumerate(scenes):
-        groups.setdefault(_kind(scene), []).append(k)
+        groups.setdefault(kind(scene), []).append(k)
     rows: list = [None] * len(scenes)
     for members in groups.values():
         joined = beside([scenes[k] for k in members], amplitudes)
@@ -181,97 +178,3 @@ def _rows(scenes: list[Scene], amplitudes) -> list:
         for k, part in zip(members, np.split(found, len(members))):
             rows[k] = part.tolist()
     return list(itertools.chain(*rows))
-
-
-def _kind(scene: Scene) -> str:
-    """The same for scenes that can share a batch."""
-    effects = [
-        (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched])
-        for e in getattr(scene.system, "effects", ())
-    ]
-    s = scene.system
-    rest = (s.medium, s.body, s.solver) if isinstance(s, Swimmer) else s
-    return repr((rest, scene.numerics, scene.gait.joints, s.lacks, effects))
-
-
-def beside(scenes: list[Scene], amplitudes=None) -> Scene:
-    """One scene with the gaits and effects of several side by side, each for all amplitudes or its own one."""
-    count = 1 if amplitudes is None else len(amplitudes)
-    gaits = Beside(tuple(s.gait for s in scenes), amplitudes)
-    joined = dataclasses.replace(scenes[0], gait=gaits)
-    if not isinstance(joined.system, Swimmer):
-        return joined
-    effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
-    return joined.changed(effects=effects)
-
-
-@dataclasses.dataclass(frozen=True)
-class Beside:
-    """Several gaits run at once, each for ``amplitudes`` or its own one: what a batch asks of a gait."""
-
-    gaits: tuple[Gait, ...]
-    amplitudes: list[float] | None
-
-    @property
-    def joints(self) -> int:
-        return self.gaits[0].joints
-
-    @property
-    def harmonics(self) -> int:
-        return max(g.harmonics for g in self.gaits)
-
-    def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
-        """alpha, alphadot (gaits x amplitudes, phases, joints)."""
-        each = [g.cycle(phases, [g.amplitude] if self.amplitudes is None else self.amplitudes) for g in self.gaits]
-        return tuple(np.concatenate(x) for x in zip(*each))
-
-
-def save(path: Path, scene: Scene, results: dict) -> None:
-    """The results as NetCDF: dimensions are the parameters with their dots as underscores, and component."""
-    from scipy.io import netcdf_file
-
-    with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = attribute(f"Net displacement per cycle of the scene {scene.name}")
-        file.scene = attribute(written.toml(scene))
-        names = []
-        for parameter, values in results["over"].items():
-            names.append(parameter.replace(".", "_").replace("-", "_"))
-            file.createDimension(names[-1], len(values))
-            axis = file.createVariable(names[-1], "f8", (names[-1],))
-            axis[:] = values
-            axis.long_name = parameter
-        file.createDimension("component", 3)
-        file.createDimension("component_length", 5)
-        component = file.createVariable("component", "c", ("component", "component_length"))
-        component[:] = np.array([list(c.ljust(5, "\0")) for c in COMPONENTS], "S1")
-        component._Encoding = "ascii"
-        unit = "body length" if scene.system.unit == "BL" else "m"
-        for name, dims, units in (
-            ("displacement", (*names, "component"), f"{unit} (x, y), rad (theta)"),
-            ("estimate", tuple(names), "body length"),
-            ("estimate_heading", tuple(names), "rad"),
-        ):
-            variable = file.createVariable(name, "f8", dims)
-            variable[:] = results[name]
-            variable.units = units
-
-
-def draw(scene: Scene, results: dict):
-    """Net displacement against one parameter, or a map over two; SceneError for more."""
-    from geomech.output import plots
-
-    over = results["over"]
-    if len(over) > 2:
-        raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
-    net, label = plots.net(results["displacement"]), f"displacement per cycle ({scene.system.unit})"
-    fig, axes = plots.figure(4.0, 3.0)
-    ax, names = axes[0, 0], list(over)
-    named = [scene.gait.amplitude_label if name == AMPLITUDE else name for name in names]
-    if len(over) == 1:
-        ax.errorbar(over[names[0]], net, yerr=results["estimate"], fmt="o-", color="black", ms=3, lw=1)
-        ax.set(xlabel=named[0], ylabel=label)
-    else:
-        image = ax.pcolormesh(over[names[0]], over[names[1]], net.T, shading="nearest", cmap="viridis", rasterized=True)
-        fig.colorbar(image, ax=ax).set_label(label)
-        ax.set(xlabel=named[0], ylabel=named[1])
-    return fig

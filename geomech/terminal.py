@@ -1,0 +1,133 @@
+"""What a command owes its terminal: one line for what went wrong, a bar for what takes long, an ear for signals."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+import typer
+
+PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
+
+
+@contextlib.contextmanager
+def progress(title: str):
+    """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
+    if not sys.stderr.isatty():
+        yield lambda fraction: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)
+
+
+class Stopped(BaseException):
+    """A signal asked to stop."""
+
+    def __init__(self, number: int):
+        self.name, self.code = signal.Signals(number).name, 128 + number
+
+
+@contextlib.contextmanager
+def stoppable():
+    """INT, TERM and HUP raise `Stopped`, so that nothing half-written stays behind. Those that are ignored, as HUP is under
+    nohup, stay so."""
+    heard = [-math.inf]
+
+    def stop(number, frame):
+        if time.monotonic() > heard[0] + PATIENCE:
+            heard[0] = time.monotonic()
+            raise Stopped(number)
+
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {n: signal.getsignal(n) for n in numbers if threading.current_thread() is threading.main_thread()}
+    before = {n: handler for n, handler in before.items() if handler not in (signal.SIG_IGN, None)}
+    for n in before:
+        signal.signal(n, stop)
+    try:
+        yield
+    finally:
+        for n, handler in before.items():
+            signal.signal(n, handler)
+
+
+def ended(app: typer.Typer, argv: list[str]) -> int:
+    """The exit code of a command, after one line on standard error if it failed."""
+    with stoppable():
+        _any_letters()
+        return _run(app, argv)
+
+
+def _run(app: typer.Typer, argv: list[str]) -> int:
+    try:
+        code = app(args=argv, standalone_mode=False)
+        if code == 130:  # an interrupt that typer caught
+            raise KeyboardInterrupt
+        if sys.stdout:
+            sys.stdout.flush()
+        return code or 0
+    except SystemExit as ended:  # what typer makes of a closed pipe
+        return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
+    except (Stopped, KeyboardInterrupt, typer.Abort) as stopped:
+        return _stopped(stopped)
+    except MemoryError:
+        tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
+    except BrokenPipeError:
+        return _unheard()
+    except Exception as error:
+        text = error.format_message() if hasattr(error, "format_message") else str(error)
+        if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
+            raise
+        tell("error: " + "; ".join([text, *getattr(error, "__notes__", ())]))
+        if isinstance(error, OSError):
+            _deaf(sys.stdout)
+    return 2
+
+
+def _stopped(by: BaseException) -> int:
+    kept = " ".join(getattr(by, "__notes__", ())) or "nothing is kept"
+    tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {kept}")
+    return getattr(by, "code", 130)
+
+
+def _unheard() -> int:
+    """What we said was not wanted to the end: `geomech scenes | head -1`. Files are written by then: no failure."""
+    _deaf(sys.stdout)
+    return 0
+
+
+def tell(text: str) -> None:
+    """One line on standard error, if anybody listens."""
+    try:
+        print(" ".join(text.split()), file=sys.stderr, flush=True)
+    except OSError:
+        _deaf(sys.stderr)
+
+
+def _deaf(stream) -> None:
+    """Lead a stream that cannot be written to nowhere, so that Python does not complain of it at the end."""
+    with contextlib.suppress(AttributeError, OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _any_letters() -> None:
+    """What a terminal has no letters for is escaped, and matplotlib keeps its folders to itself: nothing fails for the sake
+    of what is said beside the results."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="backslashreplace")
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    try:
+        Path.home()
+    except RuntimeError:  # nowhere: matplotlib then takes a temporary folder if it is told of one that cannot be
+        os.environ.setdefault("MPLCONFIGDIR", os.devnull)
