@@ -56,7 +56,7 @@ def inverse(g) -> np.ndarray:
 
 
 def adjoint(g) -> np.ndarray:
-    """Ad_g (..., 3, 3): the velocity of a body at g h, seen in the frame g, from its own, for fixed h -> g."""
+    """Ad_g (..., 3, 3): maps the body velocity at pose g to the spatial one, xi_spatial = Ad_g xi_body."""
     x, y, theta = _split(g)
     c, s = np.cos(theta), np.sin(theta)
     zero, one = np.zeros_like(c), np.ones_like(c)

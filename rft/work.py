@@ -54,9 +54,12 @@ def work_done(
 
 
 def done_by(model: Model, whole: np.ndarray, motions: dict[str, Kinematics], xi, eps) -> Work:
-    """`Work` of B samples from body velocities xi (3, B), in body lengths. motions: of the contacts' elements, of which the
-    body's own may be pieces of elements with the half lengths ``whole``: moments are those between the latter. eps: (B,),
-    the rounding."""
+    """`Work` of B samples at body velocities xi (3, B), in body lengths.
+
+    motions: kinematics of the elements of each contact, by its name. whole: half lengths of the body's own elements, of
+    which those of the model may be pieces; bending moments are those between the body's own. eps: (B,), the speed below
+    which dry friction is rounded off.
+    """
     power, borne = 0.0, {}
     for name, contact in model.contacts.items():
         motion = motions[name]

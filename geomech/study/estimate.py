@@ -91,10 +91,11 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
 
 
 def _left(d0, d1, d2, kinks: bool) -> np.ndarray:
-    """Error left after three doublings that moved the answer by d0, d1, d2.
+    """Error after the last of three doublings of the phases, which moved the answer by d0, d1 and d2.
 
-    If each shrinks the error by r, the last leaves d2 r / (1 - r). With kinks theory gives r = 1/4 (order 2) and the
-    moves scatter, so r is not taken for less, nor a small last move at its word. SAFETY is set by the coverage test.
+    If each doubling multiplies the error by r, what is left after the last is d2 r / (1 - r), and r is estimated from the
+    moves. Where links stick, theory gives r = 1/4 (order 2) but single moves scatter: r is then at least 1/4, and the
+    largest of the three moves, each carried forward by r, stands for the last. SAFETY is set by the coverage test.
     """
     r = np.clip(np.sqrt(d2 / np.maximum(d0, 1e-300)), 0.25 if kinks else 0.0, 0.5)
     move = np.maximum.reduce([d2, d1 * r, d0 * r * r]) if kinks else d2

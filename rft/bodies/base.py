@@ -9,12 +9,12 @@ import numpy as np
 
 
 class Kinematics(NamedTuple):
-    """Elements of a body, in body lengths, in the body frame; each array (n, B): elements by samples.
+    """Kinematics of n straight elements for B samples, in the body frame and in body lengths; arrays (n, B) if not said.
 
-    c, s: cosine and sine of the element's heading. r_t, r_n: along and across the element, the velocity its centre
-    takes from a unit turn of the frame. half: half lengths (n, 1), 0 for a point such as an end cap. weight: (n, 1), what
-    an element's force counts, its length for a piece of body. v: (3, n, B), the element's own (v_t, v_n, spin) of `rft.loads`
-    while the frame is held still.
+    c, s: cosine and sine of each element's heading. r_t, r_n: components along and across the element of the velocity
+    that a unit turning rate of the frame gives its centre. half: (n, 1), half lengths, 0 for a point such as an end cap.
+    weight: (n, 1), the factor of an element's drag per unit length, its length for a piece of body. v: (3, n, B), the
+    velocities (v_t, v_n, spin) of `rft.loads` that the change of shape alone gives the element, the frame being held.
     """
 
     c: np.ndarray

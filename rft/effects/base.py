@@ -50,14 +50,14 @@ class Site(NamedTuple):
 
 @dataclass(frozen=True)
 class Effect(PerSample):
-    """Base of all effects. kind: its name in scenes and messages. breaks: premises it takes away; each takes an
-    engine, or a result, with it. An effect changes a `Model`, and effects commute; as its parameter goes to ``limit`` the
-    scene without it comes back at ``order``.
+    """Base of all effects: each changes a `Model`, and any two commute. As its parameter goes to ``limit`` the scene without
+    it comes back at ``order``.
 
-    batched: parameters that may be arrays (B,), one for each sample of a batch. settles: change of
-    displacement from cycle to cycle, body lengths, below which cycles with this effect count as periodic. held: numbers that
-    time stepping remembers for each sample, beside some for each element. varies: along an element, of which it takes means:
-    longer elements are cut into pieces (`pieced`).
+    kind: its name in scenes and messages. breaks: the premises it takes away, and with them an engine or a result.
+    batched: parameters that may be arrays (B,), one for each sample of a batch. settles: change of displacement from cycle
+    to cycle, body lengths, below which cycles with this effect count as periodic. held: numbers that time stepping
+    remembers for each sample, beside some for each element. varies: whether it differs along an element, of which it takes
+    means, so that longer elements are cut into pieces (`pieced`).
     """
 
     kind = "effect"
