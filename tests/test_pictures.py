@@ -184,3 +184,14 @@ def test_panels_are_x_y_and_theta():
     for component, ax in enumerate(plots.ccf_figure(field, error=error).axes[:3]):
         np.testing.assert_allclose(mesh(ax)[2], A[component, 0].T)
         assert ax.get_title("left")
+
+
+def test_a_row_of_rounding_has_no_arrows():
+    """A snake that cannot slip sideways, in the frame of a wheeled link: A^y is nothing."""
+    fitted = Study(scenes.load("no-slip-snake").changed(frame="link-2").with_numerics(grid=8)).fitted
+    arrows = [plots.vector_field(fitted, row).collections[0] for row in range(3)]
+    lengths = [np.hypot(a.U, a.V)[~np.broadcast_to(a.Umask, a.U.shape)] for a in arrows]
+    assert not lengths[1].any()
+    assert arrows[1].get_clim() == (0.0, 1.0)
+    for k in (0, 2):
+        assert lengths[k].max() == pytest.approx(arrows[k].get_clim()[1])

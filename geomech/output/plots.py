@@ -28,6 +28,7 @@ STYLE = {
     "hatch.linewidth": 0.35,
     "lines.markersize": 3,
 }
+ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
@@ -77,10 +78,14 @@ def vector_field(connection: Connection, component: int = 0, unit: str = "BL", a
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
     size = np.hypot(u, v)
+    if np.nanmax(size, initial=0.0) <= ROUNDING * np.nanmax(np.abs(connection.A), initial=0.0):  # a row of nothing
+        u, v, size = 0 * u, 0 * v, 0 * size
     if np.isnan(size).any():  # beside singular shapes arrows are cut
         cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
         u, v, size = cut * u, cut * v, cut * size
-    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007)
+    top = np.nanmax(size, initial=0.0)
+    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, scale=None if top else 1.0)
+    arrows.set_clim(0.0, top or 1.0)
     per = "rad" if component == 2 else unit
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
     colorbar.set_label(rf"$|\mathbf{{A}}^{{{COMPONENTS[component]}}}|$ ({per}/rad)")
