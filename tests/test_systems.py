@@ -8,6 +8,7 @@ from registry import GAITS, SYSTEMS
 
 from geomech import connection, coordinates, symbolic
 from geomech import scene as scenes
+from geomech.connection import crossed
 from geomech.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.output import netcdf
@@ -185,3 +186,9 @@ def test_whatever_has_a_velocity_is_a_system():
         np.testing.assert_allclose(study.displacement(tier, None, [0.2]), truth, atol=0.02 * np.hypot(*truth[0, :2]))
     with pytest.raises(SceneError, match="of no kind that a scene file can name"):
         scenes.toml(Scene(Disc(), GAITS["ellipse"]))
+
+
+def test_points_on_either_side_of_a_change_of_sign_are_crossed():
+    assert crossed(np.array([-2.0, -1.0, 1.0, 2.0, 0.0, 3.0])).tolist() == [False, True, True, False, True, False]
+    plane = np.array([[1.0, 2.0, 3.0], [1.0, -2.0, 3.0], [1.0, 2.0, 3.0]])
+    assert crossed(plane).tolist() == [[False, True, False], [True, True, True], [False, True, False]]
