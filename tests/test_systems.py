@@ -1,5 +1,7 @@
 """Systems: what the geometry asks of them; the no-slip snake against its closed form, its singular shapes left out."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -16,9 +18,10 @@ from geomech.output.explain import explain
 from geomech.scene import Scene
 from geomech.study import cost, estimate
 from geomech.study.bench import Study
-from geomech.systems import KINDS, NoSlipSnake, Plain
+from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
+from geomech.systems.swimmer import Solver
 from geomech.tiers.direct import direct
-from rft import Chain, se2
+from rft import Backbone, Chain, Coulomb, Transient, se2
 
 AWAY = Ellipse(semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7))  # from alpha_1 = alpha_2
 
@@ -192,3 +195,12 @@ def test_points_on_either_side_of_a_change_of_sign_are_crossed():
     assert crossed(np.array([-2.0, -1.0, 1.0, 2.0, 0.0, 3.0])).tolist() == [False, True, True, False, True, False]
     plane = np.array([[1.0, 2.0, 3.0], [1.0, -2.0, 3.0], [1.0, 2.0, 3.0]])
     assert crossed(plane).tolist() == [[False, True, False], [True, True, True], [False, True, False]]
+
+
+@pytest.mark.parametrize(
+    ("body", "pieces", "seen"), [(Chain(), 40, 40), (Backbone(100), 40, 100), (Chain((1, 1)), 1, 2), (Chain(), 1, 3)]
+)
+def test_effects_that_vary_see_pieces_or_whole_elements(body, pieces, seen):
+    swimmer = Swimmer(Coulomb(), body, (Transient(travel=0.1),), Solver(pieces=pieces))
+    assert swimmer.cut == seen
+    assert dataclasses.replace(swimmer, effects=()).cut == 0
