@@ -5,9 +5,11 @@ import pathlib
 
 import mutants
 
+from geomech.commands import COMMANDS
+
 ROOT = pathlib.Path(__file__).parents[1]
-# Beside the systems: the command lists the named media, and a sweep puts effects side by side.
-KNOW_MECHANICS = {"cli.py", "study/batch.py", "study/sweep.py"}
+# Beside the systems: a command lists the named media, and a sweep puts effects side by side.
+KNOW_MECHANICS = {"commands/scenes.py", "study/batch.py", "study/sweep.py"}
 
 
 def imports(path):
@@ -81,3 +83,8 @@ def test_mutants_are_programs_that_differ():
     for m in made:
         assert ast.dump(ast.parse(m.mutated)) != ast.dump(ast.parse(m.source))
         assert m.change().startswith("- ")
+
+
+def test_a_command_is_the_function_of_its_file():
+    files = {p.stem for p in (ROOT / "geomech" / "commands").glob("*.py")} - {"__init__", "options"}
+    assert files == set(COMMANDS)

@@ -1,4 +1,4 @@
-"""Options that commands share, and what they must be."""
+"""What commands share: options, and what they must be; a scene and its field, loaded and asked for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.errors import SceneError
+from geomech import terminal
+from geomech.errors import SceneError, named
 from geomech.files import refuse_inputs, whole_file
 
 SceneArgument = Annotated[
@@ -87,3 +88,36 @@ def spread(option: str, text: str) -> list[float]:
     if not all(map(math.isfinite, values)):
         raise SceneError(f"{option}: {text!r} must be finite")
     return values
+
+
+def allow(scene, cost, yes: bool) -> None:
+    """Say what is to come if it takes long; SceneError if it takes too long to be begun without --yes."""
+    cost.check(scene.name, yes)
+    if not cost.small:
+        terminal.tell(f"{scene.name}: {cost}")
+
+
+def loaded(name: str, grid: int | None = None, extent: float | None = None):
+    """The scene of that name, with the options of its field."""
+    from geomech.scene import load
+
+    return load(name).with_numerics(grid=grid, extent=extent)
+
+
+def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
+    """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space."""
+    from geomech.study.bench import Study
+    from geomech.study.cost import built, price
+    from geomech.tiers import TIERS
+
+    scene = loaded(name, grid, extent)
+    study, joints = Study(scene), scene.system.joints
+    with named(scene.name):
+        TIERS["path"].refuse(scene.system)
+        if maps and joints != 2:
+            raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {joints}")
+        check_outputs(scene, output, plot)
+        allow(scene, price([built(scene, "path")]), yes)
+    with terminal.progress(f"field of {scene.name}") as bar:
+        study.compute_field(bar)
+    return study

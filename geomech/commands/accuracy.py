@@ -1,0 +1,34 @@
+"""geomech accuracy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from geomech import terminal
+from geomech.commands.options import FolderOption, JsonOption, SceneArgument, YesOption, allow, loaded
+from geomech.files import whole_folder
+
+
+def accuracy(
+    name: SceneArgument,
+    out: FolderOption = Path("accuracy"),
+    as_json: JsonOption = False,
+    yes: YesOption = False,
+):
+    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
+    from geomech.output import plots
+    from geomech.scene import inputs
+    from geomech.study import accuracy as study
+
+    scene = loaded(name)
+    with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"accuracy of {scene.name}") as bar:
+        allow(scene, study.cost(scene), yes)
+        results = study.study(scene, bar)
+        text = "\n".join([study.table(results), "", *study.sentences(results)])
+        (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
+        (folder / "accuracy.txt").write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
+        fig = plots.work_precision_figure(results)
+        for ending in ("png", "pdf"):
+            plots.save(fig, folder / f"accuracy.{ending}")
+    print(json.dumps(results) if as_json else f"{text}\nfiles in {out}: accuracy.json, .txt, .png, .pdf")

@@ -1,0 +1,61 @@
+"""geomech displacement."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Optional
+
+import typer
+
+from geomech import terminal
+from geomech.commands.options import (
+    ExtentOption,
+    GridOption,
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    allow,
+    check_outputs,
+    loaded,
+    spread,
+)
+from geomech.errors import SceneError, choose
+
+
+def displacement(
+    name: SceneArgument,
+    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT")],
+    methods: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
+    grid: GridOption = None,
+    extent: ExtentOption = None,
+    tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
+    as_json: JsonOption = False,
+    plot: PlotOption = None,
+    yes: YesOption = False,
+):
+    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
+    from geomech.output import plots, report
+    from geomech.study import cost
+    from geomech.study.bench import METHODS, Study
+    from geomech.study.choose import cheapest
+
+    values = spread("--amplitudes", amplitudes)
+    chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
+    scene = loaded(name, grid, extent)
+    check_outputs(scene, None, plot)
+    with terminal.progress(f"displacement of {scene.name}") as bar:
+        if tol is None:
+            study = Study(scene)
+            allow(scene, study.cost(values, chosen or study.methods), yes)
+            table = study.study(values, chosen or study.methods, progress=bar)
+        elif chosen:
+            raise SceneError("--tol chooses the tier: drop --methods")
+        else:
+            ask = lambda jobs: allow(scene, cost.price(jobs), yes)
+            table = cheapest(scene, values, tol, ask=ask)
+    if plot:
+        fig, axes = plots.figure(3.6, 3.4)
+        plots.displacement(table, scene.system.unit, axes[0, 0], gait=scene.gait, marker="o")
+        plots.save(fig, plot)
+    print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))

@@ -1,0 +1,12 @@
+"""geomech explain."""
+
+from __future__ import annotations
+
+from geomech.commands.options import SceneArgument, loaded
+
+
+def explain(name: SceneArgument):
+    """Which effects a scene asks for, the engine that follows, what each costs and what it takes away."""
+    from geomech.output.explain import explain as told
+
+    print(told(loaded(name)))

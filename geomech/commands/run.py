@@ -1,0 +1,34 @@
+"""geomech run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from geomech import terminal
+from geomech.commands.options import FolderOption, YesOption, allow
+from geomech.files import whole_folder
+
+DEFAULT_SCENE = "three-link-glass"
+
+
+def run(
+    name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
+    out: FolderOption = Path("results"),
+    yes: YesOption = False,
+):
+    """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
+    from geomech.output import report
+    from geomech.scene import inputs, load
+    from geomech.study.bench import Study
+
+    scene = load(name)
+    report.refuse_folder(scene, out, inputs(scene))
+    with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"field of {scene.name}") as bar:
+        allow(scene, report.cost(scene), yes)
+        tables = report.write(Study(scene), folder, bar)
+    for title, table in tables.items():
+        print(report.text_table(title, table, scene))
+    print(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir() if not p.name.startswith('.')))}")

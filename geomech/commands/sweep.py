@@ -1,0 +1,61 @@
+"""geomech sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from geomech import terminal
+from geomech.commands.options import (
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    allow,
+    check_netcdf,
+    check_outputs,
+    loaded,
+    spread,
+)
+from geomech.errors import SceneError
+
+
+def sweep(
+    name: SceneArgument,
+    over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
+    plot: PlotOption = None,
+    yes: YesOption = False,
+):
+    """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
+    from geomech.output import plots, sweeps
+    from geomech.study import kept
+    from geomech.study import sweep as sweeping
+
+    axes = {}
+    for text in over:
+        parameter, equals, values = text.partition("=")
+        if not equals or parameter in axes:
+            raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
+        axes[parameter] = spread(f"--over {parameter}", values)
+    check_netcdf(out)
+    if plot and len(axes) > 2:
+        raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
+    scene = loaded(name)
+    partial = kept.beside(out)
+    check_outputs(scene, out, plot, partial)
+    with terminal.progress(f"sweep of {scene.name}") as bar:
+        allow(scene, sweeping.cost(scene, axes), yes)
+        results = sweeping.sweep(scene, axes, partial, bar)
+    try:
+        sweeps.save(out, scene, results)
+        if plot:
+            plots.save(sweeps.draw(scene, results), plot)
+    except BaseException as error:
+        if partial.exists():
+            error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
+        raise
+    partial.unlink(missing_ok=True)
+    net = plots.net(results["displacement"])
+    print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.system.unit}, in {out}")

@@ -1,0 +1,32 @@
+"""geomech velocity."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from geomech.commands.options import JsonOption, SceneArgument, numbers
+from geomech.errors import named
+
+
+def velocity(
+    name: SceneArgument,
+    alpha: Annotated[str, typer.Option(help="joint angles in rad, such as 0.5,0.3")],
+    alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0")],
+    as_json: JsonOption = False,
+):
+    """Body velocity for one shape and its rate of change, with its residual and status."""
+    from geomech.scene import load
+
+    scene = load(name)
+    with named(scene.name):
+        out = scene.system.single(numbers("--alpha", alpha), numbers("--alphadot", alphadot))
+    if as_json:
+        print(json.dumps({k: v for k, v in out.items() if k != "iterations"}))
+        return
+    unit = scene.system.unit
+    print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{unit}, {unit}, rad per unit time")
+    steps = f", {out['iterations']} iterations" if "iterations" in out else ""
+    print(f"{out['status']}, residual {out['residual']:.1e}{steps}")
