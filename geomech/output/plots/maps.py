@@ -1,63 +1,19 @@
-"""Plots: each draws on the Axes it is given, or a new one, and returns it. No pyplot, so no global state."""
+"""Maps of shape space: rows of A as arrows, components of the CCF as colours, gaits as curves."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from geomech.connection import Connection
-from geomech.errors import SceneError
 from geomech.field import Field
-from geomech.files import whole_file
 from geomech.gaits import Gait
-from geomech.tiers import TIERS
+from geomech.output.plots.style import axes_of, figure, styled
 
-STYLE = {
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "savefig.dpi": 200,
-    "svg.fonttype": "none",
-    "hatch.linewidth": 0.35,
-    "lines.markersize": 3,
-}
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
-
-
-def styled(draw):
-    """Make a drawing function use the project's style, whatever the caller's is."""
-
-    @functools.wraps(draw)
-    def in_style(*args, **kwargs):
-        import matplotlib as mpl
-
-        with mpl.rc_context(STYLE):
-            return draw(*args, **kwargs)
-
-    return in_style
-
-
-@styled
-def figure(width: float, height: float, columns: int = 1, rows: int = 1):
-    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap."""
-    from matplotlib.figure import Figure
-
-    fig = Figure(figsize=(width, height), layout="constrained")
-    fig.get_layout_engine().set(wspace=0.06)
-    return fig, fig.subplots(rows, columns, squeeze=False)
-
-
-def _axes(ax):
-    return figure(3.4, 3.0)[1][0, 0] if ax is None else ax
 
 
 def shape_space(ax, axes: Sequence[np.ndarray]):
@@ -72,7 +28,7 @@ def shape_space(ax, axes: Sequence[np.ndarray]):
 @styled
 def vector_field(connection: Connection, component: int = 0, unit: str = "BL", ax=None, every: int | None = None):
     """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length."""
-    ax = _axes(ax)
+    ax = axes_of(ax)
     step = every or max(1, len(connection.axes[0]) // 12)
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
@@ -109,7 +65,7 @@ def ccf_map(
     the line of zeros keeps only what parts two signs that are known (`certain`)."""
     from cmcrameri import cm
 
-    ax = _axes(ax)
+    ax = axes_of(ax)
     field, error = drawable(field), error and drawable(error)
     values = field.values[component]
     top, smooth = largest(values), "nearest" if field.masked else "gouraud"
@@ -162,26 +118,6 @@ def draw_gait(gait: Gait, ax, color: str = "black"):
 
 
 @styled
-def displacement(table: Mapping, unit: str = "BL", ax=None, label: str = "", gait: Gait | None = None, **style):
-    """Net displacement per cycle (`net`) against amplitude, a line a tier; ``table`` as `Study.study` gives it."""
-    ax = _axes(ax)
-    for name, tier in TIERS.items():
-        if name in table:
-            title = f"{label}, {tier.label}" if label else tier.label
-            ax.plot(table["amplitude"], net(table[name]), label=title, **{**tier.style, **style})
-    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
-    ax.set(xlabel=gait.amplitude_label if gait else "amplitude", ylabel=f"displacement per cycle ({unit})")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
-    return ax
-
-
-def net(poses) -> np.ndarray:
-    """Signed displacement (...,) of poses (..., 3): the distance, negative where it points backwards (x < 0)."""
-    poses = np.asarray(poses, float)
-    return np.copysign(np.hypot(poses[..., 0], poses[..., 1]), poses[..., 0])
-
-
-@styled
 def connection_figure(connection: Connection, unit: str = "BL"):
     """All three rows of A side by side."""
     fig, axes = figure(10.8, 3.0, 3)
@@ -200,49 +136,3 @@ def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error
 
 
 KNOB_MARKER = "osD^v<>Ph*X"
-
-
-@styled
-def work_precision(results: Mapping, axes=None):
-    """Error against seconds of `accuracy.study`, a line a knob: against the truth on the first of two Axes, against the
-    knob's own limit on the second. Slopes are measured orders in the setting."""
-    axes = figure(10.0, 3.8, 2)[1][0] if axes is None else axes
-    for ax, against in zip(axes, ("truth", "limit")):
-        lines = [line for line in results["lines"] if line["against"] == against]
-        for line, marker in zip(lines, KNOB_MARKER):
-            style = {"color": TIERS[line["tier"]].colour, "linestyle": "-", "linewidth": 1.0}
-            if against == "limit":
-                style["color"] = f"C{KNOB_MARKER.index(marker)}"
-            order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
-            error = np.maximum(line["error"], 1e-17)
-            ax.loglog(line["seconds"], error, marker=marker, label=line["label"] + order, **style)
-        ax.set(
-            xlabel="seconds", ylabel=f"error against the {'truth' if against == 'truth' else 'limit of the knob'} (BL)"
-        )
-        ax.grid(True, which="major", lw=0.3, color="0.85")
-        if lines:
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return axes
-
-
-@styled
-def work_precision_figure(results: Mapping):
-    fig, axes = figure(10.0, 3.4, 2)
-    work_precision(results, axes[0])
-    return fig
-
-
-def check_format(path: str | Path) -> Path:
-    """path if its ending is a figure format, else SceneError."""
-    formats = (".png", ".pdf", ".svg")
-    path = Path(path)
-    if path.suffix.lower() not in formats:
-        raise SceneError(f"cannot draw {path}: end the name in {', '.join(formats)}")
-    return path
-
-
-@styled
-def save(fig, path: str | Path) -> None:
-    """Write a figure; the file appears whole or not at all."""
-    with whole_file(check_format(path)) as part:
-        fig.savefig(part, dpi=STYLE["savefig.dpi"])

@@ -1,0 +1,66 @@
+"""What all pictures have in common: the project's style, figures without pyplot's global state, files that appear whole."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+from geomech.errors import SceneError
+from geomech.files import whole_file
+
+STYLE = {
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "savefig.dpi": 200,
+    "svg.fonttype": "none",
+    "hatch.linewidth": 0.35,
+    "lines.markersize": 3,
+}
+
+
+def styled(draw):
+    """Make a drawing function use the project's style, whatever the caller's is."""
+
+    @functools.wraps(draw)
+    def in_style(*args, **kwargs):
+        import matplotlib as mpl
+
+        with mpl.rc_context(STYLE):
+            return draw(*args, **kwargs)
+
+    return in_style
+
+
+@styled
+def figure(width: float, height: float, columns: int = 1, rows: int = 1):
+    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap."""
+    from matplotlib.figure import Figure
+
+    fig = Figure(figsize=(width, height), layout="constrained")
+    fig.get_layout_engine().set(wspace=0.06)
+    return fig, fig.subplots(rows, columns, squeeze=False)
+
+
+def axes_of(ax):
+    return figure(3.4, 3.0)[1][0, 0] if ax is None else ax
+
+
+def check_format(path: str | Path) -> Path:
+    """path if its ending is a figure format, else SceneError."""
+    formats = (".png", ".pdf", ".svg")
+    path = Path(path)
+    if path.suffix.lower() not in formats:
+        raise SceneError(f"cannot draw {path}: end the name in {', '.join(formats)}")
+    return path
+
+
+@styled
+def save(fig, path: str | Path) -> None:
+    """Write a figure; the file appears whole or not at all."""
+    with whole_file(check_format(path)) as part:
+        fig.savefig(part, dpi=STYLE["savefig.dpi"])
