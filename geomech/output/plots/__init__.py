@@ -13,12 +13,12 @@ from geomech.output.plots.maps import (
     largest,
     shape_space,
     vector_field,
-)  # fmt: skip
+)
 from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
 from geomech.output.plots.style import STYLE, check_format, figure, save, styled
 
 __all__ = [
-    "COMPONENTS", "FINEST", "KNOB_MARKER", "STYLE", "ccf_figure", "ccf_map", "certain", "check_format", "connection_figure", "displacement",
-    "draw_gait", "drawable", "figure", "largest", "net", "save", "shape_space", "styled", "vector_field", "work_precision",
-    "work_precision_figure",
+    "COMPONENTS", "FINEST", "KNOB_MARKER", "STYLE", "ccf_figure", "ccf_map", "certain", "check_format", "connection_figure",
+    "displacement", "draw_gait", "drawable", "figure", "largest", "net", "save", "shape_space", "styled", "vector_field",
+    "work_precision", "work_precision_figure",
 ]  # fmt: skip
