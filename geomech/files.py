@@ -197,6 +197,38 @@ def _locked(file) -> bool:
     return True
 
 
+@contextlib.contextmanager
+def locked(path: Path):
+    """Whether ``path`` could be locked, and hold it so; True where there are no locks. The file is there while the lock
+    is held. OSError if it cannot be made."""
+    if fcntl is None:
+        yield True
+        return
+    while True:  # what is locked may have been removed by its last owner a moment ago
+        with os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600), "rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                yield False
+                return
+            except OSError:  # a file system without locks
+                yield True
+                return
+            if _same(file, path):
+                try:
+                    yield True
+                finally:
+                    path.unlink(missing_ok=True)
+                return
+
+
+def _same(file, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), os.stat(path))
+    except OSError:
+        return False
+
+
 def _discard(folder: Path) -> None:
     """Remove a folder of ours, its mark after all that it stands for."""
     shutil.rmtree(folder / NEW, ignore_errors=True)

@@ -6,6 +6,7 @@ import contextlib
 import logging
 import math
 import os
+import shlex
 import signal
 import sys
 import threading
@@ -79,7 +80,7 @@ def _run(app: typer.Typer, argv: list[str]) -> int:
     except SystemExit as ended:  # what typer makes of a closed pipe
         return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
     except (Stopped, KeyboardInterrupt, typer.Abort) as stopped:
-        return _stopped(stopped)
+        return _stopped(stopped, argv)
     except MemoryError:
         tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
     except BrokenPipeError:
@@ -94,9 +95,11 @@ def _run(app: typer.Typer, argv: list[str]) -> int:
     return 2
 
 
-def _stopped(by: BaseException) -> int:
-    kept = " ".join(getattr(by, "__notes__", ())) or "nothing is kept"
-    tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {kept}")
+def _stopped(by: BaseException, argv: list[str]) -> int:
+    """What is kept, as the notes of ``by`` say, and the command that takes it up."""
+    kept, again = "; ".join(getattr(by, "__notes__", ())), shlex.join(["geomech", *argv])
+    told = f"{kept}: {again}" if kept else f"nothing is kept; the same command starts anew: {again}"
+    tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {told}")
     return getattr(by, "code", 130)
 
 

@@ -278,7 +278,8 @@ def test_an_interrupt_is_no_success(raised, monkeypatch):
 
     monkeypatch.setattr(scenes, "load", stop)
     code, out, err = run("explain", "three-link-glass")
-    assert (code, out, err) == (130, "", "error: stopped by SIGINT: nothing is kept\n")
+    again = "the same command starts anew: geomech explain three-link-glass"
+    assert (code, out, err) == (130, "", f"error: stopped by SIGINT: nothing is kept; {again}\n")
 
 
 def test_what_was_ignored_stays_ignored():

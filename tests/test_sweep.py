@@ -14,6 +14,7 @@ import xarray
 from test_cli import geomech
 
 from geomech import scene as scenes
+from geomech import terminal
 from geomech.errors import SceneError
 from geomech.output import sweeps
 from geomech.study import estimate, kept, sweep
@@ -375,9 +376,9 @@ def test_the_longest_name_has_room(length, tmp_path):
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", name]
     assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
     assert [p.name for p in tmp_path.iterdir()] == [name]
-    partial = kept.beside(tmp_path / name)
-    assert partial == tmp_path / kept.beside(Path(name))
-    assert partial != kept.beside(tmp_path / ("b" + name[1:]))
+    partial = kept.beside(tmp_path / name, {})
+    assert partial == tmp_path / kept.beside(Path(name), {})
+    assert partial != kept.beside(tmp_path / ("b" + name[1:]), {})
     partial.write_text("5")
     code, _, err = geomech("sweep", *args, cwd=tmp_path)
     assert code == 0
@@ -405,7 +406,7 @@ cli.main()
     first = subprocess.run([sys.executable, "-c", script, "sweep", *args], cwd=tmp_path)
     assert first.returncode == -signal.SIGKILL
     left = {p.name[:9] for p in tmp_path.iterdir()}
-    assert left == {".s.nc.par", ".geomech-"}
+    assert left == {".s.nc.par", ".s.nc.loc", ".geomech-"}
     assert len(json.loads((tmp_path / ".s.nc.partial").read_text())["rows"]) == 4
     assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
     assert [p.name for p in tmp_path.iterdir()] == ["s.nc"]
@@ -439,3 +440,79 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
 def test_bad_sweeps_are_refused_before_computing(over, said):
     with pytest.raises(SceneError, match=said):
         sweep.sweep(GLASS, over)
+
+
+def test_an_unfinished_sweep_belongs_to_its_own_question(tmp_path, monkeypatch):
+    """Another sweep to the same file leaves it, and has its own; the same command goes on with either."""
+    rows = sweep._rows
+
+    def ask(*amplitudes, stop=False):
+        calls = []
+
+        def stopping(at, amplitudes):
+            calls.append(amplitudes)
+            if stop and len(calls) == 2:
+                raise terminal.Stopped(signal.SIGINT)
+            return rows(at, amplitudes)
+
+        monkeypatch.setattr(sweep, "_rows", stopping)
+        over = "gait.amplitude=" + ",".join(map(str, amplitudes))
+        return *geomech("sweep", "three-link-viscous", "--over", over, "-o", "s.nc", cwd=tmp_path)[::2], len(calls)
+
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
+    code, err, _ = ask(0.5, 1, stop=True)
+    same = "1 of 2 points are kept in .s.nc.partial: the same command goes on from there: "
+    assert (code, err) == (
+        130,
+        f"error: stopped by SIGINT: {same}geomech sweep three-link-viscous --over gait.amplitude=0.5,1 -o s.nc\n",
+    )
+    first = (tmp_path / ".s.nc.partial").read_bytes()
+    code, err, _ = ask(0.6, 0.9, 1.2, stop=True)
+    own = kept.beside(
+        tmp_path / "s.nc", json.loads(next(tmp_path.glob(".s.nc.?*.partial")).read_text())["question"]
+    ).name
+    assert code == 130
+    assert err.startswith("note: another sweep to s.nc is unfinished: ")
+    assert f"1 of 3 points are kept in {own}: the same command goes on from there: geomech sweep" in err
+    assert own != ".s.nc.partial"
+    assert ask(0.6, 0.9, 1.2)[::2] == (0, 2)
+    assert (tmp_path / ".s.nc.partial").read_bytes() == first
+    assert {p.name for p in tmp_path.iterdir()} == {".s.nc.partial", "s.nc"}
+    assert ask(0.5, 1) == (0, "", 1)
+    assert {p.name for p in tmp_path.iterdir()} == {"s.nc"}
+
+
+HOLDS = """
+import sys
+from pathlib import Path
+from geomech.study import kept
+with kept.alone(Path("s.nc")):
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_two_sweeps_do_not_write_one_file_and_a_killed_one_is_no_obstacle(tmp_path):
+    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", HOLDS], cwd=tmp_path, **pipes) as other:
+        assert other.stdout.readline() == b"ready\n"
+        for name in ("s.nc", "../" + tmp_path.name + "/s.nc"):
+            code, out, err = geomech("sweep", *args, name, cwd=tmp_path)
+            assert (code, out) == (2, "")
+            assert err.startswith(f"error: another sweep to {name} is under way: wait for it")
+        assert geomech("sweep", *args, "t.nc", cwd=tmp_path)[::2] == (0, "")
+        other.kill()
+    assert {p.name for p in tmp_path.iterdir()} == {".s.nc.lock", "t.nc"}
+    assert geomech("sweep", *args, "s.nc", cwd=tmp_path)[::2] == (0, "")
+    assert {p.name for p in tmp_path.iterdir()} == {"s.nc", "t.nc"}
+
+
+@pytest.mark.parametrize("kind", ["folder", "dangling"])
+def test_a_lock_that_is_no_file_is_refused(kind, tmp_path):
+    lock = tmp_path / ".s.nc.lock"
+    lock.mkdir() if kind == "folder" else lock.symlink_to(tmp_path / "nothing")
+    code, _, err = geomech("sweep", "three-link-viscous", "--over", "gait.amplitude=1", "-o", "s.nc", cwd=tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.startswith("error: cannot keep a sweep beside s.nc: ")
+    assert [p.name for p in tmp_path.iterdir()] == [".s.nc.lock"]

@@ -19,6 +19,7 @@ from geomech.commands.options import (
     spread,
 )
 from geomech.errors import SceneError
+from geomech.files import note
 
 
 def sweep(
@@ -43,19 +44,24 @@ def sweep(
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
     scene = loaded(name)
-    partial = kept.beside(out)
+    partial = sweeping.partial(scene, axes, out)
     check_outputs(scene, out, plot, partial)
-    with terminal.progress(f"sweep of {scene.name}") as bar:
-        allow(scene, sweeping.cost(scene, axes), yes)
-        results = sweeping.sweep(scene, axes, partial, bar)
-    try:
-        sweeps.save(out, scene, results)
-        if plot:
-            plots.save(sweeps.draw(scene, results), plot)
-    except BaseException as error:
-        if partial.exists():
-            error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
-        raise
-    partial.unlink(missing_ok=True)
+    with kept.alone(out):
+        with terminal.progress(f"sweep of {scene.name}") as bar:
+            allow(scene, sweeping.cost(scene, axes), yes)
+            if kept.is_second(out, partial):
+                note(
+                    f"another sweep to {out} is unfinished: what is done of it stays, this one keeps its own in {partial}"
+                )
+            results = sweeping.sweep(scene, axes, partial, bar)
+        try:
+            sweeps.save(out, scene, results)
+            if plot:
+                plots.save(sweeps.draw(scene, results), plot)
+        except BaseException as error:
+            if partial.exists():
+                error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
+            raise
+        partial.unlink(missing_ok=True)
     net = plots.net(results["displacement"])
     print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.system.unit}, in {out}")

@@ -1,7 +1,9 @@
-"""The rows of an unfinished sweep, in a file that is believed only if it is whole and answers the same question."""
+"""The rows of an unfinished sweep, in a file of its question's own that is believed only if it is whole, and the lock that
+keeps two sweeps from one output."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -9,15 +11,56 @@ import os
 from pathlib import Path
 
 from geomech.errors import SceneError
-from geomech.files import hidden, note, read, sweep_strays, whole_file, why
+from geomech.files import hidden, locked, note, read, sweep_strays, whole_file, why
 
 LARGEST = 1_000_000_000  # bytes: ten times what a million rows take
+VERSIONS = {"geomech", "solver"}  # of a question: what another one left cannot be taken up any more
 WIDTH = 5  # numbers in a row: x, y, theta and the errors of position and heading
 
 
-def beside(output: Path) -> Path:
-    """The file that keeps what is done of a sweep to ``output``."""
-    return hidden(output.resolve() if ".." in output.parts else output, ".partial")
+def beside(output: Path, question: dict) -> Path:
+    """The file that keeps what is done of the sweep to ``output`` that answers this question (JSON): ``.NAME.partial``,
+    or, where that keeps what is done of another sweep, a name of the question's own."""
+    first, key = hidden(_plain(output), ".partial"), hashlib.sha256(json.dumps(question).encode()).hexdigest()[:8]
+    own = hidden(_plain(output), f".{key}.partial")
+    return own if os.path.lexists(own) or _is_anothers(first, json.loads(json.dumps(question))) else first
+
+
+def is_second(output: Path, partial: Path) -> bool:
+    """Whether another unfinished sweep to ``output`` has taken the usual name of what is kept."""
+    first = hidden(_plain(output), ".partial")
+    return partial != first and os.path.lexists(first)
+
+
+def _is_anothers(path: Path, question: dict) -> bool:
+    """Whether a file keeps, undamaged, what is done of another sweep; that of another version is none."""
+    try:
+        found = json.loads(read(path, LARGEST))
+        whole = found.pop("checksum") == _checksum(found)
+        return whole and any(found["question"][key] != question[key] for key in {*question} - VERSIONS)
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError):
+        return False
+
+
+@contextlib.contextmanager
+def alone(output: Path):
+    """Hold the lock of sweeps to ``output``: SceneError while another process has it. It is freed however its owner ends;
+    where the file system has no locks nothing is held."""
+    path = hidden(_plain(output), ".lock")
+    with contextlib.ExitStack() as stack:
+        try:
+            held = stack.enter_context(locked(path))
+        except OSError as error:
+            raise SceneError(f"cannot keep a sweep beside {output}: {why(error)}; choose another -o") from None
+        if not held:
+            raise SceneError(
+                f"another sweep to {output} is under way: wait for it, stop it, or choose another output with -o"
+            )
+        yield
+
+
+def _plain(output: Path) -> Path:
+    return output.resolve() if ".." in output.parts else output
 
 
 def keep(path: Path, question: dict, rows: list) -> None:

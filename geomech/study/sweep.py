@@ -105,6 +105,11 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     return tables, names, values, list(itertools.product(*outer))
 
 
+def partial(scene: Scene, over: Mapping[str, list[float]], output: Path) -> Path:
+    """The file that keeps what is done of this sweep to ``output``; SceneError as from `sweep`."""
+    return kept.beside(output, question(scene, _grid(scene, over)[2]))
+
+
 def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
     system = scene.system
