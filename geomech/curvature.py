@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from geomech.connection import Connection
+from geomech.errors import is_whole, short
 from geomech.field import Field
 from rft import se2
 
@@ -31,7 +32,12 @@ def lie_bracket(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
 
 def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in the connection's length unit and rad."""
-    if connection.field.joints < 2:
+    if not isinstance(connection, Connection):
+        raise ValueError(f"a CCF is that of a Connection, such as connection.fit gives, got {short(connection)}")
+    joints = connection.field.joints
+    if not (is_whole(i) and is_whole(j) and i != j and 0 <= min(i, j) and max(i, j) < max(joints, 2)):
+        raise ValueError(f"i and j must be two of the joints 0 to {joints - 1}, got {short(i)} and {short(j)}")
+    if joints < 2:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
     return Field(connection.axes, values, connection.degree)
@@ -47,7 +53,7 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """
     from scipy.ndimage import maximum_filter
 
-    whole = ccf(connection, i, j)
+    whole = ccf(connection, i, j)  # refuses what has none
     if whole.masked:
         return _at_halves(connection, whole, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)

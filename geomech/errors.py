@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import math
 import numbers
+import warnings
 from collections.abc import Iterable
 
 
@@ -15,6 +16,32 @@ class SceneError(ValueError):
     def __init__(self, text: str):
         text = " ".join(text.split())
         super().__init__(text if len(text) <= 400 else text[:300] + " ... " + text[-80:])
+
+
+class Note(UserWarning):
+    """Something that is done as asked and is likely not meant; on the command line a line on standard error."""
+
+
+class UnitWarning(Note):
+    """A number that would make more sense in another unit."""
+
+
+class VelocityWarning(Note):
+    """A velocity that lacks what a local connection rests on."""
+
+
+FULL_TURN = 2 * math.pi * (1 + 1e-9)
+
+
+def check_angle(what: str, largest: float) -> None:
+    """UnitWarning if an angle in rad is beyond a full turn."""
+    if largest > FULL_TURN:
+        warnings.warn(
+            f"{what} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
+            f"the command line, a key that ends in _deg in a scene, or {math.radians(largest):.4g} rad",
+            UnitWarning,
+            stacklevel=3,
+        )
 
 
 @contextlib.contextmanager

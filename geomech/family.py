@@ -31,8 +31,9 @@ from rft import se2
 
 @dataclass(frozen=True)
 class Family:
-    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending from 0. xi: (M, N, 3),
-    body velocity with respect to phase at N equally spaced phases."""
+    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending, 0 among them. xi: (M, N, 3),
+    body velocity with respect to phase at N equally spaced phases. Either side of 0 has a spline of its own: rates that
+    turn round kink the velocity there."""
 
     gait: Gait
     amplitudes: np.ndarray
@@ -54,10 +55,14 @@ class Family:
         x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
         return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
 
-    def _spline(self, values: np.ndarray):
+    def _sides(self, values: np.ndarray):
+        """(sign, nodes, spline through values (M, ...) in |amplitude|) on each side of 0 that has curves."""
         from scipy.interpolate import make_interp_spline
 
-        return make_interp_spline(self.amplitudes, values, 3)
+        for sign in (-1, 1):
+            nodes = np.flatnonzero(sign * self.amplitudes >= 0)[::sign]
+            if len(nodes) > 1:
+                yield sign, nodes, make_interp_spline(np.abs(self.amplitudes[nodes]), values[nodes], 3)
 
     def ccf(self) -> tuple[np.ndarray, np.ndarray]:
         """(alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
@@ -65,7 +70,9 @@ class Family:
         t = self.phases
         unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
         jacobian = self.amplitudes[:, None] * (unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0])
-        density = self._spline(self.A).derivative()(self.amplitudes)
+        density = np.zeros_like(self.A)
+        for sign, nodes, spline in self._sides(self.A):
+            density[nodes] = sign * spline.derivative()(np.abs(self.amplitudes[nodes]))
         small = np.abs(jacobian) < 1e-6 * np.abs(jacobian).max()
         values = np.where(small[..., None], np.nan, density / np.where(small, 1.0, jacobian)[..., None])
         return self.gait.shape(t, self.amplitudes), values
@@ -74,30 +81,44 @@ class Family:
         """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of which the
         table has the exact value at each of its curves. ValueError for amplitudes off the table."""
         a = real_array("amplitudes", amplitudes)
-        if not ((a >= 0) & (a <= self.amplitudes[-1] * (1 + 1e-12))).all():
-            raise ValueError(f"amplitudes must lie from 0 to the family's {self.amplitudes[-1]:g}, got {a.ravel()[:4]}")
+        low, high = self.amplitudes[[0, -1]]
+        if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
+            raise ValueError(f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}")
         moved, start = displacement(self.xi), self.heading[:, 0]
-        integral = self._spline(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1))(a)
+        integral = np.zeros((*a.shape, 4))
+        for sign, _, spline in self._sides(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1)):
+            integral[sign * a > 0] = spline(np.abs(a[sign * a > 0]))
         x, y, turn, start = np.moveaxis(integral, -1, 0)
         return np.stack([*se2.rotated(-start, x, y), turn], -1)
 
 
 def fit(
-    velocity: Velocity, gait: Gait, largest: float, count: int = 24, phases: int = 128, progress: Callable | None = None
+    velocity: Velocity,
+    gait: Gait,
+    largest: float,
+    count: int = 24,
+    phases: int = 128,
+    progress: Callable | None = None,
+    *,
+    least: float = 0.0,
 ) -> Family:
-    """The family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes.
+    """The family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes; with a
+    negative ``least`` as many down to that, reflected through the centre. largest may then be 0.
 
     Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
     """
     checked_gait(gait)
-    number("largest amplitude", largest, 1e-300, 1e300)
+    number("least amplitude", least, -1e300, 0.0)
+    number("largest amplitude", largest, 0.0 if least < 0 else 1e-300, 1e300)
     number("curves", count, 4, 1e6, whole=True)
     count = int(count)
-    amplitudes = largest * np.arange(count + 1) / count
-    xi = np.zeros((count + 1, phases, 3))
+    below, above = (x * np.arange(1, count + 1) / count if x else np.zeros(0) for x in (least, largest))
+    amplitudes = np.concatenate([below[::-1], [0.0], above])
+    xi, moving = np.zeros((len(amplitudes), phases, 3)), np.flatnonzero(amplitudes)
     step = max(1, SAMPLES_TOGETHER // phases)
-    for k in range(1, count + 1, step):
-        xi[k : k + step] = evaluate(velocity, *gait.cycle(phases, amplitudes[k : k + step]))
+    for k in range(0, len(moving), step):
+        some = moving[k : k + step]
+        xi[some] = evaluate(velocity, *gait.cycle(phases, amplitudes[some]))
         if progress:
-            progress(min(1.0, (k + step - 1) / count))
+            progress(min(1.0, (k + step) / len(moving)))
     return Family(gait, amplitudes, xi)

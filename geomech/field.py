@@ -88,19 +88,24 @@ class Field:
 
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""
-        alpha = real_array("alpha", alpha)
-        if alpha.ndim == 0 or alpha.shape[-1] != self.joints or not np.isfinite(alpha).all():
-            raise ValueError(f"alpha must be finite and of shape (..., {self.joints}), got {alpha.shape}")
-        for k, axis in enumerate(self.axes):
-            low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
-            slack = 1e-9 * (axis[-1] - axis[0])
-            if low < axis[0] - slack or high > axis[-1] + slack:
-                worst = low if axis[0] - low > high - axis[-1] else high
-                raise ValueError(
-                    f"alpha_{k + 1} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
-                    "widen the extent or lower the amplitude"
-                )
-        return alpha
+        return inside(self.axes, alpha)
+
+
+def inside(axes, alpha) -> np.ndarray:
+    """alpha (..., d) as an array, or ValueError naming the first angle that leaves the grid of these axes."""
+    alpha = real_array("alpha", alpha)
+    if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
+        raise ValueError(f"alpha must be finite and of shape (..., {len(axes)}), got {alpha.shape}")
+    for k, axis in enumerate(axes):
+        low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
+        slack = 1e-9 * (axis[-1] - axis[0])
+        if low < axis[0] - slack or high > axis[-1] + slack:
+            worst = low if axis[0] - low > high - axis[-1] else high
+            raise ValueError(
+                f"alpha_{k + 1} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
+                "widen the extent or lower the amplitude"
+            )
+    return alpha
 
 
 def _tensor_spline(field: Field, integrate: int | None = None):

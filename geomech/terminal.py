@@ -6,14 +6,18 @@ import contextlib
 import logging
 import math
 import os
+import re
 import shlex
 import signal
 import sys
 import threading
 import time
+import warnings
 from pathlib import Path
 
 import typer
+
+from geomech.errors import Note
 
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
@@ -70,6 +74,33 @@ def ended(app: typer.Typer, argv: list[str]) -> int:
 
 
 def _run(app: typer.Typer, argv: list[str]) -> int:
+    with _notes() as notes:
+        code = _run_noting(app, argv, notes)
+    if not code:
+        for text in notes.values():
+            tell(f"note: {text}")
+    return code
+
+
+@contextlib.contextmanager
+def _notes():
+    """What is noted while a command runs: the first of each kind, by what it says before its first number."""
+    notes: dict[str, str] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", Note)
+        others = warnings.showwarning
+
+        def show(message, category, *where, **options):
+            if issubclass(category, Note):
+                notes.setdefault(re.split(r"[\d.]+ ", str(message))[0], str(message))
+            else:
+                others(message, category, *where, **options)
+
+        warnings.showwarning = show
+        yield notes
+
+
+def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
     try:
         code = app(args=argv, standalone_mode=False)
         if code == 130:  # an interrupt that typer caught
@@ -89,7 +120,7 @@ def _run(app: typer.Typer, argv: list[str]) -> int:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
-        tell("error: " + "; ".join([text, *getattr(error, "__notes__", ())]))
+        tell("error: " + "; ".join([text, *getattr(error, "__notes__", ()), *notes.values()]))
         if isinstance(error, OSError):
             _deaf(sys.stdout)
     return 2

@@ -420,6 +420,6 @@ def test_what_a_march_cannot_give_is_refused_by_name(name):
     assert f"engine: {swimmer.system.engine}" in told
     assert f"with {name} " in told
     assert (
-        f"not available: connection, CCF, area, path and harmonic tiers, adapted tier, velocity at a single shape: {name}"
+        f"not available: connection, CCF, velocity at a single shape, area, adapted, path and harmonic tiers: {name}"
         in told
     )

@@ -8,6 +8,8 @@ import pytest
 from geomech import scene as scenes
 from geomech.study.bench import Study
 
+pytestmark = pytest.mark.filterwarnings("ignore::geomech.errors.UnitWarning")
+
 VALUES = [
     "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",
     '""', '"x"', '"mean"', '"link-2"', '"circle"', '"granular"', "[]", "[[]]", "[1]", "[1, 2, 3, 4]", "[[1, 2], [3]]",

@@ -30,6 +30,8 @@ from rft import (
 )
 from rft.loads import element_load
 
+pytestmark = pytest.mark.filterwarnings("ignore::geomech.errors.UnitWarning")
+
 
 def still(alpha, alphadot):
     return np.zeros((*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3))
@@ -77,8 +79,8 @@ NUMBERS = [
     ("gait's amplitude", having(Circle, "amplitude"), -1e6, 1e6),
     ("amplitudes", lambda x: Circle().shape(0.0, [x]), -1e6, 1e6),
     ("semi-axis", lambda x: Ellipse(semi_axes=(1.0, x)), -1e6, 1e6),
-    ("sine's amplitude", having(Sine, "amplitude"), 0.0, 10.0),
-    ("sine's amplitudes", lambda x: Sine(elements=4).shape(0.0, [x]), 0.0, 10.0),
+    ("sine's amplitude", having(Sine, "amplitude"), -10.0, 10.0),
+    ("sine's amplitudes", lambda x: Sine(elements=4).shape(0.0, [x]), -10.0, 10.0),
     ("sine's waves", having(Sine, "waves", elements=12), LEAST, 3.0),
     ("extent", lambda x: connection.grid(2, 4, x), 1e-9, 1e6),
     ("family's amplitude", lambda x: family.fit(still, Circle(), x, 4, 8), 1e-300, None),

@@ -315,6 +315,34 @@ def test_estimates_are_in_body_lengths():
         np.testing.assert_allclose(tables[1][key]["path"], tables[0][key]["path"], rtol=1e-6, atol=1e-12)
 
 
-def test_the_adapted_tier_refuses_amplitudes_below_zero():
-    with pytest.raises(SceneError, match="adapted tier takes amplitudes >= 0"):
-        BENCH.displacement("adapted", amplitudes=[-0.5, 0.5])
+GENERIC = Fourier(cos=((0.8, 0.2), (0.3, -0.1)), sin=((-0.3, 0.1), (0.6, 0.25)), centre=(0.3, -0.2))
+TURNED = Fourier(cos=((-0.8, -0.2), (-0.3, 0.1)), sin=((0.3, -0.1), (-0.6, -0.25)), centre=(0.3, -0.2))
+A = np.array([-1.0, -0.35, 0.0, 0.35, 1.0])
+
+
+@pytest.mark.parametrize("tier", ["area", "adapted", "path", "harmonic", "direct"])
+def test_every_tier_takes_negative_and_zero_amplitudes_alike(tier):
+    """As those of the curve reflected through the gait's centre, and rest."""
+    found = BENCH.displacement(tier, GENERIC, A)
+    np.testing.assert_allclose(found[::-1], BENCH.displacement(tier, TURNED, A), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found[:2], BENCH.displacement(tier, GENERIC, A[:2]), atol=1e-12)
+    np.testing.assert_allclose(found[2], 0.0, atol=1e-15)
+    np.testing.assert_allclose(BENCH.displacement(tier, GENERIC, [0.0, 0.0]), 0.0, atol=1e-15)
+    assert np.abs(found[0] - found[-1]).max() > 1e-3
+    own = dataclasses.replace(GENERIC, amplitude=-1.0)
+    np.testing.assert_allclose(BENCH.displacement(tier, own), found[0], rtol=1e-9, atol=1e-12)
+
+
+def test_the_adapted_tier_is_near_the_truth_on_both_sides():
+    truth, found = (BENCH.displacement(tier, GENERIC, A) for tier in ("direct", "adapted"))
+    np.testing.assert_allclose(found, truth, atol=5e-3 * np.abs(truth).max())
+    table = BENCH.table("adapted", GENERIC, A)
+    assert len(table.amplitudes) == 2 * BENCH.scene.numerics.curves + 1
+    with pytest.raises(ValueError, match="must lie from -1 to the family's 1, got"):
+        table.area([-1.1])
+    alone = family.fit(GLASS.system.velocity, GENERIC, 0.0, 24, 128, least=-1.0)
+    np.testing.assert_allclose(alone.area(A[:3]), found[:3], rtol=1e-9, atol=1e-12)
+    shapes, values = table.ccf()
+    reflected = family.fit(GLASS.system.velocity, TURNED, 1.0)
+    np.testing.assert_allclose(values[23::-1], reflected.ccf()[1][1:], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(shapes[23::-1], reflected.ccf()[0][1:], atol=1e-12)

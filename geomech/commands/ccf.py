@@ -20,6 +20,6 @@ def ccf(
     """The CCF map with the scene's gait drawn on it."""
     from geomech.output import plots
 
-    study = field(name, grid, extent, plot, plot, True, yes)
+    study = field(name, grid, extent, plot, plot, True, yes, with_gait=True)
     gait, unit = study.scene.gait, study.scene.system.unit
     plots.save(plots.ccf_figure(study.curvature, [gait], unit, study.curvature_error), plot)

@@ -16,6 +16,7 @@ from geomech.commands.options import (
     SceneArgument,
     YesOption,
     allow,
+    amplitude_kind,
     check_outputs,
     loaded,
     spread,
@@ -25,7 +26,7 @@ from geomech.errors import SceneError, choose
 
 def displacement(
     name: SceneArgument,
-    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT")],
+    amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT; angles also as 30deg")],
     methods: Annotated[Optional[str], typer.Option(help="any of area,adapted,path,harmonic,direct")] = None,
     grid: GridOption = None,
     extent: ExtentOption = None,
@@ -40,9 +41,9 @@ def displacement(
     from geomech.study.bench import METHODS, Study
     from geomech.study.choose import cheapest
 
-    values = spread("--amplitudes", amplitudes)
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
     scene = loaded(name, grid, extent)
+    values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     check_outputs(scene, None, plot)
     with terminal.progress(f"displacement of {scene.name}") as bar:
         if tol is None:

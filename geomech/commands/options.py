@@ -11,14 +11,13 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.errors import SceneError, named
+from geomech.errors import SceneError, check_angle, named
 from geomech.files import refuse_inputs, whole_file
 
 SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")
 ]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
-ExtentOption = Annotated[Optional[float], typer.Option("--extent", help="half width of the field in rad")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
 
 
@@ -62,26 +61,80 @@ class _Unused(Exception):
     """Leaves `whole_file` without writing."""
 
 
-def numbers(option: str, text: str, count: int | None = None) -> list[float]:
-    """0.5,0.3, as many as ``count`` if that is given."""
+NO_ANGLE = "this is no angle"
+
+
+def _number(text: str, angle: str | None) -> float:
+    """0.5, or 30deg for an angle, in rad. angle: of what it is said to be none; None if it is one."""
+    if not text.strip().endswith("deg"):
+        return float(text)
+    if angle is not None:
+        raise _NoAngle(angle)
+    return math.radians(float(text.strip().removesuffix("deg")))
+
+
+class _NoAngle(Exception):
+    """Degrees of what is no angle; its text is what."""
+
+
+def numbers(option: str, text: str, count: int | None = None, angle: str | None = NO_ANGLE) -> list[float]:
+    """0.5,0.3, as many as ``count`` if that is given. angle: None for angles, which may be 30deg; else what they are."""
     try:
-        values = [float(x) for x in text.split(",")]
+        values = [_number(x, angle) for x in text.split(",")]
         if count not in (None, len(values)):
             raise ValueError
+    except _NoAngle as no_angle:
+        raise SceneError(f"{option}: {text!r} is in degrees, but {no_angle}: give a number without 'deg'") from None
     except ValueError:
+        such = "0.5,0.3 or 30deg,20deg" if angle is None else "0.5,0.3"
         raise SceneError(
-            f"{option}: {text!r} is not {'a number' if count else 'a list of numbers such as 0.5,0.3'}"
+            f"{option}: {text!r} is not {'a number' if count else f'a list of numbers such as {such}'}"
         ) from None
     return values
 
 
-def spread(option: str, text: str) -> list[float]:
-    """0.5,1.0 or START:STOP:COUNT, all finite."""
+def an_angle(text: str | float) -> float:
+    """An option that is an angle: 2.5, or 120deg, in rad."""
+    try:
+        return _number(str(text), None)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg") from None
+
+
+ExtentOption = Annotated[
+    Optional[float],
+    typer.Option("--extent", metavar="ANGLE", help="half width of the field in rad, or as 120deg", parser=an_angle),
+]
+
+
+def amplitude_kind(scene) -> str | None:
+    """Of `numbers`: what an amplitude of the scene's gait is, None if it is an angle."""
+    if "amplitude" in getattr(scene.gait, "angles", ()):
+        return None
+    return f"the amplitude of a {type(scene.gait).__name__.lower()} is none"
+
+
+def parameter_kind(scene, parameter: str) -> str | None:
+    """Of `numbers`: what a scene's parameter is (`geomech.study.sweep`), None if it is an angle in rad."""
+    section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
+    if parameter == "gait.amplitude":
+        return amplitude_kind(scene)
+    system = scene.system
+    owners = {"gait": [scene.gait], "system": [system], "effects": getattr(system, "effects", ())}
+    of = owners.get(section, [getattr(system, section, None)])
+    if parameter == "numerics.extent" or any(key in getattr(owner, "angles", ()) for owner in of):
+        return None
+    return "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
+
+
+def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
+    """0.5,1.0 or START:STOP:COUNT, all finite; angle: of `numbers`."""
     parts = text.split(":")
     if len(parts) == 1:
-        values = numbers(option, text)
+        values = numbers(option, text, angle=angle)
     elif len(parts) == 3 and re.fullmatch(r"[1-9]\d{0,4}", parts[2]):
-        (start,), (stop,), count = numbers(option, parts[0], 1), numbers(option, parts[1], 1), int(parts[2])
+        (start,), (stop,) = (numbers(option, part, 1, angle) for part in parts[:2])
+        count = int(parts[2])
         values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
     else:
         raise SceneError(f"{option}: {text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10")
@@ -101,11 +154,15 @@ def loaded(name: str, grid: int | None = None, extent: float | None = None):
     """The scene of that name, with the options of its field."""
     from geomech.scene import load
 
-    return load(name).with_numerics(grid=grid, extent=extent)
+    scene = load(name)
+    if scene.system.joint_angles:
+        check_angle("an extent", scene.numerics.extent if extent is None else extent)
+    return scene.with_numerics(grid=grid, extent=extent)
 
 
-def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool):
-    """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space."""
+def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False):
+    """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space.
+    with_gait: and the gait, which is refused if it leaves the field."""
     from geomech.study.bench import Study
     from geomech.study.cost import built, price
     from geomech.tiers import TIERS
@@ -116,6 +173,8 @@ def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: 
         TIERS["path"].refuse(scene.system)
         if maps and joints != 2:
             raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {joints}")
+        if with_gait:
+            study.refuse_outside()
         check_outputs(scene, output, plot)
         allow(scene, price([built(scene, "path")]), yes)
     with terminal.progress(f"field of {scene.name}") as bar:

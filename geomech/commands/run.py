@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.options import FolderOption, YesOption, allow
+from geomech.commands.options import FolderOption, YesOption, allow, loaded
 from geomech.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"
@@ -21,10 +21,10 @@ def run(
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech.output import report
-    from geomech.scene import inputs, load
+    from geomech.scene import inputs
     from geomech.study.bench import Study
 
-    scene = load(name)
+    scene = loaded(name)
     report.refuse_folder(scene, out, inputs(scene))
     with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"field of {scene.name}") as bar:
         allow(scene, report.cost(scene), yes)

@@ -16,6 +16,7 @@ from geomech.commands.options import (
     check_netcdf,
     check_outputs,
     loaded,
+    parameter_kind,
     spread,
 )
 from geomech.errors import SceneError
@@ -39,11 +40,12 @@ def sweep(
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
             raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
-        axes[parameter] = spread(f"--over {parameter}", values)
+        axes[parameter] = values
     check_netcdf(out)
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
     scene = loaded(name)
+    axes = {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
     partial = sweeping.partial(scene, axes, out)
     check_outputs(scene, out, plot, partial)
     with kept.alone(out):

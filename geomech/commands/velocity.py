@@ -13,16 +13,16 @@ from geomech.errors import named
 
 def velocity(
     name: SceneArgument,
-    alpha: Annotated[str, typer.Option(help="joint angles in rad, such as 0.5,0.3")],
-    alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0")],
+    alpha: Annotated[str, typer.Option(help="joint angles in rad, such as 0.5,0.3, or 30deg,20deg")],
+    alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0, or in deg")],
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
     from geomech.scene import load
 
-    scene = load(name)
+    scene, asked = load(name), (("--alpha", alpha), ("--alphadot", alphadot))
     with named(scene.name):
-        out = scene.system.single(numbers("--alpha", alpha), numbers("--alphadot", alphadot))
+        out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
     if as_json:
         print(json.dumps({k: v for k, v in out.items() if k != "iterations"}))
         return

@@ -16,8 +16,10 @@ LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 class Gait:
     """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
 
-    amplitude: scales the curve about its centre. centre: shape angles (rad), the origin if left empty.
-    reverse: run the curve backwards, t -> -t, from the same start.
+    amplitude: scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
+    reflected through the centre, alpha - centre -> centre - alpha at every phase. All gaits and tiers keep to that.
+    centre: shape angles (rad), the origin if left empty. reverse: run the curve backwards, t -> -t, from the same start.
+    angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
     """
 
     amplitude: float = 1.0
@@ -57,6 +59,10 @@ class Gait:
         """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
         centre = np.array(self.centre or (0.0,) * self.joints)
         return centre + self._times(amplitudes, self.unit(-np.asarray(t, float) if self.reverse else t))
+
+    def largest(self, amplitudes=None) -> float:
+        """The largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
+        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), amplitudes)).max(initial=0.0))
 
     def rate(self, t, amplitudes=None) -> np.ndarray:
         """d alpha / dt, shaped like `shape`."""

@@ -44,6 +44,8 @@ class Series(Gait):
 class Circle(Series):
     """alpha = centre + amplitude (cos t, sin t): counter-clockwise, amplitude its radius in rad."""
 
+    angles = ("centre", "amplitude")
+
     @property
     def amplitude_label(self) -> str:
         return "radius of the circle (rad)"

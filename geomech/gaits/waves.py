@@ -51,8 +51,8 @@ class Sine(Gait):
         number("waves", self.waves, 0, self.elements / 4)
         if not self.waves > 0:
             raise ValueError(f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
-        if not 0 <= self.amplitude <= 10:
-            raise ValueError(f"amplitude (A / lambda) must lie from 0 to 10, got {self.amplitude!r}")
+        if not abs(self.amplitude) <= 10:
+            raise ValueError(f"amplitude (A / lambda) must lie from -10 to 10, got {self.amplitude!r}")
 
     @property
     def joints(self) -> int:
@@ -64,8 +64,8 @@ class Sine(Gait):
 
     def _slopes(self, amplitudes) -> np.ndarray:
         a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
-        if not ((a >= 0) & (a <= 10)).all():
-            raise ValueError(f"amplitudes (A / lambda) must lie from 0 to 10, got {a.ravel()[:4]}")
+        if not (np.abs(a) <= 10).all():
+            raise ValueError(f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}")
         return 2 * np.pi * a
 
     def _headings(self, t, amplitudes):
@@ -91,6 +91,10 @@ class Sine(Gait):
     def rate(self, t, amplitudes=None) -> np.ndarray:
         return np.diff(self._headings(t, amplitudes)[1], axis=-1) * (-1.0 if self.reverse else 1.0)
 
+    def largest(self, amplitudes=None) -> float:
+        """At most: headings stay between -pi/2 and pi/2."""
+        return np.pi
+
     def unit(self, t) -> np.ndarray:
         return self.shape(t)
 
@@ -107,4 +111,4 @@ class Sine(Gait):
 
     def relative_curvature(self, amplitudes=None) -> np.ndarray:
         """Mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
-        return 4 * np.arctan(self._slopes(amplitudes))
+        return 4 * np.arctan(np.abs(self._slopes(amplitudes)))

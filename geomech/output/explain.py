@@ -6,6 +6,7 @@ from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
+from geomech.tiers import TIERS
 
 
 def explain(scene: Scene) -> str:
@@ -15,18 +16,44 @@ def explain(scene: Scene) -> str:
     lines = [f"{scene.name}: {first}, {gait} gait", *told]
     lines.append(f"engine: {system.engine} {system.because}")
     lines.append("tiers: " + ", ".join(tiers(system)))
+    return "\n".join([*lines, *_lost(system)])
+
+
+def _lost(system) -> list[str]:
+    """A line of the results that are not to be had for each reason there is."""
+    reasons: dict[str, list[str]] = {}
     if system.lacks & ALL:
-        lost = "connection, CCF, area, path and harmonic tiers"
-        if system.steps:
-            lost += ", adapted tier, velocity at a single shape"
-        lines.append(f"not available: {lost}: {system.blames} takes away what they rest on")
+        first = reasons[f"{system.blames} takes away what they rest on"] = ["connection", "CCF"]
+        first += ["velocity at a single shape"] if system.steps else []
     elif system.joints != 2:
-        lines.append(
-            f"not available: CCF maps, area and harmonic tiers: they take two joints, this body has {system.joints}"
-        )
-    elif system.singularity is not None:
-        lines.append(
-            f"not available: area and harmonic tiers: the field has singular shapes, where {system.singular}; maps and "
-            "files leave these out, and gaits that meet one are refused"
-        )
-    return "\n".join(lines)
+        reasons[_joints(system, range(2, 3))] = ["CCF maps"]
+    for tier in TIERS.values():
+        if not tier.takes(system):
+            reasons.setdefault(_why(tier, system), []).append(tier.name)
+    return [f"not available: {_listed(lost)}: {why}" for why, lost in reasons.items()]
+
+
+def _listed(lost: list[str]) -> str:
+    """Results, and tiers after them: "CCF maps, area and harmonic tiers"."""
+    tiers = [name for name in lost if name in TIERS]
+    told = " and ".join(filter(None, [", ".join(tiers[:-1]), *tiers[-1:]]))
+    return ", ".join(
+        [*(name for name in lost if name not in TIERS), *([f"{told} tier{'s' * (len(tiers) > 1)}"] if tiers else [])]
+    )
+
+
+def _why(tier, system) -> str:
+    """Why a tier says nothing of a system."""
+    if system.lacks & tier.rests_on:
+        return f"{system.blames} takes away what they rest on"
+    if system.joints not in tier.offered:
+        return _joints(system, tier.offered)
+    return (
+        f"the field has singular shapes, where {system.singular}; maps and files leave these out, and gaits that meet "
+        "one are refused"
+    )
+
+
+def _joints(system, taken: range) -> str:
+    count = f"{taken[0]} joints" if len(taken) == 1 else f"{taken[0]} to {taken[-1]} joints"
+    return f"they take {count}, this body has {system.joints}"

@@ -79,8 +79,8 @@ def _gaits(scene: Scene) -> list[Gait]:
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes up to the largest that keeps the gait inside the field; up to its own where there is no field, or
-    one with singular shapes.
+    """Amplitudes, of the sign of the gait's own, up to the largest that keeps it inside the field; up to its own where
+    there is no field, or one with singular shapes.
     SceneError for a gait that does not move or lies outside."""
     own = "path" not in methods(scene.system) or scene.system.singularity is not None
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
@@ -91,7 +91,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     room = scene.numerics.extent - np.abs(np.array(gait.centre or 0.0)).max()
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
-    top = 0.999 * room / np.abs(unit).max()
+    top = np.copysign(0.999 * room / np.abs(unit).max(), gait.amplitude)
     return [float(f"{a:.3g}") for a in top * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
 
 

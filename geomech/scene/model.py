@@ -34,6 +34,12 @@ class Scene:
                     f"[gait] {type(self.gait).__name__.lower()} moves {self.gait.joints} joints but [body] has "
                     f"{self.system.joints}: give the body one link more than the gait has joints, or another gait"
                 )
+            self.note_turns(self.gait)
+
+    def note_turns(self, gait: Gait, amplitudes=None) -> None:
+        """UnitWarning if a gait turns a joint by more than a full turn."""
+        if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
+            self.system.note_angles(gait.largest(amplitudes))
 
     @property
     def frame(self) -> str:
@@ -56,6 +62,9 @@ class Scene:
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
+            parts = [f.name for f in dataclasses.fields(own.get("system", self.system))]
+            for name in of_system:
+                choose("part", name, ["system", "gait", "numerics", "name", *parts])
             if of_system:
                 own["system"] = dataclasses.replace(own.get("system", self.system), **of_system)
             return dataclasses.replace(self, **own)

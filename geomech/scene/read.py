@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
+import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
 import msgspec
 
-from geomech.errors import SceneError, choose, named, short
+from geomech.errors import SceneError, UnitWarning, choose, named, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Numerics, Scene
@@ -209,10 +210,22 @@ def _build(place: str, table: dict, kind: type):
         if field in values:
             raise SceneError(f"{place}: {field} is given twice: keep one of {field} and {field}_deg")
         values[field] = _radians(value) if in_degrees else value
+        if key == "gamma0_deg":
+            _check_degrees(f"{place} {key}", value)
     try:
         return msgspec.convert(values, kind)
     except (ValueError, OverflowError) as error:
-        raise SceneError(f"{place} {str(error).replace(' - at `$', ' - at `').replace(' - at ``', '')}") from None
+        told = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
+        in_rad = [key for key in table if key in getattr(kind, "angles", ()) and told.startswith(f"{key} must")]
+        told += "".join(f"; {key} is in rad, write {key}_deg for degrees" for key in in_rad)
+        raise SceneError(f"{place} {told}") from None
+
+
+def _check_degrees(place: str, value) -> None:
+    """UnitWarning for an angle of grains below a degree: measured ones are of ten to twenty."""
+    if isinstance(value, (int, float)) and 0 < value < 1:
+        told = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
+        warnings.warn(told, UnitWarning, stacklevel=2)
 
 
 def _radians(degrees):

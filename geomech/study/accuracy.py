@@ -14,6 +14,7 @@ from functools import partial
 
 import numpy as np
 
+from geomech.errors import SceneError, named
 from geomech.scene.model import Scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
@@ -106,7 +107,12 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
 
 
 def cost(scene: Scene, runs: int = 2) -> Cost:
-    """Of `study`."""
+    """Of `study`; SceneError for a gait that does not move."""
+    if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
+        raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+    if any(TIERS[knob.tier].on_grid for knob in _knobs(scene)):
+        with named(scene.name):
+            Study(scene).refuse_outside()
     jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
     for knob in _knobs(scene):
         jobs += [job for value in knob.values for job in _runs(scene, runs) * _jobs(knob, knob.turned(scene, value))]

@@ -7,17 +7,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.connection import Connection
+from geomech.connection import Connection, grid
 from geomech.curvature import ccf
 from geomech.curvature import error as ccf_error
 from geomech.errors import SceneError, choose, named, real_array, short
-from geomech.field import Field
+from geomech.field import Field, inside
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.scene.model import Scene
 from geomech.study import cost, estimate
 from geomech.study.offer import METHODS, lookups, methods, tiers
 from geomech.tiers import TIERS
+from geomech.tiers.base import in_groups
 
 
 class Study:
@@ -82,9 +83,17 @@ class Study:
         with named(scene.name):
             tier = TIERS[choose("methods", method, METHODS)]
             tier.refuse(scene.system)
+            scene.note_turns(gait, amplitudes)
             self._refuse_singular(tier, gait, amplitudes)
             table = None if tier.is_direct(scene.system) else self.table(method, gait, amplitudes)
             return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
+
+    def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
+        """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
+        system, n = self.scene.system, self.scene.numerics
+        gait = self.scene.gait if gait is None else gait
+        axes, every = grid(system.joints, n.grid, n.extent), gait.amplitude if amplitudes is None else amplitudes
+        in_groups(lambda some: inside(axes, gait.cycle(n.phases, some)[0])[:, 0], every, system.at_once(n.phases))
 
     def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
@@ -92,7 +101,7 @@ class Study:
         if system.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if reach := tier.reach(gait, a):
-                a = reach[-1] * np.arange(1, n.curves + 1) / n.curves
+                a = np.outer([x for x in reach[1:] if x], np.arange(1, n.curves + 1) / n.curves).ravel()
             system.refuse_singular(gait.cycle(n.phases, a)[0])
 
     def study(
@@ -140,10 +149,13 @@ class Study:
         if isinstance(methods, str) or not isinstance(methods, Sequence):
             raise SceneError(f"{scene.name}: methods must be a list of {', '.join(METHODS)}, got {short(methods)}")
         with named(scene.name):
+            scene.note_turns(gait, amplitudes)
             chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
             for tier in chosen.values():
                 tier.refuse(scene.system)
                 self._refuse_singular(tier, gait, amplitudes)
+                if tier.on_grid and not tier.is_direct(scene.system):
+                    self.refuse_outside(gait, amplitudes)
         return gait, amplitudes, chosen
 
 

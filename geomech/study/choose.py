@@ -33,6 +33,7 @@ def cheapest(
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
     system, study = scene.system, Study(scene)
     gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
+    scene.note_turns(gait, amplitudes)
     if tol <= system.settling:
         raise SceneError(f"{scene.name}: cycles with these effects repeat to {system.settling:g} only: raise --tol")
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))

@@ -34,6 +34,7 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     parts = parameter.split(".")
     if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical"):
         old = tables.get(parts[0], {}).get(parts[1])
+        tables = {**tables, parts[0]: {k: v for k, v in tables.get(parts[0], {}).items() if k != _twin(parts[1])}}
         value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
         return {**tables, parts[0]: {**tables.get(parts[0], {}), parts[1]: value}}
     if len(parts) == 2 and parts[0] == "effects":
@@ -49,6 +50,11 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     raise SceneError(
         f"--over {parameter}: name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius"
     )
+
+
+def _twin(key: str) -> str:
+    """The key that gives the same in degrees, or in rad."""
+    return key.removesuffix("_deg") if key.endswith("_deg") else f"{key}_deg"
 
 
 def sweep(

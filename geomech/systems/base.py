@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from geomech.connection import evaluate
-from geomech.errors import real_array, short
+from geomech.errors import check_angle, real_array, short
 from geomech.reconstruct import displacement
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
@@ -64,10 +64,11 @@ class Plain:
 
     kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the phases only. solver:
     its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are evaluated, for
-    one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that time
-    stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
+    one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that
+    time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
-    closed: forces on an element have an exact form, which finer loads come near to.
+    joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed: forces
+    on an element have an exact form, which finer loads come near to.
     """
 
     kind = "system"
@@ -80,7 +81,7 @@ class Plain:
     elements = evaluations = 1
     together = 1 << 12
     held = cut = 0
-    closed = False
+    closed = joint_angles = False
     settling = 0.0
     engine = "algebraic"
 
@@ -105,10 +106,24 @@ class Plain:
 
     def single(self, alpha, alphadot) -> dict:
         """{"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
-        if self.singularity is not None and not self.singularity(real_array("alpha", alpha)):
+        alpha, alphadot = (self._one(name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
+        self.note_angles(np.abs(alpha).max())
+        if self.singularity is not None and not self.singularity(alpha):
             raise ValueError(f"the shape is singular: {self.singular}: move a joint")
-        xi = evaluate(self.velocity, real_array("alpha", alpha), real_array("alphadot", alphadot))
+        xi = evaluate(self.velocity, alpha, alphadot)
         return {"xi": xi.tolist(), "status": "exact", "residual": 0.0}
+
+    def note_angles(self, largest: float) -> None:
+        """UnitWarning if the largest of some shape variables is a joint angle beyond a full turn."""
+        if self.joint_angles:
+            check_angle("a joint angle", largest)
+
+    def _one(self, name: str, x) -> np.ndarray:
+        """x as finite numbers (joints,), or ValueError naming it."""
+        x = real_array(name, x)
+        if x.shape != (self.joints,) or not np.isfinite(x).all():
+            raise ValueError(f"{name} must be {self.joints} finite numbers for this system, got {short(x.tolist())}")
+        return x
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases; ValueError at a singular shape."""

@@ -28,7 +28,7 @@ class NoSlipSnake(Plain):
 
     kind = "no-slip-snake"
     joints = 2
-    mirror = linear = True
+    mirror = linear = joint_angles = True
     singular = "the wheels' axles meet in one point"
 
     def __post_init__(self):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import rft
-from geomech.errors import short
+from geomech.errors import real_array, short
 from geomech.reconstruct import displacement
 from geomech.systems.base import SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so
 from rft.balance import checked_body
@@ -108,6 +108,12 @@ class Swimmer(Plain):
         return isinstance(self.body, rft.Chain) and self.joints == 2
 
     @property
+    def joint_angles(self) -> bool:
+        """Bodies of a few shape variables have amplitudes of bends, or of modes, in their place."""
+        plain = isinstance(self.body, (rft.Chain, rft.Backbone)) and getattr(self.body, "bends", None) is None
+        return plain and getattr(self.body, "modes", None) is None
+
+    @property
     def linear(self) -> bool:
         return is_linear(self.medium) and not self.effects
 
@@ -168,6 +174,7 @@ class Swimmer(Plain):
 
     def single(self, alpha, alphadot) -> dict:
         s = self.solve(alpha, alphadot)
+        self.note_angles(np.abs(real_array("alpha", alpha)).max())
         if str(s.status) == "unconverged":
             raise ValueError("the force balance did not converge: raise [numerics] regularisation")
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from geomech import family
+from geomech.errors import real_array
 from geomech.systems.base import SHAPE_ALONE
 from geomech.tiers.base import Tier
 
@@ -21,13 +22,15 @@ class Adapted(Tier):
     depends_on = ("curves", "phases")
 
     def reach(self, gait, amplitudes):
-        a = np.asarray(gait.amplitude if amplitudes is None else amplitudes, float)
-        if (a < 0).any():
-            raise ValueError("the adapted tier takes amplitudes >= 0: use the direct tier below")
-        return gait, float(a.max(initial=0.0))
+        """(gait, least <= 0, largest >= 0)."""
+        a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+        return gait, float(a.min(initial=0.0)), float(a.max(initial=0.0))
 
-    def table(self, system, numerics, *reach, progress=None):
-        return family.fit(system.velocity, *reach, numerics.curves, numerics.phases // 2, progress)
+    def table(self, system, numerics, gait, least, largest, progress=None):
+        if least == largest:  # rest, and nothing else
+            return family.Family(gait, np.zeros(1), np.zeros((1, numerics.phases // 2, 3)))
+        count, phases = numerics.curves, numerics.phases // 2
+        return family.fit(system.velocity, gait, largest, count, phases, progress, least=least)
 
     def solves(self, system, numerics, count, phases):
         return numerics.curves * (numerics.phases // 2)

@@ -47,8 +47,8 @@ class Tier:
     """Base of all tiers. name: in scenes, options and tables. label: for legends. style: of its line. rests_on: premises
     without which it says nothing. needs: what these are lost for. joints: shape variables that it takes; offered: those
     for which a plain study asks for it. looks_up: its table's name, of which tiers may share one, "" for none.
-    depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. whole: the table must have
-    no singular shapes. plain: a plain study asks for it.
+    depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. on_grid: the table is a
+    field on the scene's grid. whole: it must have no singular shapes. plain: a plain study asks for it.
     """
 
     name = "tier"
@@ -59,6 +59,7 @@ class Tier:
     joints = offered = range(1, 10_001)
     looks_up = ""
     depends_on: tuple[str, ...] = ()
+    on_grid = False
     whole = False
     plain = True
 

@@ -48,6 +48,7 @@ class Path(Tier):
     style = {"color": "#0072B2", "linestyle": "-."}
     offered = range(1, 4)  # no more joints than a grid can span
     looks_up = "connection"
+    on_grid = True
     depends_on = ("grid", "extent", "directions", "interpolation")
 
     def is_direct(self, system):

@@ -31,7 +31,7 @@ class Granular(TermLaw):
         check_ranges(self, C=(0, 1e6), gamma0=(-1e6, 1e6))
         require(
             0 < self.gamma0 < math.pi / 2,
-            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees",
+            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
         )
         if self.k is not None:
             check_ranges(self, k=(1e-3, 1e3))

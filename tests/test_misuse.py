@@ -1,0 +1,236 @@
+"""Slips that are likely: of unit, sign and size, and what a velocity of one's own lacks."""
+
+import json
+import math
+import warnings
+
+import numpy as np
+import pytest
+from test_cli import geomech
+
+from geomech import curvature
+from geomech import scene as scenes
+from geomech.errors import SceneError, UnitWarning
+from geomech.gaits import Circle, Ellipse, Sine
+from geomech.output.explain import explain
+from geomech.scene import Scene
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from geomech.systems import NoSlipSnake, Swimmer
+from rft import Backbone, Chain, Coulomb, Serpenoid, Viscous
+
+VISCOUS = scenes.load("three-link-viscous")
+PLAIN = '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n'
+DIRECT = ["--methods", "direct", "--json"]
+
+
+def scene(folder, text, name="s.toml"):
+    (folder / name).write_text(text)
+    return name
+
+
+@pytest.mark.parametrize(
+    ("args", "change", "said"),
+    [
+        (["velocity", "s.toml", "--alpha", "30,17", "--alphadot", "1,0", "--json"], "", "a joint angle of 30 rad"),
+        (["velocity", "s.toml", "--alpha", "0,-6.3", "--alphadot", "1,0", "--json"], "", "a joint angle of 6.3 rad"),
+        (["displacement", "s.toml", "--amplitudes", "30,60", *DIRECT], "", "a joint angle of 60 rad"),
+        (["displacement", "s.toml", "--amplitudes", "30", "--tol", "1", "--json"], "", "a joint angle of 30 rad"),
+        (["displacement", "s.toml", "--amplitudes", "1", "--extent", "90", *DIRECT], "", "an extent of 90 rad"),
+        (["explain", "s.toml"], "amplitude = 20", "a joint angle of 20 rad"),
+        (["explain", "s.toml"], "centre = [10, 17]", "a joint angle of 1"),
+        (["displacement", "s.toml", "--amplitudes", "1", *DIRECT], "[numerics]\nextent = 90", "an extent of 90 rad"),
+    ],
+)
+def test_angles_beyond_a_full_turn_are_noted_once_and_the_result_is_given(args, change, said, tmp_path):
+    scene(tmp_path, PLAIN + change)
+    code, out, err = geomech(*args, cwd=tmp_path)
+    assert code == 0
+    assert err.startswith(f"note: {said}")
+    assert err.count("\n") == 1
+    assert "beyond a full turn, 2 pi: if that is in degrees" in err
+    assert out
+
+
+def test_gamma0_below_a_degree_is_noted(tmp_path):
+    small = PLAIN.replace("gamma0_deg = 13.8", "gamma0_deg = 0.24")
+    code, out, err = geomech("explain", scene(tmp_path, small), cwd=tmp_path)
+    assert (code, bool(out)) == (0, True)
+    assert err == (
+        "note: s.toml: [medium] gamma0_deg = 0.24 is less than a degree: if that is in rad, write gamma0 = 0.24\n"
+    )
+    with pytest.warns(UnitWarning, match="gamma0_deg = 0.24 is less than a degree"):
+        assert scenes.parse(small).system.medium.gamma0 == pytest.approx(math.radians(0.24))
+
+
+@pytest.mark.parametrize(("given", "hinted"), [("gamma0 = 17", True), ("gamma0_deg = 117", False)])
+def test_degrees_where_gamma0_is_in_rad_are_told_of_the_other_key(given, hinted, tmp_path):
+    code, _, err = geomech("explain", scene(tmp_path, PLAIN.replace("gamma0_deg = 13.8", given)), cwd=tmp_path)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "gamma0 must lie between 0 and 90 degrees, got " in err
+    assert err.endswith("; gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
+
+
+def test_a_refusal_stays_one_line_and_keeps_the_note():
+    code, out, err = geomech("displacement", "three-link-viscous", "--amplitudes", "30")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("error: three-link-viscous: alpha_1 = 30 rad lies outside the field's -2.5 to 2.5: ")
+    assert "; a joint angle of 30 rad is beyond a full turn" in err
+
+
+def test_an_extent_that_is_refused_is_told_too():
+    code, out, err = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--extent", "120")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "extent must be a number from 1e-06 to 100, got 120" in err
+    assert "; an extent of 120 rad is beyond a full turn" in err
+
+
+def test_from_python_units_are_warned_of_by_name():
+    for make in (
+        lambda: Scene(VISCOUS.system, Circle(amplitude=30)),
+        lambda: Scene(NoSlipSnake(), Ellipse(centre=(7, 0))),
+        lambda: Study(VISCOUS).displacement("direct", amplitudes=[1, -30]),
+        lambda: Study(VISCOUS).study([30], ["direct"]),
+        lambda: cheapest(VISCOUS, [30.0], 1.0),
+        lambda: VISCOUS.system.single([30, 17], [1, 0]),
+        lambda: NoSlipSnake().single([30, 17], [1, 0]),
+    ):
+        with pytest.warns(UnitWarning, match="a joint angle of .* rad is beyond a full turn"):
+            make()
+
+
+def test_what_is_no_joint_angle_or_just_a_full_turn_is_not_noted():
+    Scene(Swimmer(Viscous(), Serpenoid(elements=12)), Circle(amplitude=9))  # curvature times length
+    Scene(Swimmer(Viscous(), Chain()), Circle(amplitude=2 * math.pi))
+    Scene(Swimmer(Viscous(), Backbone(8)), Sine(amplitude=10, elements=8))
+    for name in scenes.builtin_names():
+        code, _, err = geomech("explain", name)
+        assert (code, err) == (0, "")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert Study(VISCOUS).displacement("direct", amplitudes=[30]).shape == (1, 3)
+
+
+def test_degrees_are_taken_wherever_angles_are(tmp_path):
+    name = scene(tmp_path, PLAIN)
+    ask = lambda *args: geomech(*args, cwd=tmp_path)
+    rad = [f"{math.radians(x):.17g}" for x in (30, 90)]
+    for degrees, plain in (
+        (["velocity", name, "--alpha", "30deg,0.5", "--alphadot", "-90deg,1"],
+         ["velocity", name, "--alpha", f"{rad[0]},0.5", "--alphadot", f"-{rad[1]},1"]),
+        (["displacement", name, "--amplitudes", "30deg:90deg:3", "--methods", "direct"],
+         ["displacement", name, "--amplitudes", f"{rad[0]}:{rad[1]}:3", "--methods", "direct"]),
+    ):  # fmt: skip
+        found, wanted = (ask(*args, "--json") for args in (degrees, plain))
+        assert found[::2] == wanted[::2] == (0, "")
+        assert json.loads(found[1]).keys() == json.loads(wanted[1]).keys()
+        for key in {"xi", "direct"} & json.loads(found[1]).keys():
+            np.testing.assert_allclose(json.loads(found[1])[key], json.loads(wanted[1])[key], rtol=1e-12)
+    assert ask("connection", "three-link-viscous", "--extent", "120deg", "--grid", "5", "-o", "c.nc")[::2] == (0, "")
+    over = ["--over", "medium.gamma0=10deg,17deg", "--over", "gait.amplitude=30deg:90deg:2", "-o", "s.nc"]
+    assert ask("sweep", name, *over)[::2] == (0, "")
+
+
+def test_what_degrees_were_swept_is_in_rad(tmp_path):
+    import xarray
+
+    name = scene(tmp_path, PLAIN.replace('"circle"', '"ellipse"'))
+    over = ["--over", "medium.gamma0=10deg,17deg", "--over", "gait.tilt=30deg,60deg", "-o", "s.nc"]
+    assert geomech("sweep", name, *over, cwd=tmp_path)[::2] == (0, "")
+    with xarray.open_dataset(tmp_path / "s.nc") as data:
+        np.testing.assert_allclose(data.medium_gamma0, np.radians([10, 17]))
+        np.testing.assert_allclose(data.gait_tilt, np.radians([30, 60]))
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["displacement", "butterfly-glass", "--amplitudes", "30deg"], "but the amplitude of a butterfly is none"),
+        (["displacement", "sandfish-loose", "--amplitudes", "30deg"], "but the amplitude of a sine is none"),
+        (["displacement", "three-link-viscous", "--amplitudes", "30degrees"], "such as 0.5,0.3 or 30deg,20deg"),
+        (["velocity", "three-link-viscous", "--alpha", "deg,1", "--alphadot", "1,0"], "'deg,1' is not a list"),
+        (["connection", "three-link-viscous", "-o", "c.nc", "--extent", "wide"], "'wide' is no angle"),
+        (["sweep", "three-link-viscous", "-o", "s.nc", "--over", "medium.ratio=2deg"], "but this is no angle"),
+        (["sweep", "three-link-viscous", "-o", "s.nc", "--over", "gait.centre_deg=2deg"], "takes degrees as they are"),
+    ],
+)
+def test_degrees_of_what_is_no_angle_are_refused(args, said, tmp_path):
+    code, out, err = geomech(*args, cwd=tmp_path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("error: ")
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_circle_in_a_scene_may_be_told_in_degrees():
+    assert scenes.parse(PLAIN + "amplitude_deg = 30").gait.amplitude == pytest.approx(math.pi / 6)
+
+
+@pytest.mark.parametrize("gait", ["amplitude = 2.7", "centre = [2.6, 0]\namplitude = 0.1"])
+def test_a_gait_off_the_field_is_refused_by_every_command_alike(gait, tmp_path, monkeypatch):
+    def solve(*args):
+        raise AssertionError("computed")
+
+    name = scene(tmp_path, PLAIN + gait)
+    said = geomech("displacement", name, "--amplitudes", gait.split()[-1], cwd=tmp_path)
+    assert said[:2] == (2, "")
+    assert "lies outside the field's -2.5 to 2.5: widen the extent or lower the amplitude" in said[2]
+    monkeypatch.setattr(Swimmer, "solve", solve)
+    assert geomech("ccf", name, "--plot", "c.png", cwd=tmp_path) == said
+    assert geomech("displacement", name, "--amplitudes", gait.split()[-1], cwd=tmp_path) == said
+    assert geomech("accuracy", name, cwd=tmp_path) == said
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_sine_of_negative_amplitude_is_the_mirrored_wave():
+    gait, t = Sine(amplitude=0.2, waves=1.3, elements=9), np.linspace(0, 6, 5)
+    assert Sine(amplitude=-0.2, waves=1.3, elements=9).shape(t) == pytest.approx(-gait.shape(t), abs=1e-14)
+    assert gait.rate(t, [-0.2]) == pytest.approx(-gait.rate(t, [0.2]), abs=1e-14)
+    assert gait.wavelength([-0.2]) == gait.wavelength([0.2])
+    assert gait.relative_curvature([-0.2]) == gait.relative_curvature([0.2])
+
+
+@pytest.mark.parametrize("amplitude", ["0", "-0.2"])
+def test_time_stepping_takes_negative_and_zero_amplitudes_too(amplitude, tmp_path):
+    text = PLAIN + '[[effects]]\nkind = "transient"\ntravel = 0.1\n[numerics]\ncycles = 1\nphases = 16\n'
+    code, out, err = geomech("displacement", scene(tmp_path, text), "--amplitudes", amplitude, "--json", cwd=tmp_path)
+    assert (code, err) == (0, "")
+    if amplitude == "0":
+        np.testing.assert_allclose(json.loads(out)["direct"], 0.0, atol=1e-15)
+    else:  # a circle about the straight chain: the mirror image
+        (x, y, turn), plain = (
+            json.loads(out)["direct"][0],
+            Study(scenes.parse(text)).displacement("direct", None, [0.2]),
+        )
+        np.testing.assert_allclose([x, -y, -turn], plain[0], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("command", ["run", "accuracy"])
+def test_what_does_not_move_is_refused(command, tmp_path):
+    text = PLAIN.replace('"circle"', '"ellipse"\nsemi_axes = [0, 0]' if command == "run" else '"circle"\namplitude = 0')
+    code, out, err = geomech(command, scene(tmp_path, text), cwd=tmp_path)
+    assert (code, out, err) == (2, "", "error: s.toml: [gait] does not move: give it a size\n")
+    assert [p.name for p in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_explain_names_the_tiers_that_are_lost_and_why():
+    three = scenes.parse(PLAIN.replace('"circle"', '"fourier"\ncos = [[1], [0], [0]]\nsin = [[0], [1], [0]]').replace(
+        'kind = "chain"', 'kind = "chain"\nlengths = [1, 1, 1, 1]'
+    ))  # fmt: skip
+    assert "not available: CCF maps, area and harmonic tiers: they take 2 joints, this body has 3" in explain(three)
+    fish = explain(scenes.load("sandfish-loose")).splitlines()
+    assert "not available: path tier: they take 1 to 3 joints, this body has 99" in fish
+    assert "not available: area and harmonic tiers: the field has singular shapes" in explain(
+        scenes.load("no-slip-snake")
+    )
+
+
+def test_names_that_are_none_get_a_hint():
+    with pytest.raises(SceneError, match="numerics: 'nonsense' is unknown; use one of"):
+        VISCOUS.with_numerics(nonsense=1)
+    with pytest.raises(SceneError, match="part: 'meduim' is unknown; did you mean 'medium'"):
+        VISCOUS.changed(meduim=Coulomb())
+    with pytest.raises(ValueError, match="a CCF is that of a Connection, .* got 'x'"):
+        curvature.ccf("x")
+    with pytest.raises(ValueError, match="i and j must be two of the joints 0 to 1, got 0 and 2"):
+        curvature.ccf(Study(VISCOUS.with_numerics(grid=5)).fitted, 0, 2)
