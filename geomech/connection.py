@@ -12,8 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.errors import is_whole, number, short
+from geomech.errors import is_whole, number, real_array, short
 from geomech.field import Field
+from geomech.velocity import fits, tried
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
@@ -46,11 +47,14 @@ class Connection:
 
 
 def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
-    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), or not finite unless ``masked``."""
+    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), and does not broadcast to it, or not finite
+    unless ``masked``."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
     if not callable(velocity):
         raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
-    xi = np.asarray(velocity(alpha, alphadot))
+    xi = real_array("what velocity returns", velocity(alpha, alphadot))
+    if xi.shape != shape and fits(xi, shape):
+        xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:
         raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
     if not masked and not np.isfinite(xi).all():
@@ -155,6 +159,7 @@ def fit(
     mirror: bool = False,
     *,
     singularity: Callable | None = None,
+    trusted: bool = False,
 ) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
@@ -162,9 +167,14 @@ def fit(
     xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half. singularity: a
     function of shapes (..., d) that passes through 0 where the velocity does not exist; there the connection is nan.
     Raises what ``velocity`` raises.
+
+    A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
+    few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
     """
     axes = tuple(np.asarray(a, float) for a in axes)
     unit = directions(len(axes), count)
+    if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
+        velocity = tried(velocity, axes, singularity is not None)
     inverse = np.linalg.pinv(unit)
 
     def keep(xi):

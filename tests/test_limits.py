@@ -187,7 +187,7 @@ def test_what_is_left_out_is_what_the_documentation_says():
 @pytest.mark.parametrize(
     ("ask", "shapes", "each"),
     [
-        (lambda v: connection.fit(v, connection.grid(2, 5)), 25, 8),
+        (lambda v: connection.fit(v, connection.grid(2, 5), trusted=True), 25, 8),
         (lambda v: harmonics.fit(v, connection.grid(2, 5)), 25, 24),
         (lambda v: family.fit(v, Circle(), 1.0), 24, 128),
         (lambda v: direct(v, Circle(), [0.5, 1.0]), 2, 256),

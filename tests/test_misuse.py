@@ -6,11 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from registry import MEDIA
 from test_cli import geomech
 
-from geomech import curvature
+from geomech import connection, curvature
 from geomech import scene as scenes
-from geomech.errors import SceneError, UnitWarning
+from geomech.errors import SceneError, UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.output.explain import explain
 from geomech.scene import Scene
@@ -190,19 +191,13 @@ def test_a_sine_of_negative_amplitude_is_the_mirrored_wave():
     assert gait.relative_curvature([-0.2]) == gait.relative_curvature([0.2])
 
 
-@pytest.mark.parametrize("amplitude", ["0", "-0.2"])
-def test_time_stepping_takes_negative_and_zero_amplitudes_too(amplitude, tmp_path):
-    text = PLAIN + '[[effects]]\nkind = "transient"\ntravel = 0.1\n[numerics]\ncycles = 1\nphases = 16\n'
-    code, out, err = geomech("displacement", scene(tmp_path, text), "--amplitudes", amplitude, "--json", cwd=tmp_path)
-    assert (code, err) == (0, "")
-    if amplitude == "0":
-        np.testing.assert_allclose(json.loads(out)["direct"], 0.0, atol=1e-15)
-    else:  # a circle about the straight chain: the mirror image
-        (x, y, turn), plain = (
-            json.loads(out)["direct"][0],
-            Study(scenes.parse(text)).displacement("direct", None, [0.2]),
-        )
-        np.testing.assert_allclose([x, -y, -turn], plain[0], rtol=1e-9, atol=1e-12)
+def test_time_stepping_takes_negative_and_zero_amplitudes_too():
+    """Of a circle about the straight chain a negative one is the mirror image."""
+    text = PLAIN + '[[effects]]\nkind = "transient"\ntravel = 0.1\n[numerics]\ncycles = 1\nphases = 32\n'
+    below, rest, above = Study(scenes.parse(text)).displacement("direct", None, [-0.2, 0.0, 0.2])
+    np.testing.assert_allclose(rest, 0.0, atol=1e-15)
+    np.testing.assert_allclose(below * [1, -1, -1], above, rtol=1e-9, atol=1e-12)
+    assert np.abs(above).min() > 1e-5
 
 
 @pytest.mark.parametrize("command", ["run", "accuracy"])
@@ -234,3 +229,83 @@ def test_names_that_are_none_get_a_hint():
         curvature.ccf("x")
     with pytest.raises(ValueError, match="i and j must be two of the joints 0 to 1, got 0 and 2"):
         curvature.ccf(Study(VISCOUS.with_numerics(grid=5)).fitted, 0, 2)
+
+
+AXES = connection.grid(2, 5, 1.0)
+
+
+def turning(alpha, alphadot):
+    """Linear, odd, of every component, and depends on the shape."""
+    a, r = np.broadcast_arrays(alpha, alphadot)
+    x = np.cos(a[..., 0]) * r[..., 1] - np.sin(a[..., 1]) * r[..., 0]
+    return np.stack([x, a[..., 0] * r[..., 0], r[..., 1] - 0.3 * r[..., 0]], -1)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "said"),
+    [
+        (lambda a, r: turning(a, r) + 0.01, "is not odd in alphadot"),
+        (lambda a, r: np.abs(turning(a, r)), "is not odd in alphadot"),
+        (lambda a, r: turning(a, r) ** 3, "is not homogeneous in alphadot"),
+        (lambda a, r: turning(a, r / np.linalg.norm(r, axis=-1, keepdims=True)), "is not homogeneous"),
+        (lambda a, r: turning(np.zeros(2), r), "ignores alpha"),
+        (lambda a, r: [1.0, 2.0, 3.0], "is not odd .*; it is not homogeneous .*; it ignores alpha"),
+    ],
+)
+def test_a_velocity_is_told_what_it_lacks(velocity, said):
+    with pytest.warns(VelocityWarning, match=f"this velocity {said}") as told:
+        connection.fit(velocity, AXES)
+    assert [str(x.message).count("\n") for x in told] == [0]
+    connection.fit(velocity, AXES, trusted=True)
+
+
+def single(alpha, alphadot):
+    (a1, a2), (r1, r2) = alpha, alphadot
+    return [math.cos(a1) * r2 - math.sin(a2) * r1, a1 * r1, r2 - 0.3 * r1]
+
+
+@pytest.mark.parametrize(
+    "velocity",
+    [single, lambda a, r: np.array(single(a, r)), lambda a, r: np.stack(single(np.moveaxis(a, -1, 0), r))],
+    ids=["list", "array", "first axis"],
+)
+def test_a_velocity_of_one_shape_is_asked_for_each(velocity):
+    found, wanted = connection.fit(velocity, AXES), connection.fit(turning, AXES)
+    np.testing.assert_allclose(found.A, wanted.A, atol=1e-14)
+    np.testing.assert_allclose(found.residual, wanted.residual, atol=1e-14)
+
+
+def test_what_lacks_batch_axes_is_broadcast():
+    constant = np.array([0.1, -0.2, 0.3])
+    with pytest.warns(VelocityWarning, match="ignores alpha"):
+        fitted = connection.fit(lambda a, r: constant * (r[..., :1] - 2 * r[..., 1:]), AXES)  # (C, 3), no shapes
+    np.testing.assert_allclose(
+        fitted.A, np.multiply.outer(constant, [1, -2])[..., None, None] + np.zeros((5, 5)), atol=1e-14
+    )
+    with pytest.raises(
+        ValueError, match=r"must return shape \(25, 8, 3\) for these alpha and alphadot, got \(25, 8, 1\)"
+    ):
+        connection.fit(lambda a, r: turning(a, r)[..., :1], AXES)
+    with pytest.raises(ValueError, match="what velocity returns must be numbers"):
+        connection.fit(lambda a, r: None, AXES)
+    with pytest.raises(KeyError, match="own"):
+        connection.fit(lambda a, r: {}["own"], AXES)
+
+
+@pytest.mark.parametrize("name", scenes.builtin_names())
+def test_no_system_of_ours_is_suspected(name):
+    """Those of which a connection is to be had."""
+    system = scenes.load(name).system
+    if system.joints == 2 and not system.lacks:
+        small = connection.grid(2, 4, 1.2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            connection.fit(system.velocity, small, singularity=system.singularity)
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_no_medium_of_ours_is_suspected(name):
+    system = Swimmer(MEDIA[name], Chain((0.7, 1.4, 0.9)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        connection.fit(system.velocity, connection.grid(2, 4, 2.5))

@@ -37,9 +37,8 @@ def _listed(lost: list[str]) -> str:
     """Results, and tiers after them: "CCF maps, area and harmonic tiers"."""
     tiers = [name for name in lost if name in TIERS]
     told = " and ".join(filter(None, [", ".join(tiers[:-1]), *tiers[-1:]]))
-    return ", ".join(
-        [*(name for name in lost if name not in TIERS), *([f"{told} tier{'s' * (len(tiers) > 1)}"] if tiers else [])]
-    )
+    named = [f"{told} tier{'s' * (len(tiers) > 1)}"] if tiers else []
+    return ", ".join([*(name for name in lost if name not in TIERS), *named])
 
 
 def _why(tier, system) -> str:

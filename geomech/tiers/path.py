@@ -61,7 +61,7 @@ class Path(Tier):
     def table(self, system, numerics, *reach, progress=None):
         return connection.fit(
             system.velocity, axes(system, numerics), self.directions(system, numerics), numerics.interpolation,
-            progress, system.mirror, singularity=system.singularity,
+            progress, system.mirror, singularity=system.singularity, trusted=True,
         )  # fmt: skip
 
     def solves(self, system, numerics, count, phases):
