@@ -309,3 +309,41 @@ def test_no_medium_of_ours_is_suspected(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         connection.fit(system.velocity, connection.grid(2, 4, 2.5))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"circle"', "circle", "(at line 8, column 8): 'kind = circle', put text in \"quotes\""),
+        ('"circle"', "“circle”", "'kind = “circle”', put text in straight \"quotes\""),
+        ('"circle"', '"circle', "close the quotes"),
+        ("C = 1.8", "C = .8", "(at line 3, column 5): 'C = .8', a number has a digit before its point"),
+        ("C = 1.8", "C = 1,8", "'C = 1,8', a number has a point, no comma"),
+        ("C = 1.8", "C = 1.8 # yes\nk = 2 Pa", "(at line 4, column 7): 'k = 2 Pa', a number has no unit"),
+        ("gamma0_deg = 13.8", "gamma0 = 13.8 deg", "a number has no unit: a key that ends in _deg takes degrees"),
+        ("C = 1.8", "C: 1.8", "'C: 1.8', write KEY = VALUE"),
+        ("C = 1.8", "C =", "give the key a value"),
+        ("C = 1.8\n", "", "[medium] Object missing required field `C`: add C = ..."),
+        ("C = 1.8", 'C = "big"', "Expected `float`, got `str` - at `.C`: give a number in place of 'big'"),
+        ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number in place of '1'"),
+        ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] in place of 3"),
+        ('"circle"', '"circle"\nreverse = 1', "give true or false in place of 1"),
+        ('"circle"', '"circle"\ncentre_deg = ["a", 1]', "give a number in place of 'a'"),
+        ('"circle"', '"circle"\n[numerics]\ngrid = 31.5', "give a whole number without a point in place of 31.5"),
+        ('"circle"', '"circle"\n[numerics]\nextent_deg = 1e9', "extent must be a number from 1e-06 to 100"),
+        (
+            '"circle"',
+            '"circle"\n[numerics]\ngrid_deg = 9',
+            "[numerics] key: 'grid_deg' is unknown; did you mean 'grid'",
+        ),
+    ],
+)
+def test_a_slip_in_a_scene_is_shown_with_its_cure(old, new, said, tmp_path):
+    code, out, err = geomech("explain", scene(tmp_path, PLAIN.replace(old, new)), cwd=tmp_path)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("error: s.toml")
+    assert said in err
+
+
+def test_an_extent_may_be_told_in_degrees():
+    assert scenes.parse(PLAIN + "[numerics]\nextent_deg = 120\n").numerics.extent == pytest.approx(2 * math.pi / 3)

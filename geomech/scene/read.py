@@ -15,6 +15,7 @@ import msgspec
 from geomech.errors import SceneError, UnitWarning, choose, named, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
+from geomech.scene import slips
 from geomech.scene.model import Numerics, Scene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
@@ -69,7 +70,7 @@ def parse(text: str, name: str = "scene") -> Scene:
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
-        raise SceneError(f"{name} is not TOML: {error}") from None
+        raise SceneError(f"{name} is not TOML: {error}{slips.at_line(text, error)}") from None
     return from_tables(tables, name, text)
 
 
@@ -89,7 +90,8 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
     numerics = tables.get("numerics", {})
     for key in numerics:
-        choose(f"{name}: [numerics] key", key, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
+        plain = key.removesuffix("_deg") if key.removesuffix("_deg") in Numerics.angles else key
+        choose(f"{name}: [numerics] key", plain, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
     if own:
         solver = {k: v for k, v in numerics.items() if k in own}
         parts["solver"] = _build(f"{name}: [numerics]", solver, type(kind.solver))
@@ -216,9 +218,8 @@ def _build(place: str, table: dict, kind: type):
         return msgspec.convert(values, kind)
     except (ValueError, OverflowError) as error:
         told = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        in_rad = [key for key in table if key in getattr(kind, "angles", ()) and told.startswith(f"{key} must")]
-        told += "".join(f"; {key} is in rad, write {key}_deg for degrees" for key in in_rad)
-        raise SceneError(f"{place} {told}") from None
+        cure = slips.of_value(told, table, getattr(kind, "angles", ()))
+        raise SceneError(f"{place} {told}{cure}") from None
 
 
 def _check_degrees(place: str, value) -> None:

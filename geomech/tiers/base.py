@@ -32,6 +32,8 @@ class Numerics:
     harmonics: int = 15
     curves: int = 24
 
+    angles = ("extent",)
+
     def __post_init__(self):
         number("extent", self.extent, 1e-6, 100)
         for name, (low, high) in WHOLE.items():
