@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from geomech.errors import is_whole, number, real_array, short
-from geomech.field import Field
+from geomech.field import Field, as_axes
 from geomech.velocity import fits, tried
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -43,7 +43,7 @@ class Connection:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi = A(alpha) alphadot, (..., 3)."""
-        return np.einsum("...ij,...j->...i", self(alpha), np.asarray(alphadot, float))
+        return np.einsum("...ij,...j->...i", self(alpha), real_array("alphadot", alphadot))
 
 
 def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
@@ -70,6 +70,13 @@ def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray
     number("extent", extent, 1e-9, 1e6)
     axis = np.linspace(-extent, extent, int(points))
     return ((axis - axis[::-1]) / 2,) * int(joints)  # symmetric to the last digit, for `fit`'s mirror
+
+
+def check_knobs(degree, progress) -> None:
+    """ValueError for no degree of a spline, or nothing to be told the fraction done."""
+    number("degree", degree, 1, 5, whole=True)
+    if not (progress is None or callable(progress)):
+        raise ValueError(f"progress must be a function of the fraction done, got {short(progress)}")
 
 
 def directions(joints: int, count: int) -> np.ndarray:
@@ -171,7 +178,8 @@ def fit(
     A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
     """
-    axes = tuple(np.asarray(a, float) for a in axes)
+    axes = as_axes(axes)
+    check_knobs(degree, progress)
     unit = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = tried(velocity, axes, singularity is not None)

@@ -18,26 +18,33 @@ from geomech.field import Field
 from rft import se2
 
 
+def _checked(connection, i, j) -> None:
+    """ValueError for no connection, or no two of its joints."""
+    if not isinstance(connection, Connection):
+        raise ValueError(f"a CCF is that of a Connection, such as connection.fit gives, got {short(connection)}")
+    joints = connection.field.joints
+    if not (is_whole(i) and is_whole(j) and i != j and 0 <= min(i, j) and max(i, j) < max(joints, 2)):
+        raise ValueError(f"i and j must be two of the joints 0 to {joints - 1}, got {short(i)} and {short(j)}")
+
+
 def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
     """d_i A_j - d_j A_i on the grid, (3, N_1, ..., N_d)."""
+    _checked(connection, i, j)
     field = connection.field
     return field.derivative(i)[:, j] - field.derivative(j)[:, i]
 
 
 def lie_bracket(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
     """[A_i, A_j] on the grid, (3, N_1, ..., N_d)."""
+    _checked(connection, i, j)
     columns = np.moveaxis(connection.A, 0, -1)
     return np.moveaxis(se2.bracket(columns[i], columns[j]), -1, 0)
 
 
 def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in the connection's length unit and rad."""
-    if not isinstance(connection, Connection):
-        raise ValueError(f"a CCF is that of a Connection, such as connection.fit gives, got {short(connection)}")
-    joints = connection.field.joints
-    if not (is_whole(i) and is_whole(j) and i != j and 0 <= min(i, j) and max(i, j) < max(joints, 2)):
-        raise ValueError(f"i and j must be two of the joints 0 to {joints - 1}, got {short(i)} and {short(j)}")
-    if joints < 2:
+    _checked(connection, i, j)
+    if connection.field.joints < 2:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
     return Field(connection.axes, values, connection.degree)

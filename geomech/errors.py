@@ -67,7 +67,8 @@ def choose(place: str, word: object, known: Iterable[str]) -> str:
 
 def number(name: str, value: object, low: float, high: float, whole: bool = False) -> None:
     """ValueError naming it unless value is a number, or a whole one, from low to high; True and False are none."""
-    if not ((is_whole if whole else is_number)(value) and low <= value <= high):
+    plain = value.item() if hasattr(value, "item") and is_number(value) else value  # of 32 bits low may be out of reach
+    if not ((is_whole if whole else is_number)(value) and low <= plain <= high):
         raise ValueError(f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {short(value)}")
 
 

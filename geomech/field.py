@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.errors import real_array
+from geomech.errors import number, real_array, short
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,9 @@ class Field:
     degree: int = 3
 
     def __post_init__(self):
+        object.__setattr__(self, "axes", as_axes(self.axes))
+        object.__setattr__(self, "values", real_array("values", self.values))
+        number("degree", self.degree, 0, 5, whole=True)
         shape = tuple(len(a) for a in self.axes)
         if self.values.shape[-len(shape) :] != shape:
             raise ValueError(f"values {self.values.shape} do not end in the grid's shape {shape}")
@@ -43,6 +46,7 @@ class Field:
 
     def derivative(self, axis: int) -> np.ndarray:
         """d values / d alpha_axis on the grid, of the spline."""
+        number("axis", axis, 0, self.joints - 1, whole=True)
         if self.masked:
             return self._between_masks(axis)
         return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
@@ -89,6 +93,17 @@ class Field:
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""
         return inside(self.axes, alpha)
+
+
+def as_axes(axes) -> tuple[np.ndarray, ...]:
+    """Axes as arrays of angles, or ValueError."""
+    try:
+        arrays = tuple(real_array("an axis", a) for a in axes)
+    except TypeError:
+        arrays = ()
+    if not arrays or any(a.ndim != 1 for a in arrays):
+        raise ValueError(f"axes must be rows of ascending angles, one for each joint, got {short(axes)}")
+    return arrays
 
 
 def inside(axes, alpha) -> np.ndarray:

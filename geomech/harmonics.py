@@ -17,8 +17,9 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.connection import Velocity, directions, sampled
-from geomech.field import Field
+from geomech.connection import Velocity, check_knobs, directions, sampled
+from geomech.errors import is_whole, number, real_array, short
+from geomech.field import Field, as_axes
 
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
@@ -43,7 +44,7 @@ class Harmonics:
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) at alpha, alphadot (..., 2); ValueError outside the grid."""
-        alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), np.asarray(alphadot, float))
+        alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), real_array("alphadot", alphadot))
         points = [x.reshape(-1, 2) for x in (alpha, alphadot)]
         step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
         parts = [self._at(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
@@ -78,9 +79,11 @@ def fit(
     The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
     it (k onto 2 count - k); so keep ``highest`` well below. ValueError if it is even or not below ``count``.
     """
-    if highest % 2 == 0 or not 1 <= highest < count:
-        raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {highest!r}")
-    axes = tuple(np.asarray(a, float) for a in axes)
+    number("directions", count, 2, 1e6, whole=True)
+    if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
+        raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {short(highest)}")
+    axes = as_axes(axes)
+    check_knobs(degree, progress)
     if len(axes) != 2:
         raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
     unit = directions(2, count)

@@ -16,7 +16,10 @@ from geomech.errors import real_array, short
 
 def turning(xi) -> np.ndarray:
     """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
-    k, turn = _coefficients(np.asarray(xi, float)[..., 2] + 0j)
+    xi = real_array("xi", xi)
+    if xi.ndim < 2 or xi.shape[-1] != 3:
+        raise ValueError(f"xi must be of shape (..., N, 3), got {xi.shape}")
+    k, turn = _coefficients(xi[..., 2] + 0j)
     swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
     return _values(swing, k, np.shape(xi)[-2])
 

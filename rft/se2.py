@@ -14,7 +14,10 @@ def _sinc(x: np.ndarray) -> np.ndarray:
 
 
 def _split(g):
-    g = np.asarray(g, float)
+    try:
+        g = np.asarray(g, float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError("a pose or velocity of the plane has three real numbers (..., 3)") from None
     if g.ndim == 0 or g.shape[-1] != 3:
         raise ValueError(f"a pose or velocity of the plane has shape (..., 3), got {g.shape}")
     return g[..., 0], g[..., 1], g[..., 2]

@@ -11,7 +11,7 @@ from rft.balance import checked_input
 from rft.bodies.base import Body, Kinematics, halves
 from rft.bodies.pieces import PIECES
 from rft.contact import SIDE, Model
-from rft.effects.base import Effect, folded, pieced
+from rft.effects.base import Effect, broken, folded, pieced
 from rft.media.base import Medium, real_array, require
 
 
@@ -44,6 +44,7 @@ def work_done(
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
     require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
+    broken(effects)  # refuses what is no effect
     pieces_of = pieced(body, effects, pieces)
     model = folded(effects, medium, pieces_of, loads)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))

@@ -9,18 +9,21 @@ import pytest
 from registry import GAITS
 
 import rft
-from geomech import connection, curvature, family, reconstruct
+from geomech import connection, curvature, family, harmonics, reconstruct
 from geomech import scene as scenes
 from geomech.errors import SceneError
+from geomech.field import Field
 from geomech.gaits import KINDS, Centreline, Circle, Sine
+from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
+from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.systems import Solver, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, Coulomb, Granular, Viscous, body_velocity
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2
 
 WRONG = {
     "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
@@ -106,6 +109,43 @@ def geometries(value):
     yield "extent", lambda: connection.grid(2, 5, value)
     yield "joints", lambda: connection.directions(value, 64)
     yield "directions", lambda: connection.directions(2, value)
+    axes, table = connection.grid(2, 6), family.fit(velocity, Circle(), 1.0, 4, 8)
+    yield "velocity", lambda: connection.fit(value, axes)
+    for fit in (connection.fit, harmonics.fit):
+        yield "axes", lambda fit=fit: fit(velocity, value)
+        yield "directions", lambda fit=fit: fit(velocity, axes, value)
+        yield "degree", lambda fit=fit: fit(velocity, axes, 24, value)
+        yield "progress", lambda fit=fit: fit(velocity, axes, progress=value)
+    yield "highest", lambda: harmonics.fit(velocity, axes, highest=value)
+    yield "phases", lambda: family.fit(velocity, Circle(), 1.0, 4, value)
+    yield "least", lambda: family.fit(velocity, Circle(), 1.0, 4, 8, least=value)
+    yield "family's amplitudes", lambda: table.area(value)
+    for of in (curvature.ccf, curvature.error, curvature.exterior_derivative, curvature.lie_bracket):
+        yield "connection", lambda of=of: of(value)
+        yield "joint", lambda of=of: of(fitted, value)
+    yield "axes", lambda: Field(value, fitted.A)
+    yield "values", lambda: Field(fitted.axes, value)
+    yield "degree", lambda: Field(fitted.axes, fitted.A, value)
+    yield "axis", lambda: fitted.field.derivative(value)
+    yield "rate", lambda: fitted.velocity(STILL, value)
+    yield "field", lambda: area(value, Circle())
+    yield "phases", lambda: area(curvature.ccf(fitted), Circle(), 0.5, value)
+    yield "xi", lambda: reconstruct.turning(value)
+    yield "pose", lambda: se2.exp(value)
+    yield "a scene", lambda: explain(value)
+    for of in (scenes.toml, scenes.tables, scenes.inputs, accuracy.cost, undulation.activation):
+        yield "a scene", lambda of=of: of(value)
+    yield "a scene", lambda: cheapest(value, [1.0], 0.1)
+    yield "a scene", lambda: sweep.sweep(value, {"gait.amplitude": [1.0]})
+    yield "over", lambda: sweep.sweep(plain, value)
+    yield "a list", lambda: sweep.cost(plain, {"gait.amplitude": value})
+    yield "a list", lambda: cheapest(plain, value, 0.1)
+    yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
+    yield "gait of the scene", lambda: Study(plain).table("adapted", value)
+    yield "method", lambda: Study(plain).needs_field(value)
+    yield "system", lambda: plain.changed(system=value)
+    yield "one shape", lambda: plain.system.single(value, [1, 0])
+    yield "nothing", lambda: plain.system.with_solver(nonsense=value)
     for tier in (path, direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)
@@ -141,7 +181,9 @@ TAKEN = {
     *itertools.product(["amplitudes"], ("empty", "list", "deep", "array", "many")),
     *itertools.product(["amplitudes of a study"], ("empty", "list")), ("methods", "empty"),
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
-    ("effects", "empty"),
+    ("effects", "empty"), ("progress", "None"), ("progress", "function"), ("a list", "list"), ("rate", "array"),
+    *itertools.product(["family's amplitudes"], ("empty", "deep", "many")), ("rate", "deep"),
+    ("family's amplitudes", "array"),
 }  # fmt: skip
 
 

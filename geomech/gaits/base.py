@@ -58,7 +58,7 @@ class Gait:
     def shape(self, t, amplitudes=None) -> np.ndarray:
         """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
         centre = np.array(self.centre or (0.0,) * self.joints)
-        return centre + self._times(amplitudes, self.unit(-np.asarray(t, float) if self.reverse else t))
+        return centre + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
 
     def largest(self, amplitudes=None) -> float:
         """The largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
@@ -67,7 +67,7 @@ class Gait:
     def rate(self, t, amplitudes=None) -> np.ndarray:
         """d alpha / dt, shaped like `shape`."""
         sign = -1.0 if self.reverse else 1.0
-        return self._times(amplitudes, sign * self.unit_rate(sign * np.asarray(t, float)))
+        return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
 
     def _times(self, amplitudes, curve):
         a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)

@@ -72,7 +72,7 @@ class Sine(Gait):
         """Headings of the elements and their rates of change with the wave's phase, (B..., T..., elements)."""
         from scipy.special import ellipe
 
-        t = np.asarray(t, float) * (-1.0 if self.reverse else 1.0)
+        t = real_array("t", t) * (-1.0 if self.reverse else 1.0)
         slope = self._slopes(amplitudes)[(..., *([None] * (t.ndim + 1)))]
         s = (np.arange(self.elements) + 0.5) / self.elements
         p = arc_to_phase(2 * np.pi * self.waves * s + t[..., None], slope)

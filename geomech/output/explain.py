@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from geomech.gaits import KINDS as GAITS
-from geomech.scene.model import Scene
+from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
@@ -11,7 +11,8 @@ from geomech.tiers import TIERS
 
 def explain(scene: Scene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text."""
-    system, (first, *told) = scene.system, scene.system.told()
+    system = checked_scene(scene).system
+    first, *told = system.told()
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
     lines = [f"{scene.name}: {first}, {gait} gait", *told]
     lines.append(f"engine: {system.engine} {system.because}")

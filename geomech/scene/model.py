@@ -62,7 +62,7 @@ class Scene:
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
-            parts = [f.name for f in dataclasses.fields(own.get("system", self.system))]
+            parts = [f.name for f in dataclasses.fields(checked_system(own.get("system", self.system)))]
             for name in of_system:
                 choose("part", name, ["system", "gait", "numerics", "name", *parts])
             if of_system:
@@ -73,3 +73,10 @@ class Scene:
         """A gait, or the scene's own, run for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
+
+
+def checked_scene(scene) -> Scene:
+    """scene, or ValueError if it is none."""
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, such as geomech.scene.load gives, got {short(scene)}")
+    return scene

@@ -16,7 +16,7 @@ from geomech.errors import SceneError, UnitWarning, choose, named, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.scene import slips
-from geomech.scene.model import Numerics, Scene
+from geomech.scene.model import Numerics, Scene, checked_scene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
@@ -59,7 +59,7 @@ def load(scene: str | Path) -> Scene:
 
 def inputs(scene: Scene) -> list[Path]:
     """The files that a scene was read from: its own, unless it is built in, and its gait's."""
-    own = [] if scene.name in builtin_names() else [scene.name]
+    own = [] if checked_scene(scene).name in builtin_names() else [scene.name]
     return [Path(x) for x in (*own, getattr(scene.gait, "file", None)) if x]
 
 

@@ -8,7 +8,7 @@ import tomllib
 
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
-from geomech.scene.model import Scene
+from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import PARTS, Swimmer, name_in
@@ -17,14 +17,14 @@ from geomech.systems.swimmer import PARTS, Swimmer, name_in
 def toml(scene: Scene) -> str:
     """The text it was read from where that still holds, comments and all; else a new one. SceneError if it has a part that
     no scene file can name."""
-    if scene.text and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    if checked_scene(scene).text and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
     return _text(_anew(scene))
 
 
 def tables(scene: Scene) -> dict:
     """The tables of its text, with the numerics of now, where these make the scene; else those written anew."""
-    numerics = _numerics(scene)
+    numerics = _numerics(checked_scene(scene))
     if scene.text:
         read = {**tomllib.loads(scene.text), "numerics": numerics}
         if from_tables(read, scene.name, scene.text) == scene:

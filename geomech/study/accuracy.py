@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from geomech.errors import SceneError, named
-from geomech.scene.model import Scene
+from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
@@ -89,7 +89,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}.
 
     runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell."""
-    amplitudes = scene.gait.amplitude * FRACTIONS
+    amplitudes = checked_scene(scene).gait.amplitude * FRACTIONS
     finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
     finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
     truth = Study(finest.with_numerics(phases=_truth_phases(scene))).displacement("direct", None, amplitudes)
@@ -108,7 +108,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
 
 def cost(scene: Scene, runs: int = 2) -> Cost:
     """Of `study`; SceneError for a gait that does not move."""
-    if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
+    if np.ptp(checked_scene(scene).gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if any(TIERS[knob.tier].on_grid for knob in _knobs(scene)):
         with named(scene.name):

@@ -50,13 +50,14 @@ class Study:
         with named(self.scene.name):
             how = TIERS[choose("methods", tier, METHODS)]
             how.refuse(self.scene.system)
-            reach = how.reach(self.scene.gait if gait is None else gait, amplitudes)
+            reach = how.reach(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
             make = lambda: how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
             return self._kept(how.looks_up, how.depends_on, reach, make)
 
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""
-        return TIERS[method].looks_up == "connection" and not TIERS[method].is_direct(self.scene.system)
+        tier = TIERS[choose("methods", method, METHODS)]
+        return tier.looks_up == "connection" and not tier.is_direct(self.scene.system)
 
     def compute_field(self, progress: Callable | None = None) -> None:
         """Fill `fitted` now, telling ``progress`` the fraction done."""

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.errors import SceneError, is_number, short
+from geomech.errors import SceneError, is_number, real_array, short
 from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
 from geomech.scene.model import Scene
 from geomech.study import cost
 from geomech.study.bench import Study
@@ -31,8 +32,11 @@ def cheapest(
     """
     if not (is_number(tol) and 0 < tol <= 1e300):
         raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
-    system, study = scene.system, Study(scene)
-    gait, amplitudes, start = gait or scene.gait, np.asarray(amplitudes, float), time.perf_counter()
+    study, start = Study(scene), time.perf_counter()
+    system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
+    amplitudes = real_array("amplitudes", amplitudes)
+    if amplitudes.ndim != 1 or not amplitudes.size:
+        raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
     scene.note_turns(gait, amplitudes)
     if tol <= system.settling:
         raise SceneError(f"{scene.name}: cycles with these effects repeat to {system.settling:g} only: raise --tol")

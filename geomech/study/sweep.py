@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from geomech import __version__
-from geomech.errors import SceneError
+from geomech.errors import SceneError, real_array, short
 from geomech.files import note
 from geomech.scene import write as written
-from geomech.scene.model import Scene
+from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.study import estimate, kept
 from geomech.study.batch import beside, kind
@@ -69,6 +69,9 @@ def sweep(
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
+    if not (partial is None or (isinstance(partial, (str, Path)) and str(partial))):
+        raise SceneError(f"partial must be the path of a file, got {short(partial)}")
+    partial = partial and Path(partial)
     with _Rows(partial, question(scene, values), int(np.prod(shape))) as rows:
         while len(rows) < rows.total:
             k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
@@ -99,8 +102,13 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
 def _grid(scene: Scene, over: Mapping[str, list[float]]):
     """(tables of the scene, names of the parameters, their values, points of those other than the amplitude), the
     amplitude last; SceneError if they make no sweep."""
+    checked_scene(scene)
+    if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
+        raise SceneError(
+            f"over must be values by parameter, such as {{'gait.amplitude': [0.5, 1.0]}}, got {short(over)}"
+        )
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
-    values = {k: [float(x) for x in over[k]] for k in names}
+    values = {k: _list(k, over[k]) for k in names}
     total = int(np.prod([len(v) for v in values.values()])) if names else 0
     if not 0 < total <= LARGEST:
         raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
@@ -109,6 +117,13 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     for corner in _corners(outer):
         _scene_at(tables, scene, names, corner)  # refuse before computing
     return tables, names, values, list(itertools.product(*outer))
+
+
+def _list(name: str, values) -> list[float]:
+    array = real_array(name, values)
+    if array.ndim != 1 or not np.isfinite(array).all():
+        raise SceneError(f"--over {name}: values must be a list of finite numbers, got {short(values)}")
+    return array.tolist()
 
 
 def partial(scene: Scene, over: Mapping[str, list[float]], output: Path) -> Path:

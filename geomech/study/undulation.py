@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geomech.errors import real_array, short
 from geomech.gaits import Sine
 
 if TYPE_CHECKING:
@@ -30,7 +31,9 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     to feign an optimum of efficiency and slip. Refine before believing one.
     """
     gait = _sine(scene, "performance")
-    amplitudes = np.asarray(amplitudes, float)
+    amplitudes = real_array("amplitudes", amplitudes)
+    if amplitudes.ndim != 1:
+        raise ValueError(f"amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
     run, length = scene.cycle(gait, amplitudes, work=True), scene.system.length
     spent = run.work
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
@@ -50,8 +53,8 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
 
 
 def _sine(scene: Scene, what: str) -> Sine:
-    if not isinstance(scene.gait, Sine):
-        raise ValueError(f"{what} is that of a sine wave, got a {type(scene.gait).__name__.lower()}")
+    if not isinstance(getattr(scene, "gait", None), Sine):
+        raise ValueError(f"{what} is that of a sine wave, got a {type(getattr(scene, 'gait', scene)).__name__.lower()}")
     return scene.gait
 
 

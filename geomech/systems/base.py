@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from geomech.connection import evaluate
-from geomech.errors import check_angle, real_array, short
+from geomech.errors import check_angle, choose, real_array, short
 from geomech.reconstruct import displacement
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
@@ -57,6 +57,11 @@ class System(Protocol):
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases."""
+
+
+@dataclasses.dataclass(frozen=True)
+class NoSolver:
+    """Of a system without [numerics] of its own."""
 
 
 class Plain:
@@ -145,6 +150,8 @@ class Plain:
 
     def with_solver(self, **changes):
         """The system with some of its own [numerics] changed."""
+        for name in changes:
+            choose(f"the {self.kind}'s [numerics]", name, [f.name for f in dataclasses.fields(self.solver or NoSolver)])
         return dataclasses.replace(self, solver=dataclasses.replace(self.solver, **changes)) if changes else self
 
     @property

@@ -173,8 +173,11 @@ class Swimmer(Plain):
         return self.solve(alpha, alphadot).checked().xi
 
     def single(self, alpha, alphadot) -> dict:
+        alpha, alphadot = (real_array(name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
+        if alpha.ndim > 1 or alphadot.ndim > 1:
+            raise ValueError(f"alpha and alphadot must be those of one shape, got {alpha.shape} and {alphadot.shape}")
         s = self.solve(alpha, alphadot)
-        self.note_angles(np.abs(real_array("alpha", alpha)).max())
+        self.note_angles(np.abs(alpha).max())
         if str(s.status) == "unconverged":
             raise ValueError("the force balance did not converge: raise [numerics] regularisation")
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}

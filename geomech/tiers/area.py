@@ -6,6 +6,7 @@ import numpy as np
 
 from geomech.connection import SAMPLES_TOGETHER
 from geomech.curvature import ccf
+from geomech.errors import number, short
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
@@ -21,6 +22,9 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
     size in a generic frame, 4 where A vanishes at its centre.
     """
     checked_gait(gait)
+    number("phases", phases, 1, 1e9, whole=True)
+    if not isinstance(field, Field):
+        raise ValueError(f"the area tier sums up a Field, such as curvature.ccf gives, got {short(field)}")
     if field.joints != 2 or gait.joints != 2:
         raise ValueError(f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}")
     potential = field.antiderivative(0)
