@@ -173,3 +173,39 @@ def test_a_law_without_axial_drag():
 def test_bad_parameters_are_named(make, said):
     with pytest.raises(ValueError, match=said):
         make()
+
+
+SURE, OPEN = Granular(1.8, 0.24, 2.5), [[0.01, -2e-4, 3e-3], [-2e-4, 1e-4, 1e-5], [3e-3, 1e-5, 0.04]]
+
+
+def test_a_covariance_says_what_is_open_and_changes_no_force():
+    v = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
+    two = [row[:2] for row in OPEN[:2]]
+    for covariance, names in ((None, ("C", "gamma0")), (two, ("C", "gamma0")), (OPEN, ("C", "gamma0", "k"))):
+        medium = Granular(1.8, 0.24, 2.5, np.array(covariance) if covariance else None)
+        assert medium.uncertain == names
+        assert medium.covariance == (covariance and tuple(map(tuple, covariance)))
+        assert (hash(medium) == hash(SURE)) == (medium == SURE) == (covariance is None)
+        np.testing.assert_array_equal(medium.traction(*v), SURE.traction(*v))
+        assert medium.dry == SURE.dry
+    assert Viscous(2.5, [[0.3]]).covariance == ((0.3,),) and Viscous().uncertain == ("ratio",)
+    assert Granular(1.8, 0.24, covariance=np.zeros((2, 2))).covariance == ((0.0, 0.0), (0.0, 0.0))  # fixed, by the user
+
+
+@pytest.mark.parametrize(
+    ("covariance", "said"),
+    [
+        (OPEN, "2 x 2 finite numbers"),  # without k
+        ([[1.0]], "2 x 2"),
+        ([[1.0, 2.0], [3.0]], "equal rows"),
+        ([[1e-4, 0.0], [1e-3, 1e-4]], "symmetric"),
+        ([[1e-4, 2e-4], [2e-4, 1e-4]], "negative eigenvalues"),
+        ([[-1e-4, 0.0], [0.0, 1e-4]], "negative eigenvalues"),
+        ([[0.0, 1e-12], [1e-12, 1e-4]], "negative eigenvalues"),
+        ([[1e-4, math.nan], [math.nan, 1e-4]], "finite"),
+        ([[math.inf, 0.0], [0.0, 1e-4]], "finite"),
+    ],
+)
+def test_what_is_no_covariance_is_refused(covariance, said):
+    with pytest.raises(ValueError, match=said):
+        Granular(1.8, 0.24, covariance=covariance)

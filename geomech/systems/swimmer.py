@@ -266,8 +266,9 @@ class Swimmer(Plain):
 
 
 def said(kind: str, thing) -> str:
-    """What a part of a scene is and its numbers, as a scene has them."""
-    values = [f"{f.name} = {short(getattr(thing, f.name))}" for f in dataclasses.fields(thing)]
+    """What a part of a scene is and its numbers, as a scene has them; a covariance only where there is one."""
+    given = [f.name for f in dataclasses.fields(thing) if f.name != "covariance" or thing.covariance is not None]
+    values = [f"{name} = {short(getattr(thing, name))}" for name in given]
     return f"{kind} ({', '.join(values)})" if values else kind
 
 

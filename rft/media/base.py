@@ -17,6 +17,8 @@ class Medium(Protocol):
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the
     closed-form link integrals of `rft.loads`. A law of another form sets both to None, supplies
     `traction` alone and is integrated by quadrature. ``k``, where a medium has one, is that of Eq. 2 (`Granular`).
+    A measured medium may have a ``covariance`` (n, n), of the parameters that ``uncertain`` names, in their order; it
+    changes no force (`checked_covariance`).
     """
 
     dry: tuple[tuple[float, float, float], ...] | None
@@ -120,6 +122,27 @@ def check_ranges(owner, **ranges: tuple[float, float]) -> None:
     """`in_range` for the parameters of ``owner`` that are given with their (low, high)."""
     for name, (low, high) in ranges.items():
         in_range(name, getattr(owner, name), low, high)
+
+
+def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
+    """value as rows of floats, or None as it is. ValueError unless it may be the covariance matrix of as many parameters as
+    ``sizes`` allow: square, finite, symmetric and, to rounding, without a negative eigenvalue."""
+    if value is None:
+        return None
+    matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
+    require(
+        matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
+        f"covariance must be {allowed} finite numbers, got {shown(value)}",
+    )
+    spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    unit = np.where(spread > 0, spread, 1.0)
+    scaled = matrix / unit[:, None] / unit  # correlations
+    sound = bool((np.abs(scaled - scaled.T) <= 1e-9).all() and np.linalg.eigvalsh(scaled)[0] >= -1e-9)
+    require(
+        sound and bool((matrix[:, spread == 0] == 0).all()),
+        f"covariance must be symmetric and without negative eigenvalues, got {shown(value)}",
+    )
+    return tuple(tuple(row) for row in matrix.tolist())
 
 
 def shown(value) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rft.media.base import TermLaw, check_ranges, require
+from rft.media.base import TermLaw, check_ranges, checked_covariance, require
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,14 @@ class Granular(TermLaw):
     C: the extra normal force (no unit), 0 to 1e6. gamma0: the angle at which it saturates, in radians,
     strictly between 0 and pi/2. k: pressure across over the weight of the grains above, 1e-3 to 1e3, None if unknown; it
     is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
+    covariance: None, or the matrix of (C, gamma0), or of (C, gamma0, k) where k is given; gamma0 in rad, with or without
+    k as ``uncertain`` says. It changes no force: it is what drag measurements leave open (`rft.calibrate`).
     """
 
     C: float
     gamma0: float
     k: float | None = None
+    covariance: tuple[tuple[float, ...], ...] | None = None
     angles = ("gamma0",)
 
     def __post_init__(self):
@@ -35,6 +38,13 @@ class Granular(TermLaw):
         )
         if self.k is not None:
             check_ranges(self, k=(1e-3, 1e3))
+        sizes = (2,) if self.k is None else (2, 3)
+        object.__setattr__(self, "covariance", checked_covariance(self.covariance, *sizes))
+
+    @property
+    def uncertain(self) -> tuple[str, ...]:
+        """Names of the parameters that ``covariance`` is of."""
+        return ("C", "gamma0", "k")[: len(self.covariance or (0, 0))]
 
     @property
     def dry(self):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rft.media.base import TermLaw, check_ranges
+from rft.media.base import TermLaw, check_ranges, checked_covariance
 
 
 @dataclass(frozen=True)
@@ -12,12 +12,16 @@ class Viscous(TermLaw):
     """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
 
     ratio: normal over axial drag, 1e-8 to 1e8; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+    covariance: None, or that of (ratio,), 1 x 1; it changes no force.
     """
 
     ratio: float = 2.0
+    covariance: tuple[tuple[float, ...], ...] | None = None
+    uncertain = ("ratio",)
 
     def __post_init__(self):
         check_ranges(self, ratio=(1e-8, 1e8))
+        object.__setattr__(self, "covariance", checked_covariance(self.covariance, 1))
 
     @property
     def viscous(self):
