@@ -12,7 +12,7 @@ from rft.effects import (
     TowedSled,
     Transient,
 )
-from rft.media import CATALOGUE, Coulomb, Granular, Medium, Viscous
+from rft.media import CATALOGUE, Coulomb, Granular, Medium, Table, Viscous
 from rft.time_stepping import TimeSteps, time_steps
 from rft.work import Work, work_done
 
@@ -36,6 +36,7 @@ __all__ = [
     "Serpenoid",
     "SkinFriction",
     "Solution",
+    "Table",
     "TimeSteps",
     "TowedSled",
     "Transient",

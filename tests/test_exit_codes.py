@@ -21,15 +21,17 @@ COMMANDS = {
     "displacement": ["--amplitudes", "0.5,1.0", "--plot", "out.svg"],
     "accuracy": ["-o", "out"],
     "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
+    "calibrate": ["-o", "out.toml", "--plot", "out.svg"],
     "explain": [],
     "scenes": [],
 }
-SOLVING = [name for name in COMMANDS if name not in ("explain", "scenes")]
+SOLVING = [name for name in COMMANDS if name not in ("calibrate", "explain", "scenes")]
+SUBJECT = {"scenes": [], "calibrate": ["dem-rod-drag"]}  # where it is no scene
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
 
 
 def arguments(name):
-    return [name, *([] if name == "scenes" else ["small.toml"]), *COMMANDS[name]]
+    return [name, *SUBJECT.get(name, ["small.toml"]), *COMMANDS[name]]
 
 
 @pytest.fixture
@@ -87,10 +89,11 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
     if name == "scenes":
         refused(ended("scenes", "--show", "three-link-glas"), "did you mean 'three-link-glass'")
         return
-    refused(ended(name, "nothing", *COMMANDS[name]), "scene: 'nothing' is unknown")
+    what = "drag" if name == "calibrate" else "scene"
+    refused(ended(name, "nothing", *COMMANDS[name]), f"{what}: 'nothing' is unknown")
     for k in range(0, len(COMMANDS[name]), 2):
         option = COMMANDS[name][k]
-        if option in ("-o", "--plot") and name in ("run", "accuracy", "connection", "displacement"):
+        if option in ("-o", "--plot") and name in ("run", "accuracy", "connection", "displacement", "calibrate"):
             continue  # may be left out, or has a second option beside it
         if option == "--over":
             refused(ended(name, "small.toml", "-o", "out.nc"), "Missing option '--over'")

@@ -148,7 +148,9 @@ def test_fig05c_draws_across_solid_and_along_dashed():
         for line, values, dashes in ((ax.lines[2 * k], across, "-"), (ax.lines[2 * k + 1], along, "--")):
             np.testing.assert_allclose(line.get_xydata(), np.transpose([np.degrees(psi), values]), atol=1e-12)
             assert line.get_linestyle() == dashes
-    scale = numbers["fit"]["k"] * numbers["fit"]["unit_N"]
+    scale = (
+        numbers["fit"]["k"] * 2 * (0.588 * 1030) * 9.81 * 0.008 * 0.030 * 0.080
+    )  # N, Eq. 2 and the header of the data
     across, along = ax.lines[6:8]
     np.testing.assert_allclose(across.get_ydata(), numbers["bed"]["perpendicular"] / scale)
     np.testing.assert_allclose(along.get_ydata(), numbers["bed"]["parallel"] / scale)

@@ -33,7 +33,8 @@ WRONG = {
     "date": np.datetime64("2020"),
 }  # fmt: skip
 PARTS = {
-    "Granular": Granular(1.8, 0.24), "Viscous": Viscous(), "Chain": Chain(), "Backbone": rft.Backbone(8),
+    "Granular": Granular(1.8, 0.24), "Viscous": Viscous(),
+    "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)), "Chain": Chain(), "Backbone": rft.Backbone(8),
     "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
     "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),

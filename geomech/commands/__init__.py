@@ -1,4 +1,15 @@
 """The commands, one file each: ``geomech NAME`` is the function NAME of the module NAME. A new one is a file and its name
 here; `geomech.commands.options` has what they share."""
 
-COMMANDS = ("run", "velocity", "connection", "ccf", "displacement", "accuracy", "sweep", "explain", "scenes")
+COMMANDS = (
+    "run",
+    "velocity",
+    "connection",
+    "ccf",
+    "displacement",
+    "accuracy",
+    "sweep",
+    "calibrate",
+    "explain",
+    "scenes",
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -43,13 +44,19 @@ def check_netcdf(path: Path) -> None:
 
 def check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
     """SceneError unless the output and the plot can be written and are, like ``more``, no input of the scene."""
-    from geomech.output import plots
     from geomech.scene import inputs
+
+    check_files(inputs(scene), output, plot, *more)
+
+
+def check_files(inputs: Iterable[Path], output: Path | None, plot: Path | None, *more: Path) -> None:
+    """SceneError unless the output and the plot can be written and are, like ``more``, none of the inputs."""
+    from geomech.output import plots
 
     if plot:
         plots.check_format(plot)
     outputs = list(filter(None, {output, plot}))
-    refuse_inputs([*outputs, *more], inputs(scene))
+    refuse_inputs([*outputs, *more], inputs)
     if len(outputs) == 2:
         refuse_inputs(outputs[:1], outputs[1:])
     for path in outputs:

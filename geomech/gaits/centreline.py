@@ -11,6 +11,7 @@ import numpy as np
 from geomech.errors import number, short
 from geomech.gaits import frames, midline
 from geomech.gaits.base import Gait
+from geomech.rows import LARGEST_NUMBER
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
@@ -58,7 +59,7 @@ class Centreline(Gait):
         if self.centre:
             raise ValueError("a measured centreline takes no centre: it undulates about the straight body")
         if self.period is not None:
-            number("period", self.period, frames.SMALLEST_NUMBER, frames.LARGEST_NUMBER)
+            number("period", self.period, frames.SMALLEST_NUMBER, LARGEST_NUMBER)
         if not isinstance(self.sha256, str):
             raise ValueError(f"sha256 must be text, got {short(self.sha256)}")
         data = frames.read(self.file)

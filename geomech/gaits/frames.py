@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from geomech import files
+from geomech.rows import Rows
+from geomech.rows import read as read_rows
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 LARGEST_FILE = 100_000_000  # bytes, a few million rows
-LARGEST_NUMBER = 1e12
 SMALLEST_NUMBER = 1e-300  # that a period may be
 MOST_FRAMES = 10_000
 FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
@@ -47,55 +46,30 @@ class Frames:
 
 def read(path: str | Path) -> Frames:
     """The frames of a CSV file; ValueError, one line, if it has none that can be used."""
-    name, (text, digest) = Path(path).name, _contents(Path(path))
-    lines = ((k, line.partition("#")[0].strip()) for k, line in enumerate(text.split("\n"), 1))
-    filled = [(k, line) for k, line in lines if line]
-    columns = _header(name, filled)
-    rows = np.array([_row(name, k, line, columns) for k, line in filled[1:]]).reshape(-1, len(columns))
+    source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
+    columns = _header(source)
+    rows = source.numbers(columns)
     keyed = columns[1] in ("s", "point")
     order = np.lexsort((rows[:, 1] if keyed else np.arange(len(rows)), rows[:, 0]))
-    rows, numbers = rows[order], np.array([k for k, _ in filled[1:]], int)[order]
+    rows, numbers = rows[order], source.lines[order]
     t, starts = np.unique(rows[:, 0], return_index=True)
-    frames = Frames(name, digest, columns, rows, numbers, t, starts)
+    frames = Frames(source.name, source.sha256, columns, rows, numbers, t, starts)
     _check_counts(frames)
     if keyed:
         _check_grid(frames)
     return frames
 
 
-def _contents(path: Path) -> tuple[str, str]:
-    """The text of a file and its sha256."""
-    try:
-        raw = files.read(path, LARGEST_FILE)
-        text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
-        raise ValueError(f"cannot read {str(path)!r}: {reason}; file must be a CSV file of one period") from None
-    return text, hashlib.sha256(raw).hexdigest()
-
-
-def _header(name: str, filled: list[tuple[int, str]]) -> tuple[str, ...]:
+def _header(rows: Rows) -> tuple[str, ...]:
     """The columns. What is found instead is quoted only if it has two of their names: another file's first line may be
     nobody's business."""
-    line, text = filled[0] if filled else (1, "")
-    columns = tuple(word.strip().lower() for word in text.split(","))
+    line, columns = rows.header
     if columns not in HEADERS:
         known = " or ".join(",".join(h) for h in HEADERS)
-        found = f", got {text[:40]!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
-        raise ValueError(f"{name}, line {line}: the header must be {known}{found}")
+        quoted = rows.filled[0][1][:40] if rows.filled else ""
+        found = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
+        raise ValueError(f"{rows.name}, line {line}: the header must be {known}{found}")
     return columns
-
-
-def _row(name: str, line: int, text: str, columns: tuple[str, ...]) -> list[float]:
-    cells = text.split(",")
-    try:
-        row = [float(cell) for cell in cells]
-    except ValueError:
-        row = []
-    if len(row) != len(columns) or not all(abs(x) <= LARGEST_NUMBER for x in row):
-        said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
-        raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}")
-    return row
 
 
 def _check_counts(frames: Frames) -> None:

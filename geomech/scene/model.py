@@ -15,17 +15,18 @@ from geomech.tiers.base import Numerics
 @dataclass(frozen=True)
 class Scene:
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
-    TOML it was read from, if it was; `geomech.scene.write` says whether it still holds."""
+    TOML it was read from, if it was; `geomech.scene.write` says whether it still holds. files: others it was read from."""
 
     system: System
     gait: Gait
     numerics: Numerics = field(default_factory=Numerics)
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
+    files: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
     def __post_init__(self):
         with named(self.name):
-            for what, kind in (("name", str), ("text", str), ("numerics", Numerics)):
+            for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
                 if not isinstance(getattr(self, what), kind):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
             checked_system(self.system)
@@ -59,7 +60,7 @@ class Scene:
 
     def changed(self, **changes) -> Scene:
         """This scene with some of its parts changed, or of its system's."""
-        own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text")}
+        own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
             parts = [f.name for f in dataclasses.fields(checked_system(own.get("system", self.system)))]

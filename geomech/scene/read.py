@@ -16,6 +16,7 @@ from geomech.errors import SceneError, UnitWarning, choose, named, short
 from geomech.files import read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.scene import slips
+from geomech.scene.medium import with_files
 from geomech.scene.model import Numerics, Scene, checked_scene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
@@ -58,9 +59,9 @@ def load(scene: str | Path) -> Scene:
 
 
 def inputs(scene: Scene) -> list[Path]:
-    """The files that a scene was read from: its own, unless it is built in, and its gait's."""
+    """The files that a scene was read from: its own, unless it is built in, its medium's and its gait's."""
     own = [] if checked_scene(scene).name in builtin_names() else [scene.name]
-    return [Path(x) for x in (*own, getattr(scene.gait, "file", None)) if x]
+    return [Path(x) for x in (*own, *scene.files, getattr(scene.gait, "file", None)) if x]
 
 
 def parse(text: str, name: str = "scene") -> Scene:
@@ -86,6 +87,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     for table, value in tables.items():
         if table not in ("effects", "frame") and not isinstance(value, dict):
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
+    tables, files = with_files(tables, name)
     kind, parts = _system(tables, name)
     own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
     numerics = tables.get("numerics", {})
@@ -102,6 +104,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
             numerics=_build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics),
             name=name,
             text=text,
+            files=files,
         )
 
 

@@ -8,6 +8,7 @@ import tomllib
 
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
+from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.systems import KINDS as SYSTEMS
@@ -15,18 +16,18 @@ from geomech.systems.swimmer import PARTS, Swimmer, name_in
 
 
 def toml(scene: Scene) -> str:
-    """The text it was read from where that still holds, comments and all; else a new one. SceneError if it has a part that
-    no scene file can name."""
-    if checked_scene(scene).text and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    """The text it was read from where that still holds by itself, comments and all; else a new one, in which a medium that
+    came from a file stands. SceneError if it has a part that no scene file can name."""
+    if checked_scene(scene).text and not scene.files and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return _text(_anew(scene))
+    return text_of(_anew(scene))
 
 
 def tables(scene: Scene) -> dict:
     """The tables of its text, with the numerics of now, where these make the scene; else those written anew."""
     numerics = _numerics(checked_scene(scene))
     if scene.text:
-        read = {**tomllib.loads(scene.text), "numerics": numerics}
+        read = {**with_files(tomllib.loads(scene.text), scene.name)[0], "numerics": numerics}
         if from_tables(read, scene.name, scene.text) == scene:
             return read
     return _anew(scene)
@@ -79,7 +80,8 @@ def _plain(value):
     return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
 
 
-def _text(tables: dict) -> str:
+def text_of(tables: dict) -> str:
+    """Tables, and lists of them, as TOML."""
     lines = [f"{key} = {_value(x)}" for key, x in tables.items() if not isinstance(x, (dict, list))]
     for name, table in tables.items():
         for each in table if isinstance(table, list) else [table] if isinstance(table, dict) else []:

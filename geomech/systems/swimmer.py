@@ -22,7 +22,7 @@ from rft.effects import KINDS as EFFECTS
 from rft.effects.base import MOST_PIECES, pieced
 from rft.loads import element_load, parse
 from rft.media import CATALOGUE, LAWS, is_linear
-from rft.media.base import check_ranges, in_range
+from rft.media.base import check_ranges, in_range, require_law
 from rft.newton import ELEMENTS_TOGETHER
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
@@ -63,7 +63,7 @@ class Swimmer(Plain):
     together = ELEMENTS_TOGETHER
 
     def __post_init__(self):
-        element_load(self.medium)
+        require_law(self.medium)
         checked_body(self.body)
         rft.effects.broken(self.effects)
         if not isinstance(self.solver, Solver):

@@ -4,8 +4,9 @@ from rft.media.base import Medium, TermLaw, is_linear
 from rft.media.catalogue import CATALOGUE
 from rft.media.coulomb import Coulomb
 from rft.media.granular import Granular
+from rft.media.table import Table
 from rft.media.viscous import Viscous
 
-LAWS = {"granular": Granular, "viscous": Viscous, "coulomb": Coulomb}
+LAWS = {"granular": Granular, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
 
-__all__ = ["CATALOGUE", "LAWS", "Coulomb", "Granular", "Medium", "TermLaw", "Viscous", "is_linear"]
+__all__ = ["CATALOGUE", "LAWS", "Coulomb", "Granular", "Medium", "Table", "TermLaw", "Viscous", "is_linear"]

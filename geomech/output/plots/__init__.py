@@ -1,6 +1,7 @@
 """Plots: each draws on the Axes it is given, or a new one, and returns it. No pyplot, so no global state."""
 
 from geomech.output.plots.displacements import displacement, net
+from geomech.output.plots.drag import drag_figure
 from geomech.output.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -19,6 +20,6 @@ from geomech.output.plots.style import STYLE, check_format, figure, save, styled
 
 __all__ = [
     "COMPONENTS", "FINEST", "KNOB_MARKER", "STYLE", "ccf_figure", "ccf_map", "certain", "check_format", "connection_figure",
-    "displacement", "draw_gait", "drawable", "figure", "largest", "net", "save", "shape_space", "styled", "vector_field",
-    "work_precision", "work_precision_figure",
+    "displacement", "drag_figure", "draw_gait", "drawable", "figure", "largest", "net", "save", "shape_space", "styled",
+    "vector_field", "work_precision", "work_precision_figure",
 ]  # fmt: skip

@@ -1,0 +1,142 @@
+"""Calibrations: a law and its covariance from measurements, by the law's name; what is said of them and written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.errors import SceneError, named
+from geomech.scene import drag
+from geomech.scene.write import text_of
+from rft.calibrate import FITS, Fit, fit
+from rft.drag import Rod, rod_drag
+
+UNITS = {"k": "", "axial_stress": "Pa", "axial_force": "N", "gamma0": "degrees"}
+SIZES = {
+    "radius": "m",
+    "length": "m",
+    "depth": "m",
+    "density": "kg/m^3",
+}  # of the rod and the bed, as options have them
+
+
+@dataclass(frozen=True, eq=False)
+class OfDrag:
+    """A law fitted to the drag on a rod (`rft.calibrate`). psi_deg: (N,), the angles as they were measured. name: of the
+    file."""
+
+    fit: Fit
+    psi_deg: np.ndarray
+    name: str
+
+    def numbers(self) -> dict:
+        """What `geomech calibrate --json` prints. covariance: of ``parameters``, gamma0 in rad; errors: the standard ones, of
+        gamma0 in degrees."""
+        f = self.fit
+        medium = self._medium()
+        medium.pop("covariance", None)
+        return {
+            "law": f.law,
+            **{k: x for k, x in medium.items() if k not in ("law", "k")},
+            "k": f.k,
+            "covariance": f.covariance.tolist(),
+            "rms": f.rms,
+            "parameters": list(f.names),
+            "errors": {_in_degrees(n): math.degrees(x) if n == "gamma0" else x for n, x in zip(f.names, f.errors.tolist())},
+            "axial_force_N": f.axial_force,
+            "axial_stress_Pa": f.axial_stress,
+            "end_caps": f.end_caps,
+            "rod": {name: getattr(f.rod, name) for name in SIZES},
+            "repeats_rms": repeats(f.data.psi, f.data.forces),
+            "residuals": {
+                "psi_deg": self.psi_deg.tolist(), "F_parallel_N": f.residuals[0].tolist(),
+                "F_perpendicular_N": f.residuals[1].tolist(),
+            },
+            "status": "converged",
+        }  # fmt: skip
+
+    def _medium(self) -> dict:
+        """The table [medium] of the law."""
+        values = {f.name: getattr(self.fit.medium, f.name) for f in dataclasses.fields(self.fit.medium)}
+        if "gamma0" in values:
+            values = {_in_degrees(k): math.degrees(x) if k == "gamma0" else x for k, x in values.items()}
+        if "covariance" in values:
+            values["covariance"] = [list(row) for row in values["covariance"]]
+        return {"law": self.fit.law, **{k: x for k, x in values.items() if x is not None}}
+
+    def toml(self) -> str:
+        """A file that a scene takes as ``[medium] file``."""
+        f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
+        of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
+        about = f"# Fitted to {json.dumps(self.name)}: {self.psi_deg.size} angles, rms residual {f.rms:.3g} N{of}.\n"
+        return about + text_of({"medium": self._medium()})
+
+    def text(self) -> str:
+        """All of it in words and a table of residuals."""
+        f = self.fit
+        lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {self.psi_deg.size} angles"]
+        for name, x, error in zip(f.names, f.values, f.errors):
+            turn = 180 / math.pi if name == "gamma0" else 1.0
+            lines.append(f"{name:13}{x * turn:12.5g} +- {error * turn:.2g} {UNITS.get(name, '')}".rstrip())
+        if f.axial_stress and "axial_stress" not in f.names:
+            lines.append(f"{'axial_stress':13}{f.axial_stress:12.5g} Pa")
+        if "axial_force" not in f.names:
+            lines.append(f"{'axial_force':13}{f.axial_force:12.5g} N on the whole rod")
+        caps = "left out" if not f.end_caps else f"{f.end_caps:.3g} flat ends"
+        known = [f"{name} {getattr(f.rod, name):g} {unit}" for name, unit in SIZES.items() if getattr(f.rod, name)]
+        lines.append(f"end caps: {caps}; rod and bed: {', '.join(known) or 'sizes not known'}")
+        unknown = [name for name in SIZES if not getattr(f.rod, name)]
+        if unknown and FITS[f.law].grains:
+            lines.append(f"k is not known without {', '.join(unknown)}: in the header lines, or as --{unknown[0]}")
+        repeated = repeats(f.data.psi, f.data.forces)
+        lines.append(
+            f"rms residual {f.rms:.3g} N" + (f", among repeats {repeated:.3g} N" if repeated is not None else "")
+        )
+        lines.append("  psi_deg  F_parallel_N       law  F_perpendicular_N       law")
+        for psi, forces, left in zip(self.psi_deg, f.data.forces.T, f.residuals.T):
+            (t, n), (law_t, law_n) = forces, np.round(forces - left, 12) + 0.0
+            lines.append(f"{psi:9.4g} {t:13.4g} {law_t:9.4g} {n:18.4g} {law_n:9.4g}")
+        return "\n".join(lines)
+
+    def curves(self, count: int = 181) -> dict:
+        """Numbers of its picture (`plots.drag_figure`): data and law by psi in degrees, (2, N) each."""
+        psi, f = np.linspace(0.0, np.pi / 2, count), self.fit
+        return {
+            "psi_deg": np.degrees(f.data.psi), "forces": f.data.forces, "residuals": f.residuals, "rms": f.rms,
+            "fine_deg": np.degrees(psi), "law": f.forces(psi), "band": f.band(psi), "label": f"{f.law} law",
+        }  # fmt: skip
+
+
+def _in_degrees(name: str) -> str:
+    return "gamma0_deg" if name == "gamma0" else name
+
+
+def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
+    """Root mean square of forces about their means at equal angles, N, with the degrees of freedom that these leave; None if
+    no angle is repeated. It is what no law can go below."""
+    _, which, counts = np.unique(psi.round(9), return_inverse=True, return_counts=True)
+    if (free := psi.size - counts.size) < 1:
+        return None
+    means = np.array([np.bincount(which, f) / counts for f in forces])
+    return float(np.sqrt(((forces - means[:, which]) ** 2).sum() / (2 * free)))
+
+
+def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfDrag:
+    """A law fitted to the file or sample ``source``. sizes: of `SIZES`, those that overrule the header lines. SceneError, one
+    line that names the file, if the data are bad or do not settle the law."""
+    try:
+        measured = drag.read(source)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    with named(measured.name):
+        rod = Rod(**{**measured.sizes, **sizes})
+        data = rod_drag(*measured.rows)
+        return OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
+
+
+CALIBRATIONS: dict[str, Callable[..., OfDrag]] = dict.fromkeys(FITS, of_drag)
