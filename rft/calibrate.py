@@ -24,6 +24,7 @@ from rft.media.viscous import Viscous
 CAPS = "end_caps"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
 LEVELS = 1e-6  # of its bound, within which a parameter counts as lying on it
+EXACT = 1e-14  # of steps and sums of squares, at which a fit has arrived
 UNTOLD = 1e-7  # smallest singular value, over the largest, of the slopes that still tell the parameters apart
 DEVIATIONS = 2.0  # standard errors to either side of the band of uncertainty: 95 %
 
@@ -212,24 +213,23 @@ def _best(residual: Callable, starts: list[np.ndarray], low, high):
 
     ends = []
     for start in starts:
-        settings = {
-            "x_scale": np.maximum(np.abs(start), 1e-3 * start.max()),
-            "xtol": 1e-14,
-            "ftol": 1e-14,
-            "gtol": 1e-14,
-        }
-        ends.append(least_squares(residual, start, jac="3-point", bounds=(low, high), max_nfev=200, **settings))
+        ends.append(
+            least_squares(
+                residual, start, jac="3-point", bounds=(low, high), x_scale=start, max_nfev=200, xtol=EXACT, ftol=EXACT,
+                gtol=EXACT,
+            )
+        )  # fmt: skip
     return min(ends, key=lambda end: end.cost)
 
 
 def _check_inside(names, values, low, high) -> None:
+    """ValueError if a parameter other than the axial drag ends on a bound."""
     for name, x, *bounds in zip(names, values, low, high):
-        for bound in bounds:
-            if np.isfinite(bound) and abs(x - bound) <= LEVELS * max(abs(bound), 1.0):
-                raise ValueError(
-                    f"the fit ends at the edge of {_told(name)}, {_degrees(name, bound):g}: these data do not settle it; "
-                    "measure at more angles, or fit another law"
-                )
+        for bound in bounds if name != "axial_force" else ():
+            if abs(x - bound) <= LEVELS * max(abs(bound), 1.0):
+                instead = "leave the end caps out" if name == CAPS else "measure at more angles, or fit another law"
+                told = f"the fit ends at the edge of {_told(name)}, {_degrees(name, bound):g}"
+                raise ValueError(f"{told}: these data do not settle it; {instead}")
 
 
 def _told(name: str) -> str:
@@ -242,7 +242,7 @@ def _degrees(name: str, value: float) -> float:
 
 def _covariance(names, best, count: int) -> np.ndarray:
     """Of the parameters, from the slopes of the residuals and their scatter; ValueError if they do not tell them apart."""
-    size = np.maximum(np.abs(best.x), 1e-12)
+    size = np.where(best.x > 0, best.x, 1.0)
     _, s, turned = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < UNTOLD * s[0]:
         raise ValueError(f"these data do not tell {', '.join(map(_told, names))} apart: measure at more angles")

@@ -66,6 +66,15 @@ def test_exact_drag_gives_its_law_back(C, gamma0_deg):
     assert dataclasses.replace(found.medium, covariance=None) == Granular(*found.values)
 
 
+def test_the_unit_of_force_does_not_matter():
+    drag = noisy(2)
+    want = fit("granular", drag)
+    for unit in (1e-6, 1e3, 1e6):
+        found = fit("granular", dataclasses.replace(drag, forces=unit * drag.forces))
+        np.testing.assert_allclose(found.values, want.values * [1, 1, unit], rtol=1e-5)
+        np.testing.assert_allclose(found.errors, want.errors * [1, 1, unit], rtol=1e-4)
+
+
 def test_other_laws():
     found = fit("viscous", rod_drag(PSI, *exact(Viscous(1.7))), ROD)
     assert found.names == ("ratio", "axial_stress") and found.k is None  # no weight of grains in a fluid
@@ -182,6 +191,8 @@ def test_end_caps():
     assert len(found.medium.covariance) == 3
     np.testing.assert_allclose(fit("granular", drag, ROD, e).values, [C, g, 3.7 / UNIT], rtol=1e-6)
     assert fit("granular", drag, ROD).rms > 0.01
+    with pytest.raises(ValueError, match="leave the end caps out"):
+        fit("granular", rod_drag(PSI, *exact(Granular(C, g))), ROD, "fitted")
     for law, rod, caps, said in (
         ("viscous", ROD, 1.0, "take the granular law"), ("granular", Rod(0.01), "fitted", "radius and length"),
         ("granular", ROD, -1.0, "from 0 to 10"), ("granular", ROD, math.nan, "from 0 to 10"), ("granular", ROD, "x", "fitted"),

@@ -82,6 +82,22 @@ def test_parameters_of_a_medium_from_a_file_can_be_swept(folder):
     assert abs(got[1, 0] - got[0, 0]) > 1e-3
 
 
+def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
+    """What `geomech run --medium` does; the file is looked for from the current folder."""
+    (folder / "M.toml").write_text(MEDIUM)
+    (folder / "T.csv").write_text(csv())
+    monkeypatch.chdir(folder)
+    glass = scene.load("three-link-glass")
+    own = scene.in_medium(glass, "M.toml")
+    assert own == glass.changed(medium=WRITTEN) and scene.inputs(own) == [folder / "M.toml"]
+    assert scene.parse(scene.toml(own)).system == own.system  # and not the built-in text
+    assert "1.4" in scene.toml(own) and scene.tables(own)["medium"]["C"] == 1.4
+    table = scene.in_medium(glass.with_numerics(loads="gauss:12"), "T.csv")
+    assert table.system.medium == scene.load(written(folder, TABLE, REST + GAUSS)).system.medium
+    with pytest.raises(SceneError, match="a no-slip-snake takes no medium"):
+        scene.in_medium(scene.load("no-slip-snake"), "M.toml")
+
+
 TABLE = 'law = "table"\nfile = "T.csv"'
 FILE = 'file = "M.toml"'
 BAD = {

@@ -20,6 +20,12 @@ SceneArgument = Annotated[
 ]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
+MediumOption = Annotated[
+    Optional[Path],
+    typer.Option(
+        "--medium", metavar="FILE", help="what 'geomech calibrate' wrote, or a CSV of drag, in place of the scene's"
+    ),
+]
 
 
 def folder(text: str | Path) -> Path:
@@ -157,14 +163,15 @@ def allow(scene, cost, yes: bool) -> None:
         terminal.tell(f"{scene.name}: {cost}")
 
 
-def loaded(name: str, grid: int | None = None, extent: float | None = None):
-    """The scene of that name, with the options of its field."""
-    from geomech.scene import load
+def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
+    from geomech.scene import in_medium, load
 
     scene = load(name)
     if scene.system.joint_angles:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
-    return scene.with_numerics(grid=grid, extent=extent)
+    scene = scene.with_numerics(grid=grid, extent=extent)
+    return in_medium(scene, medium) if medium else scene
 
 
 def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.options import FolderOption, YesOption, allow, loaded
+from geomech.commands.options import FolderOption, MediumOption, YesOption, allow, loaded
 from geomech.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"
@@ -17,6 +17,7 @@ DEFAULT_SCENE = "three-link-glass"
 def run(
     name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
     out: FolderOption = Path("results"),
+    medium: MediumOption = None,
     yes: YesOption = False,
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
@@ -24,7 +25,7 @@ def run(
     from geomech.scene import inputs
     from geomech.study.bench import Study
 
-    scene = loaded(name)
+    scene = loaded(name, medium=medium)
     report.refuse_folder(scene, out, inputs(scene))
     with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"field of {scene.name}") as bar:
         allow(scene, report.cost(scene), yes)

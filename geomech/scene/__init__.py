@@ -1,7 +1,18 @@
 """Scenes: what is simulated and how finely. `load` reads one by its name or from a TOML file, `write` gives its TOML."""
 
 from geomech.scene.model import Numerics, Scene
-from geomech.scene.read import builtin_names, from_tables, inputs, load, parse
+from geomech.scene.read import builtin_names, from_tables, in_medium, inputs, load, parse
 from geomech.scene.write import tables, toml
 
-__all__ = ["Numerics", "Scene", "builtin_names", "from_tables", "inputs", "load", "parse", "tables", "toml"]
+__all__ = [
+    "Numerics",
+    "Scene",
+    "builtin_names",
+    "from_tables",
+    "in_medium",
+    "inputs",
+    "load",
+    "parse",
+    "tables",
+    "toml",
+]

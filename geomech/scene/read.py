@@ -58,6 +58,18 @@ def load(scene: str | Path) -> Scene:
     return parse(text, str(scene))
 
 
+def in_medium(scene: Scene, file: str | Path) -> Scene:
+    """The scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name ends in .csv;
+    relative to the current folder. SceneError if that holds none, or the scene's system takes none."""
+    if not isinstance(scene.system, Swimmer):
+        raise SceneError(f"{scene.name}: a {scene.system.kind} takes no medium")
+    table = {"file": str(Path(file).absolute())}
+    if Path(file).suffix.lower() == ".csv":
+        table["law"] = "table"
+    tables, files = with_files({"medium": table}, scene.name)
+    return scene.changed(medium=_medium(f"{scene.name}: [medium]", tables["medium"]), files=files)
+
+
 def inputs(scene: Scene) -> list[Path]:
     """The files that a scene was read from: its own, unless it is built in, its medium's and its gait's."""
     own = [] if checked_scene(scene).name in builtin_names() else [scene.name]

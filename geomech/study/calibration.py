@@ -24,6 +24,8 @@ SIZES = {
     "density": "kg/m^3",
 }  # of the rod and the bed, as options have them
 
+MOST_LINES = 60  # of a table of residuals
+
 
 @dataclass(frozen=True, eq=False)
 class OfDrag:
@@ -97,6 +99,8 @@ class OfDrag:
         lines.append(
             f"rms residual {f.rms:.3g} N" + (f", among repeats {repeated:.3g} N" if repeated is not None else "")
         )
+        if self.psi_deg.size > MOST_LINES:
+            return "\n".join([*lines, "residuals: with --json"])
         lines.append("  psi_deg  F_parallel_N       law  F_perpendicular_N       law")
         for psi, forces, left in zip(self.psi_deg, f.data.forces.T, f.residuals.T):
             (t, n), (law_t, law_n) = forces, np.round(forces - left, 12) + 0.0
