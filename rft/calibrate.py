@@ -79,8 +79,8 @@ class Fit:
 
     @property
     def rms(self) -> float:
-        """Root mean square of all residuals, N."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
+        """Root mean square of the residuals of all rows that weigh something, N."""
+        return float(np.sqrt(np.mean(self.residuals[:, self.data.weight > 0] ** 2)))
 
     @property
     def errors(self) -> np.ndarray:

@@ -53,6 +53,11 @@ class RodDrag:
         """Forces that weigh something."""
         return 2 * int(np.count_nonzero(self.weight))
 
+    @property
+    def angles(self) -> int:
+        """Different ones."""
+        return np.unique(self.psi.round(9)).size
+
 
 def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
     """Measurements at attack angles in degrees, folded into 0 to 90: a law of a rod knows neither front from back nor left

@@ -195,7 +195,8 @@ def test_end_caps():
         fit("granular", rod_drag(PSI, *exact(Granular(C, g))), ROD, "fitted")
     for law, rod, caps, said in (
         ("viscous", ROD, 1.0, "take the granular law"), ("granular", Rod(0.01), "fitted", "radius and length"),
-        ("granular", ROD, -1.0, "from 0 to 10"), ("granular", ROD, math.nan, "from 0 to 10"), ("granular", ROD, "x", "fitted"),
+        ("granular", Rod(0.1, 0.05), 1.0, "longer than its radius"), ("granular", ROD, -1.0, "from 0 to 10"),
+        ("granular", ROD, math.nan, "from 0 to 10"), ("granular", ROD, "x", "fitted"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=said):
             fit(law, drag, rod, caps)
@@ -297,6 +298,18 @@ def test_other_spellings_of_a_good_file(tmp_path, capsys):
         file.write_bytes(text.encode())
         found = json.loads(printed(capsys, file, "--json")[1])
         assert (found["C"], found["rms"]) == (want["C"], want["rms"])
+
+
+def test_weights_of_a_file(tmp_path, capsys):
+    """A row that weighs nothing is as good as none, however wrong it is."""
+    file, found = tmp_path / "drag.csv", []
+    rows = GOOD.split()
+    for extra in (["45,9.0,0.5,0"], []):
+        file.write_text("\n".join([rows[0] + ",weight", *(f"{row},2" for row in rows[1:]), *extra]))
+        found.append(json.loads(printed(capsys, file, "--json")[1]))
+    for key in ("C", "covariance", "axial_force_N", "rms"):
+        np.testing.assert_allclose(found[0][key], found[1][key], rtol=1e-5, atol=1e-15)
+    assert len(found[0]["residuals"]["psi_deg"]) == len(found[1]["residuals"]["psi_deg"]) + 1
 
 
 @pytest.mark.parametrize(

@@ -75,13 +75,13 @@ class OfDrag:
         """A file that a scene takes as ``[medium] file``."""
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
-        about = f"# Fitted to {json.dumps(self.name)}: {self.psi_deg.size} angles, rms residual {f.rms:.3g} N{of}.\n"
+        about = f"# Fitted to {json.dumps(self.name)}: {f.data.angles} angles, rms residual {f.rms:.3g} N{of}.\n"
         return about + text_of({"medium": self._medium()})
 
     def text(self) -> str:
         """All of it in words and a table of residuals."""
         f = self.fit
-        lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {self.psi_deg.size} angles"]
+        lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {f.data.angles} angles"]
         for name, x, error in zip(f.names, f.values, f.errors):
             turn = 180 / math.pi if name == "gamma0" else 1.0
             lines.append(f"{name:13}{x * turn:12.5g} +- {error * turn:.2g} {UNITS.get(name, '')}".rstrip())
