@@ -143,6 +143,7 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN, end_caps: float | str = 0.0
         require(
             rod.radius and rod.length, "end caps take the rod's radius and length: give both, or leave the caps out"
         )
+        require(rod.radius <= rod.length, f"end caps take a rod longer than its radius, got {rod.length:g} m")
     names = (*kind.names, "axial_force", *([CAPS] if fitted else []))
     require(data.count > len(names), f"{data.count} forces are too few for {', '.join(names)}: measure at more angles")
     residual = lambda x: _weighted(data, _forces(law, rod, 0.0 if fitted else float(end_caps), data.psi, x))
