@@ -20,7 +20,12 @@ def toml(scene: Scene) -> str:
     came from a file stands. SceneError if it has a part that no scene file can name."""
     if checked_scene(scene).text and not scene.files and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return text_of(_anew(scene))
+    return _text(_anew(scene))
+
+
+def table(name: str, values: dict) -> str:
+    """One table as TOML."""
+    return _text({name: values})
 
 
 def tables(scene: Scene) -> dict:
@@ -80,8 +85,7 @@ def _plain(value):
     return [_plain(x) for x in value] if isinstance(value, (tuple, list)) else value
 
 
-def text_of(tables: dict) -> str:
-    """Tables, and lists of them, as TOML."""
+def _text(tables: dict) -> str:
     lines = [f"{key} = {_value(x)}" for key, x in tables.items() if not isinstance(x, (dict, list))]
     for name, table in tables.items():
         for each in table if isinstance(table, list) else [table] if isinstance(table, dict) else []:

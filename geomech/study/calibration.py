@@ -12,7 +12,7 @@ import numpy as np
 
 from geomech.errors import SceneError, named
 from geomech.scene import drag
-from geomech.scene.write import text_of
+from geomech.scene.write import table
 from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
 
@@ -76,7 +76,7 @@ class OfDrag:
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
         about = f"# Fitted to {json.dumps(self.name)}: {f.data.angles} angles, rms residual {f.rms:.3g} N{of}.\n"
-        return about + text_of({"medium": self._medium()})
+        return about + table("medium", self._medium())
 
     def text(self) -> str:
         """All of it in words and a table of residuals."""

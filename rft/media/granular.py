@@ -20,8 +20,9 @@ class Granular(TermLaw):
     C: the extra normal force (no unit), 0 to 1e6. gamma0: the angle at which it saturates, in radians,
     strictly between 0 and pi/2. k: pressure across over the weight of the grains above, 1e-3 to 1e3, None if unknown; it
     is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
-    covariance: None, or the matrix of (C, gamma0), or of (C, gamma0, k) where k is given; gamma0 in rad, with or without
-    k as ``uncertain`` says. It changes no force: it is what drag measurements leave open (`rft.calibrate`).
+
+    covariance (-): that of C, gamma0 (in rad) and, where k is given, k or not, as ``uncertain`` says; it changes no force
+    and is what drag measurements leave open (`rft.calibrate`).
     """
 
     C: float

@@ -17,8 +17,9 @@ REACH = np.radians(15.0)  # how near to 0 and pi/2 the angles must come
 class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
 
-    psi: rad, at least three different angles that come within 15 degrees of 0 and of pi/2; others are folded between, and those
-    measured again averaged (`rft.drag.rod_drag`). f_t, f_n: as many, positive against the motion.
+    psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; others are folded between, and
+    those measured again averaged (`rft.drag.rod_drag`). f_t, f_n (-): as many forces per length along and across, in one unit
+    of any kind, positive against the motion.
 
     With the unit velocity v, f_t is a function of v.t = cos psi and f_n one of v.n = sin psi, as in Eq. 3 of Zhang and Goldman
     (2014): odd ones, through the origin and the measured values, by piecewise cubics that are monotone between neighbours and

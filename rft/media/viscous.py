@@ -12,7 +12,8 @@ class Viscous(TermLaw):
     """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
 
     ratio: normal over axial drag, 1e-8 to 1e8; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
-    covariance: None, or that of (ratio,), 1 x 1; it changes no force.
+
+    covariance (-): that of the ratio, 1 x 1; it changes no force and is what drag measurements leave open (`rft.calibrate`).
     """
 
     ratio: float = 2.0
