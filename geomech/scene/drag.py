@@ -25,6 +25,7 @@ NUMBER, SAID = r"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)", r"\s*(?:of|is|=|:|about)?
 LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0}
 DENSITIES = {"kg/m": 1.0, "kg m": 1.0, "g/c": 1000.0, "": 1.0}
 LENGTH, PER_VOLUME = NUMBER + r"\s*(um|mm|cm|m)\b", r"\s*\(?(kg/m|kg m|g/c)\^?[^\s,;:=)]*\)?"
+DENSITY, PACKING = r"(?<!packing )(?<!relative )\bdensity", r"\b(?:packing|volume|solid)(?: (?:fraction|density))?"
 SIZES = {  # words of a header line, and the share of the number beside them that is meant
     "radius": (("radius", 1.0), ("diameter", 0.5)),
     "length": (("length", 1.0), ("long", 1.0)),
@@ -99,8 +100,8 @@ def sizes(source: Rows) -> dict[str, float]:
                 found.setdefault(name, set()).add(value)
         if "rod density" not in part and "density of the rod" not in part:
             found.setdefault("density", set()).update(_densities(part))
-            bulk |= bool(re.search("bulk|effective", part))
-        for number, percent in re.findall(r"(?:packing|fraction)(?: fraction)?" + SAID + NUMBER + r"\s*(%?)", part):
+            bulk |= "density" in part and bool(re.search("bulk|effective", part))
+        for number, percent in re.findall(PACKING + SAID + NUMBER + r"\s*(%?)", part):
             found.setdefault("packing", set()).add(float(number) / (100 if percent else 1))
     for name, values in found.items():
         if len(values) > 1:
@@ -143,10 +144,10 @@ def _lengths(part: str):
 
 def _densities(part: str) -> set[float]:
     """kg/m^3."""
-    found = re.findall(r"\bdensity" + SAID + NUMBER + PER_VOLUME, part)
+    found = re.findall(DENSITY + SAID + NUMBER + PER_VOLUME, part)
     found += re.findall(NUMBER + PER_VOLUME + r"\s+density", part)
-    found += [(x, per) for per, x in re.findall(r"\bdensity" + PER_VOLUME + SAID + NUMBER, part)]
-    found = found or [(x, "") for x in re.findall(r"\bdensity" + SAID + NUMBER, part)]
+    found += [(x, per) for per, x in re.findall(DENSITY + PER_VOLUME + SAID + NUMBER, part)]
+    found = found or [(x, "") for x in re.findall(DENSITY + SAID + NUMBER, part)]
     return {_rounded(float(x) * DENSITIES[per]) for x, per in found}
 
 
