@@ -343,6 +343,8 @@ def test_options_overrule_the_header(capsys):
     text = printed(capsys, "dem-rod-drag", "--law", "viscous")[1]
     assert "ratio" in text and "k is not known" not in text
     assert printed(capsys, "dem-rod-drag", "--depth", "-1")[0] == 2
+    code, _, err = printed(capsys, "dem-rod-drag", "--density", "0.6")
+    assert code == 2 and "dem_rod_drag.csv: k must be a number from 0.001 to 1000" in err
     assert "neither left-out, fitted nor a number" in printed(capsys, "dem-rod-drag", "--end-caps", "flat")[2]
 
 

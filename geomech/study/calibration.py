@@ -140,7 +140,9 @@ def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float |
     with named(measured.name):
         rod = Rod(**{**measured.sizes, **sizes})
         data = rod_drag(*measured.rows)
-        return OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
+        found = OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
+        found.toml()  # what no medium can be, such as a k of thousands, is refused here
+    return found
 
 
 CALIBRATIONS: dict[str, Callable[..., OfDrag]] = dict.fromkeys(FITS, of_drag)
