@@ -29,12 +29,7 @@ class Scene:
             for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
                 if not isinstance(getattr(self, what), kind):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
-            checked_system(self.system)
-            if checked_gait(self.gait).joints != self.system.joints:
-                raise ValueError(
-                    f"[gait] {type(self.gait).__name__.lower()} moves {self.gait.joints} joints but [body] has "
-                    f"{self.system.joints}: give the body one link more than the gait has joints, or another gait"
-                )
+            _check_joints(checked_system(self.system), checked_gait(self.gait))
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:
@@ -74,6 +69,14 @@ class Scene:
         """A gait, or the scene's own, run for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
+
+
+def _check_joints(system: System, gait: Gait) -> None:
+    if gait.joints != system.joints:
+        raise ValueError(
+            f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but [body] has {system.joints}: give the body "
+            "one link more than the gait has joints, or another gait"
+        )
 
 
 def checked_scene(scene) -> Scene:

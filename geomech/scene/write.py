@@ -18,7 +18,8 @@ from geomech.systems.swimmer import PARTS, Swimmer, name_in
 def toml(scene: Scene) -> str:
     """The text it was read from where that still holds by itself, comments and all; else a new one, in which a medium that
     came from a file stands. SceneError if it has a part that no scene file can name."""
-    if checked_scene(scene).text and not scene.files and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    whole = checked_scene(scene).text and not scene.files
+    if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
     return _text(_anew(scene))
 
