@@ -182,6 +182,11 @@ def test_a_table_passes_through_its_rows_in_units_of_axial_drag():
         got = np.array(table.traction(sign_t * speed * np.cos(psi), sign_n * speed * np.sin(psi)))
         want = np.array([np.append(f_t[:-1], 0.0) * sign_t, np.append(0.0, f_n[1:]) * sign_n]) / 0.5
         np.testing.assert_allclose(got, want, rtol=1e-12, atol=1e-12)
+    v = np.random.default_rng(0).normal(size=(2, 50))
+    t, n = table.traction(*v)
+    np.testing.assert_array_equal(table.traction(-v[0], v[1]), [-t, n])  # and so mirror images mirror each other
+    np.testing.assert_array_equal(table.traction(v[0], -v[1]), [t, -n])
+    assert (t * v[0] + n * v[1] > 0).all()
     fine = np.linspace(0, np.pi / 2, 2001)
     across = table.traction(np.cos(fine), np.sin(fine))[1]
     for low, high, sign in zip(psi, psi[1:], np.sign(np.diff([0.0, *f_n[1:]]))):  # monotone between rows: no overshoot

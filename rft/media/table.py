@@ -61,14 +61,14 @@ class Table:
         """Drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         along, across, _, _, unit = self._curves
         c, s, _ = _parts(v_t, v_n, eps)
-        return along(c) / unit, across(s) / unit
+        return np.sign(c) * along(np.abs(c)) / unit, np.sign(s) * across(np.abs(s)) / unit  # odd to the last digit
 
     def derivatives(self, v_t, v_n, eps=0.0):
         """((df_t/dv_t, df_t/dv_n), (df_n/dv_t, df_n/dv_n)); infinite slopes at rest are returned as 0."""
         _, _, along, across, unit = self._curves
         c, s, inverse = _parts(v_t, v_n, eps)
         e2 = (eps * inverse) ** 2
-        by_c, by_s = along(c) * inverse / unit, across(s) * inverse / unit
+        by_c, by_s = along(np.abs(c)) * inverse / unit, across(np.abs(s)) * inverse / unit
         return (by_c * (s * s + e2), -by_c * c * s), (-by_s * c * s, by_s * (c * c + e2))
 
 
