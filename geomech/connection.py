@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
+from geomech import summary
 from geomech.errors import is_whole, number, real_array, short
-from geomech.field import Field, as_axes
+from geomech.field import Field, as_axes, half_of
 from geomech.velocity import fits, tried
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -33,6 +35,11 @@ class Connection:
     speed: np.ndarray
     degree: int = 3
 
+    def __repr__(self) -> str:
+        gone = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
+        size = f"A {summary.spans(self.A)}; {summary.left(self.residual, self.speed)}"
+        return f"Connection({summary.grid(self.axes)}{gone}; {size})"
+
     @cached_property
     def field(self) -> Field:
         return Field(self.axes, self.A, self.degree)
@@ -44,6 +51,19 @@ class Connection:
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi = A(alpha) alphadot, (..., 3)."""
         return np.einsum("...ij,...j->...i", self(alpha), real_array("alphadot", alphadot))
+
+    def half(self, first: int) -> Connection:
+        """The connection on every second point of each axis from ``first``, and on both ends (`field.half_of`)."""
+        axes, arrays, degree = half_of(self.axes, (self.A, self.residual, self.speed), self.degree, first)
+        return Connection(axes, *arrays, degree)
+
+    @classmethod
+    def load(cls, path: str | Path, sign: str = "", order: str = "") -> Connection:
+        """The connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter has (`geomech.tables`);
+        SceneError, one line, for any other. Its residual is nan where the file does not tell it."""
+        from geomech.tables import load
+
+        return load(path, sign, order).connection
 
 
 def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from geomech.connection import Connection
 from geomech.errors import is_whole, short
-from geomech.field import Field
+from geomech.field import Field, every_second
 from rft import se2
 
 
@@ -64,7 +64,7 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     if whole.masked:
         return _at_halves(connection, whole, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)
-    halves = (np.moveaxis(ccf(_half(connection, first), i, j)(shapes), -1, 0) for first in (0, 1))
+    halves = (np.moveaxis(ccf(connection.half(first), i, j)(shapes), -1, 0) for first in (0, 1))
     apart = np.maximum(*(np.abs(half - whole.values) for half in halves))
     return Field(connection.axes, maximum_filter(apart, (1, *(3,) * len(connection.axes))), connection.degree)
 
@@ -75,21 +75,8 @@ def _at_halves(connection: Connection, whole: Field, i: int, j: int) -> Field:
 
     apart = np.zeros(whole.values.shape)
     for first in (0, 1):
-        picks = (..., *np.ix_(*(_every_second(axis, first) for axis in connection.axes)))
-        off = np.abs(ccf(_half(connection, first), i, j).values - whole.values[picks])
+        picks = (..., *np.ix_(*(every_second(axis, first) for axis in connection.axes)))
+        off = np.abs(ccf(connection.half(first), i, j).values - whole.values[picks])
         apart[picks] = np.fmax(apart[picks], off)
     worst = maximum_filter(apart, (1, *(3,) * len(connection.axes)))
     return Field(connection.axes, np.where(np.isnan(whole.values), np.nan, worst), connection.degree)
-
-
-def _every_second(axis: np.ndarray, first: int) -> np.ndarray:
-    return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
-
-
-def _half(connection: Connection, first: int) -> Connection:
-    """The connection on every second point of each axis from ``first``, and on both ends; of a lower degree where that
-    leaves too few points for the spline."""
-    picks = [_every_second(axis, first) for axis in connection.axes]
-    A, residual, speed = (x[(..., *np.ix_(*picks))] for x in (connection.A, connection.residual, connection.speed))
-    axes = tuple(axis[pick] for axis, pick in zip(connection.axes, picks))
-    return Connection(axes, A, residual, speed, min(connection.degree, min(map(len, picks)) - 1))

@@ -95,10 +95,10 @@ def real_array(name: str, values):
     raise ValueError(f"{name} must be numbers in equal rows, got {short(values)}")
 
 
-def short(value: object) -> str:
-    """repr(value) as one line of at most 60 characters."""
+def short(value: object, most: int = 60) -> str:
+    """repr(value) as one line of at most ``most`` characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of more digits than Python prints
         text = "a very long number"
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= most else text[: most - 3] + "..."

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech import summary
 from geomech.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.errors import number, real_array
 from geomech.gaits import Gait
@@ -38,6 +39,10 @@ class Family:
     gait: Gait
     amplitudes: np.ndarray
     xi: np.ndarray
+
+    def __repr__(self) -> str:
+        curves, phases = self.xi.shape[:2]
+        return f"Family({curves} curves of {self.gait!r}, amplitudes {summary.span(self.amplitudes)}, {phases} phases)"
 
     @cached_property
     def phases(self) -> np.ndarray:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech import summary
 from geomech.errors import number, real_array, short
 
 
@@ -32,6 +33,13 @@ class Field:
             raise ValueError(f"values {self.values.shape} do not end in the grid's shape {shape}")
         if min(shape) <= self.degree:
             raise ValueError(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
+
+    def __repr__(self) -> str:
+        lead = self.values.shape[: -self.joints]
+        flat = self.values.reshape(-1, *self.values.shape[len(lead) :])
+        size = summary.spans(self.values) if lead == (3,) else summary.span(self.values)
+        what = "x".join(map(str, lead)) or "one"
+        return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; values {size})"
 
     @property
     def joints(self) -> int:
@@ -121,6 +129,19 @@ def inside(axes, alpha) -> np.ndarray:
                 "widen the extent or lower the amplitude"
             )
     return alpha
+
+
+def every_second(axis: np.ndarray, first: int) -> np.ndarray:
+    """Indices of every second point of an axis from ``first``, and of both ends: half a grid, to estimate errors by."""
+    return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
+
+
+def half_of(axes, arrays, degree: int, first: int):
+    """(axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where that
+    leaves too few points for the spline."""
+    picks = [every_second(axis, first) for axis in axes]
+    some = tuple(axis[pick] for axis, pick in zip(axes, picks))
+    return some, [x[(..., *np.ix_(*picks))] for x in arrays], min(degree, min(map(len, picks)) - 1)
 
 
 def _tensor_spline(field: Field, integrate: int | None = None):

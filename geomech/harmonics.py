@@ -17,9 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech import summary
 from geomech.connection import Velocity, check_knobs, directions, sampled
 from geomech.errors import is_whole, number, real_array, short
-from geomech.field import Field, as_axes
+from geomech.field import Field, as_axes, half_of
 
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
@@ -34,6 +35,10 @@ class Harmonics:
     residual: np.ndarray
     degree: int = 3
 
+    def __repr__(self) -> str:
+        speed = np.sqrt((self.coefficients**2).sum(1) / 2)
+        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.left(self.residual, speed)})"
+
     @cached_property
     def field(self) -> Field:
         return Field(self.axes, self.coefficients, self.degree)
@@ -41,6 +46,11 @@ class Harmonics:
     @property
     def highest(self) -> int:
         return self.coefficients.shape[1] - 1
+
+    def half(self, first: int) -> Harmonics:
+        """As `Connection.half`."""
+        axes, arrays, degree = half_of(self.axes, (self.coefficients, self.residual), self.degree, first)
+        return Harmonics(axes, *arrays, degree)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) at alpha, alphadot (..., 2); ValueError outside the grid."""

@@ -26,6 +26,14 @@ class Solution(NamedTuple):
     status: np.ndarray
     iterations: np.ndarray
 
+    def __repr__(self) -> str:
+        if np.ndim(self.status) == 0:
+            xi = ", ".join(f"{x:.6g}" for x in self.xi)
+            return f"Solution(xi = ({xi}), {self.status}, residual {self.residual:.1e}, {self.iterations} iterations)"
+        kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
+        worst = f"residual up to {np.max(self.residual, initial=0.0):.1e}"
+        return f"Solution({self.status.shape} samples: {kinds or 'none'}; {worst})"
+
     def checked(self) -> Solution:
         """This solution, or RuntimeError if any sample is unconverged."""
         bad = int(np.count_nonzero(self.status == "unconverged"))

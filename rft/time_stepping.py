@@ -45,6 +45,11 @@ class TimeSteps(NamedTuple):
     cycles: int
     work: Work | None
 
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
+        size = f"{np.size(self.status)} gaits of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
+        return f"TimeSteps({size}; residual up to {np.max(self.residual, initial=0.0):.1e})"
+
     @property
     def displacement(self) -> np.ndarray:
         """(..., 3): pose after the cycle in the frame at its start."""

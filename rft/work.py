@@ -27,6 +27,11 @@ class Work(NamedTuple):
     bending_moment: np.ndarray
     slip: np.ndarray
 
+    def __repr__(self) -> str:
+        names = zip(("power", "bending moment", "slip"), self)
+        sizes = [f"{name} {np.min(x):.3g} to {np.max(x):.3g}" for name, x in names if np.size(x)]
+        return f"Work({np.shape(self.power)} samples of {np.shape(self.bending_moment)[-1]} joints; {', '.join(sizes)})"
+
 
 def work_done(
     medium: Medium,

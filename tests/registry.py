@@ -1,9 +1,10 @@
 """Everything the property tests run over. A new medium, body or gait is added here, in one line."""
 
 import math
+import pathlib
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
-from geomech.systems import NoSlipSnake, Swimmer
+from geomech.systems import NoSlipSnake, Swimmer, Table
 from rft import (
     Backbone,
     BodyInertia,
@@ -58,6 +59,9 @@ GAITS = {
 SYSTEMS = {
     "swimmer": Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, BODIES["uneven"]),
     "no-slip-snake": NoSlipSnake((0.8, 1.3, 1.0), length=0.4, frame="link-1"),
+    "table": Table(
+        pathlib.Path(__file__).parent / "data" / "uneven.nc"
+    ),  # of the swimmer above; the file has its scene
 }
 
 # name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)

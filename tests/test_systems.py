@@ -162,7 +162,9 @@ def test_what_a_system_says_of_itself_holds(name):
     columns = np.stack([system.velocity(alpha, e) for e in np.eye(system.joints)], -1)
     linear = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max() < 1e-9 * np.abs(columns).max()
     assert linear == system.linear
-    assert system.unit == "m" and system.in_frame("link-2").frame == "link-2"
+    assert system.unit == "m"
+    if not system.stored("connection"):  # which has the frame it was made in
+        assert system.in_frame("link-2").frame == "link-2"
     assert KINDS[system.kind] is type(system)
     scene = Scene(system, AWAY)
     run = scene.cycle(phases=64)

@@ -3,27 +3,43 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
 from geomech.commands.options import ExtentOption, GridOption, PlotOption, SceneArgument, YesOption, check_netcdf, field
+from geomech.errors import SceneError, choose
 
 
 def connection(
     name: SceneArgument,
-    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.nc", help="NetCDF file to write")],
+    out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="FILE.nc (NetCDF) or FILE.mat to write")],
     grid: GridOption = None,
     extent: ExtentOption = None,
     plot: PlotOption = None,
+    sign: Annotated[Optional[str], typer.Option(help="of a .mat file: + for xi = + A alphadot (as is), or -")] = None,
+    order: Annotated[Optional[str], typer.Option(help="of a .mat file: ndgrid (as is) or meshgrid")] = None,
     yes: YesOption = False,
 ):
-    """The local connection on a grid, with its fit residual and CCF, as NetCDF."""
-    from geomech.output import plots
-    from geomech.output.netcdf import save_connection
+    """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
+    from geomech.files import note
+    from geomech.output import mat, netcdf, plots
+    from geomech.tables import ORDERS, SIGNS
 
-    check_netcdf(out)
-    study = field(name, grid, extent, out, plot, plot is not None, yes)
-    save_connection(out, study)
+    check_netcdf(out, matlab=True)
+    for option, word, known in (("--sign", sign, SIGNS), ("--order", order, ORDERS)):
+        if word is not None:
+            choose(option, word, known)
+            if out.suffix == ".nc":
+                raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
+    study = field(
+        name, grid, extent, out, plot, plot is not None or out.suffix == ".mat", yes, harmonics=out.suffix == ".nc"
+    )
+    if out.suffix == ".nc":
+        netcdf.save_connection(out, study)
+    else:
+        mat.save_connection(out, study, sign or "+", order or "ndgrid")
+        if not sign:
+            note(f"{out} has {SIGNS['+']}; --sign - gives the other")
     if plot:
         plots.save(plots.connection_figure(study.fitted, study.scene.system.unit), plot)

@@ -42,10 +42,11 @@ JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 
-def check_netcdf(path: Path) -> None:
-    """SceneError for a name that does not end in .nc."""
-    if path.suffix != ".nc":
-        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc")
+def check_netcdf(path: Path, matlab: bool = False) -> None:
+    """SceneError for a name that does not end in .nc, or in .mat where that will do."""
+    if path.suffix not in (".nc", ".mat") if matlab else path.suffix != ".nc":
+        also = ", or that of a MATLAB file in .mat" if matlab else ""
+        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc{also}")
 
 
 def check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
@@ -168,15 +169,22 @@ def loaded(name: str, grid: int | None = None, extent: float | None = None, medi
     from geomech.scene import in_medium, load
 
     scene = load(name)
-    if scene.system.joint_angles:
+    own = scene.system.stored("connection")
+    if (grid, extent) != (None, None) and own:
+        raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
+    if scene.system.joint_angles and not own:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene
 
 
-def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False):
+def field(
+    name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False,
+    harmonics: bool = False,
+):  # fmt: skip
     """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space.
-    with_gait: and the gait, which is refused if it leaves the field."""
+    with_gait: and the gait, which is refused if it leaves the field. harmonics: with those of the velocity, where it has
+    any beside the connection."""
     from geomech.study.bench import Study
     from geomech.study.cost import built, price
     from geomech.tiers import TIERS
@@ -190,7 +198,9 @@ def field(name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: 
         if with_gait:
             study.refuse_outside()
         check_outputs(scene, output, plot)
-        allow(scene, price([built(scene, "path")]), yes)
+        tiers = ["path", *(["harmonic"] if harmonics and "harmonic" in study.lookups else [])]
+        allow(scene, price([built(scene, tier) for tier in tiers]), yes)
     with terminal.progress(f"field of {scene.name}") as bar:
-        study.compute_field(bar)
+        for k, tier in enumerate(tiers):
+            study.table(tier, progress=lambda done: bar((k + done) / len(tiers)))
     return study

@@ -3,58 +3,130 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from geomech.connection import Connection
+from geomech.field import Field
 from geomech.files import whole_file
+from geomech.harmonics import Harmonics
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study.bench import Study
 
 COMPONENTS = ("x", "y", "theta")
+UNITS = {"BL": "body length", "m": "m"}
+
+
+class Variable(NamedTuple):
+    """One of a file, or of a data set of xarray."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    values: np.ndarray
+    units: str
+    long_name: str
 
 
 def save_connection(path: str | Path, study: Study) -> None:
-    """Write A (component, joint, alpha_1, ...), its fit residual and, for two joints, the CCF and its estimated error,
-    with units, conventions (`about`) and the scene's text. The file appears whole or not at all."""
+    """Write A (component, joint, alpha_1, ...), its fit residual, the rms of xi and, for two joints, the CCF with its
+    estimated error and, where xi is not linear in alphadot, its odd harmonics; with units, conventions (`about`) and the
+    scene's text. `Connection.load` and [system] kind = "table" read it. The file appears whole or not at all."""
     from scipy.io import netcdf_file
 
-    scene, fitted = study.scene, study.fitted
-    unit = "body length" if scene.system.unit == "BL" else "m"
+    found = variables(study)  # computed, before there is a file
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = attribute(f"Local connection and curvature constraint function of the scene {scene.name}")
-        for key, value in about(scene).items():
-            setattr(file, key, value)
-        file.scene = attribute(toml(scene))
-        file.numerics = (
-            repr(scene.numerics) if scene.system.solver is None else f"{scene.numerics}, {scene.system.solver}"
-        )
-        _coordinates(file, fitted)
-        angles = tuple(f"alpha_{k + 1}" for k in range(len(fitted.axes)))
-        units = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
-        _variable(file, "A", fitted.A, ("component", "joint", *angles), units, "local connection")
-        name = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
-        _variable(file, "fit_residual", fitted.residual, ("component", *angles), units, name)
-        if len(angles) == 2:
-            units = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
-            name = "curvature constraint function of joints 1 and 2"
-            _variable(file, "ccf", study.curvature.values, ("component", *angles), units, name)
-            name = (
-                "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
-            )
-            _variable(file, "ccf_error", study.curvature_error.values, ("component", *angles), units, name)
+        for key, value in attributes(study).items():
+            text = isinstance(value, str)  # SciPy keeps but seven digits of a float of Python's
+            setattr(file, key, attribute(value) if text else np.float64(value) if isinstance(value, float) else value)
+        _coordinates(file, study.fitted)
+        for name, dimensions, values, units, long_name in found:
+            for dimension, size in zip(dimensions, values.shape):
+                if dimension not in file.dimensions:
+                    file.createDimension(dimension, size)
+            _variable(file, name, values, dimensions, units, long_name)
+
+
+def attributes(study: Study) -> dict:
+    """Of a file of the scene's connection: what it is, what it rests on, and the scene's text."""
+    scene = study.scene
+    numerics = repr(scene.numerics) if scene.system.solver is None else f"{scene.numerics}, {scene.system.solver}"
+    return {
+        "title": f"Local connection and curvature constraint function of the scene {scene.name}",
+        **about(scene),
+        "scene": toml(scene),
+        "numerics": numerics,
+        "interpolation": int(study.fitted.degree),
+    }
+
+
+def variables(study: Study) -> list[Variable]:
+    """Of a file of the scene's connection, without its coordinates."""
+    unit, lookups = study.scene.system.unit, study.lookups
+    found = of_connection(study.fitted, unit)
+    if len(study.fitted.axes) == 2:
+        found.append(of_ccf(study.curvature, unit))
+        name = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
+        found.append(of_ccf(study.curvature_error, unit, "ccf_error", name))
+    if "harmonic" in lookups:
+        found += of_harmonics(study.table("harmonic"), unit)
+    return found
+
+
+def of_connection(fitted: Connection, unit: str) -> list[Variable]:
+    """A, what its fit leaves, and the rms of xi. unit: of lengths, "BL" or "m"."""
+    angles = angles_of(fitted.axes)
+    units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+    left = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
+    speed = "rms of xi over directions of alphadot, |alphadot| = 1"
+    return [
+        Variable("A", ("component", "joint", *angles), fitted.A, units, "local connection"),
+        Variable("fit_residual", ("component", *angles), fitted.residual, units, left),
+        Variable("speed", ("component", *angles), fitted.speed, units, speed),
+    ]
+
+
+def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variable:
+    """A CCF, or its error."""
+    units = f"{UNITS[unit]} rad-2 (x, y), rad rad-2 (theta)"
+    said = said or "curvature constraint function of joints 1 and 2"
+    return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
+
+
+def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
+    """Coefficients of the odd harmonics of xi, and what they leave."""
+    angles = angles_of(table.axes)
+    units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+    name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
+    left = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
+    return [
+        Variable("harmonics", ("component", "coefficient", *angles), table.coefficients, units, name),
+        Variable("harmonics_residual", ("component", *angles), table.residual, units, left),
+    ]
+
+
+def angles_of(axes) -> tuple[str, ...]:
+    """Names of the axes of shape space."""
+    return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
+
+
+def angle_of(k: int) -> str:
+    """What alpha_k+1 is."""
+    return f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
 
 
 def about(scene: Scene) -> dict:
     """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
     system = scene.system
-    mean = "centre of mass, length-weighted mean heading"
+    meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
+    meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
     return {
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
         "frame": scene.frame,
-        "frame_meaning": f"body frame: {mean if scene.frame == 'mean' else 'centre and heading of that link, 1 the tail'}",
+        "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": "body length" if system.unit == "BL" else "m",
+        "length_unit": UNITS[system.unit],
         **system.about(),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
@@ -77,12 +149,9 @@ def _coordinates(file, fitted) -> None:
     variable._Encoding = "ascii"
     file.createDimension("joint", len(fitted.axes))
     file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
-    for k, axis in enumerate(fitted.axes):
-        name = f"alpha_{k + 1}"
+    for k, (name, axis) in enumerate(zip(angles_of(fitted.axes), fitted.axes)):
         file.createDimension(name, len(axis))
-        _variable(
-            file, name, axis, (name,), "rad", f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
-        )
+        _variable(file, name, axis, (name,), "rad", angle_of(k))
 
 
 def _variable(file, name, values, dimensions, units, long_name) -> None:

@@ -22,6 +22,7 @@ from geomech.study.cost import study as jobs
 from geomech.study.offer import methods
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
+from geomech.tiers.path import axes as field_axes
 
 AMPLITUDES = 10  # in the study that `run` makes of each gait
 SCENE, TABLES = "scene.toml", "displacement.json"
@@ -88,7 +89,8 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if own:
         return [float(f"{a:.3g}") for a in gait.amplitude * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
-    room = scene.numerics.extent - np.abs(np.array(gait.centre or 0.0)).max()
+    centre = np.array(gait.centre or (0.0,) * gait.joints)
+    room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), centre))
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
     top = np.copysign(0.999 * room / np.abs(unit).max(), gait.amplitude)

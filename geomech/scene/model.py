@@ -37,6 +37,9 @@ class Scene:
         if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
             self.system.note_angles(gait.largest(amplitudes))
 
+    def __repr__(self) -> str:
+        return f"Scene({self.name}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
+
     @property
     def frame(self) -> str:
         """The body frame of all velocities and displacements; the system's own."""

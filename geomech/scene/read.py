@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from geomech.errors import SceneError, UnitWarning, choose, named, short
-from geomech.files import read_text
+from geomech.files import note, read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.scene import slips
 from geomech.scene.medium import with_files
@@ -55,7 +55,10 @@ def load(scene: str | Path) -> Scene:
         raise SceneError(
             f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
         ) from None
-    return parse(text, str(scene))
+    made = parse(text, str(scene))
+    for line in getattr(made.system, "assumed", ()):
+        note(line)
+    return made
 
 
 def in_medium(scene: Scene, file: str | Path) -> Scene:
@@ -71,9 +74,10 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
 
 
 def inputs(scene: Scene) -> list[Path]:
-    """The files that a scene was read from: its own, unless it is built in, its medium's and its gait's."""
+    """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system."""
     own = [] if checked_scene(scene).name in builtin_names() else [scene.name]
-    return [Path(x) for x in (*own, *scene.files, getattr(scene.gait, "file", None)) if x]
+    named_in = (getattr(part, "file", None) for part in (scene.gait, scene.system))
+    return [Path(x) for x in (*own, *scene.files, *named_in) if x]
 
 
 def parse(text: str, name: str = "scene") -> Scene:
@@ -123,7 +127,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
 def _system(tables: Mapping, name: str) -> tuple[type, dict]:
     """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
     they may also be in its own table."""
-    table = dict(tables.get("system", {"kind": "swimmer"}))
+    table = dict(_located(tables.get("system", {"kind": "swimmer"}), name))
     kind = SYSTEMS[_kind(f"{name}: [system]", table, "kind", SYSTEMS)]
     del table["kind"]
     sizes = _Sizes(name, tables.get("physical", {}), tables.get("frame"))

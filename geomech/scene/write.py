@@ -41,8 +41,6 @@ def tables(scene: Scene) -> dict:
 
 def _anew(scene: Scene) -> dict:
     system, out = scene.system, {}
-    if scene.frame != "mean":
-        out["frame"] = scene.frame
     if isinstance(system, Swimmer):
         out["medium"] = _of_kind(system.medium, *PARTS["medium"])
         out["body"] = _of_kind(system.body, *PARTS["body"])
@@ -53,6 +51,8 @@ def _anew(scene: Scene) -> dict:
     for part in (out.get("body"), out.get("system")):
         if part and "frame" in part:
             del part["frame"]  # the scene's
+            if scene.frame != "mean":
+                out = {"frame": scene.frame, **out}
     out["gait"] = _of_kind(scene.gait, "kind", GAITS)
     out["numerics"] = _numerics(scene)
     if effects:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.connection import Connection, grid
+from geomech.connection import Connection
 from geomech.curvature import ccf
 from geomech.curvature import error as ccf_error
 from geomech.errors import SceneError, choose, named, real_array, short
@@ -19,6 +19,7 @@ from geomech.study import cost, estimate
 from geomech.study.offer import METHODS, lookups, methods, tiers
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
+from geomech.tiers.path import axes
 
 
 class Study:
@@ -29,6 +30,10 @@ class Study:
         if not isinstance(scene, Scene):
             raise ValueError(f"a study is that of a Scene, got {short(scene)}")
         self.scene, self._tables = scene, {} if tables is None else tables
+
+    def __repr__(self) -> str:
+        held = sorted({str(key[0]) for key in self._tables})
+        return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(held) or 'nothing yet'})"
 
     def turned(self, **numerics) -> Study:
         """The bench of the scene with some of its [numerics] changed; None keeps a value."""
@@ -93,8 +98,8 @@ class Study:
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
         system, n = self.scene.system, self.scene.numerics
         gait = self.scene.gait if gait is None else gait
-        axes, every = grid(system.joints, n.grid, n.extent), gait.amplitude if amplitudes is None else amplitudes
-        in_groups(lambda some: inside(axes, gait.cycle(n.phases, some)[0])[:, 0], every, system.at_once(n.phases))
+        field, every = axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+        in_groups(lambda some: inside(field, gait.cycle(n.phases, some)[0])[:, 0], every, system.at_once(n.phases))
 
     def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""

@@ -2,8 +2,8 @@
 
 Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the phases
 and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half the
-length; every other tier against the direct tier. Errors come in pairs: the distance between net positions, in body lengths,
-and between net headings, in rad.
+length; a table against half of its grid, and by what its fit left (`System.own_error`); every other tier against the
+direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net headings, in rad.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
     error += 2 * np.pi * (run.residual * run.speed)[:, None]
     if finer := system.finer():
         error += 1.2 * apart(finer.run(*every[1]).net, coarse, scene.system.length)
-    error += np.asarray(run.to_come)[..., None]
+    error += np.asarray(run.to_come)[..., None] + system.own_error(*every[2])
     return full, error, pieces_error(scene, shapes, every[1], coarse)
 
 

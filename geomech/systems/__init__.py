@@ -3,7 +3,19 @@
 from geomech.systems.base import Cycle, Plain, Premise, System, checked_system
 from geomech.systems.no_slip import NoSlipSnake
 from geomech.systems.swimmer import Solver, Swimmer
+from geomech.systems.table import Table
 
-KINDS = {"swimmer": Swimmer, "no-slip-snake": NoSlipSnake}
+KINDS = {"swimmer": Swimmer, "no-slip-snake": NoSlipSnake, "table": Table}
 
-__all__ = ["KINDS", "Cycle", "NoSlipSnake", "Plain", "Premise", "Solver", "Swimmer", "System", "checked_system"]
+__all__ = [
+    "KINDS",
+    "Cycle",
+    "NoSlipSnake",
+    "Plain",
+    "Premise",
+    "Solver",
+    "Swimmer",
+    "System",
+    "Table",
+    "checked_system",
+]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from geomech import summary
 from geomech.connection import evaluate
 from geomech.errors import check_angle, choose, real_array, short
 from geomech.reconstruct import displacement
@@ -32,6 +33,11 @@ class Cycle(NamedTuple):
     work: Any
     cycles: int
     to_come: np.ndarray
+
+    def __repr__(self) -> str:
+        size = f"{np.size(self.speed)} gaits of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}"
+        more = f"; {self.cycles} cycles" * (self.cycles > 1) + "; with work" * (self.work is not None)
+        return f"Cycle({size}; residual up to {np.max(self.residual, initial=0.0):.1e}{more})"
 
 
 class System(Protocol):
@@ -139,6 +145,15 @@ class Plain:
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
         return max(1, VALUES_TOGETHER // (phases * (self.joints + 6)))
+
+    def stored(self, name: str):
+        """Its own table, "connection" or "harmonics", where it is known by one; None where tables are computed."""
+        return None
+
+    def own_error(self, alpha, alphadot) -> np.ndarray:
+        """(..., 2), body lengths and rad: what the velocity itself leaves of the displacement of a gait given as in `run`;
+        0 for one that follows from a law."""
+        return np.zeros((*np.shape(alpha)[:-2], 2))
 
     def finer(self):
         """The system with its velocity computed more exactly, None where it is exact already."""

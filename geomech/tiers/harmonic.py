@@ -23,6 +23,8 @@ class Harmonic(Path):
         return max(24, (8 * numerics.harmonics) // 5)
 
     def table(self, system, numerics, *reach, progress=None):
+        if own := system.stored(self.looks_up):
+            return own
         count, degree = self.directions(system, numerics), numerics.interpolation
         grid = axes(system, numerics)
         return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, highest=numerics.harmonics)

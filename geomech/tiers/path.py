@@ -22,6 +22,8 @@ def path(fitted: Connection | Velocity, gait: Gait, amplitudes=None, phases: int
 def axes(system, numerics) -> tuple[np.ndarray, ...]:
     """Of the field; ValueError if there is none, or one too large."""
     system.refuse(Tier.needs, Tier.rests_on, "use the direct tier")
+    if own := system.stored("connection"):
+        return own.axes
     if numerics.grid**system.joints > LARGEST_GRID:
         raise ValueError(
             f"a field of {numerics.grid}^{system.joints} shapes is too large: lower [numerics] grid, or use "
@@ -31,8 +33,8 @@ def axes(system, numerics) -> tuple[np.ndarray, ...]:
 
 
 def shapes(system, numerics) -> int:
-    """Of the field, that are solved."""
-    return numerics.grid**system.joints // (2 if system.mirror else 1)
+    """Of the field, that are solved: none of one that is stored."""
+    return 0 if system.stored("connection") else numerics.grid**system.joints // (2 if system.mirror else 1)
 
 
 def zeros(system, numerics, components: tuple[int, ...]) -> Field:
@@ -59,6 +61,8 @@ class Path(Tier):
         return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
 
     def table(self, system, numerics, *reach, progress=None):
+        if own := system.stored(self.looks_up):
+            return own
         return connection.fit(
             system.velocity, axes(system, numerics), self.directions(system, numerics), numerics.interpolation,
             progress, system.mirror, singularity=system.singularity, trusted=True,

@@ -1,0 +1,36 @@
+"""Connections as MATLAB files in sysplotter's layout (`geomech.tables.mat`)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from geomech.errors import SceneError
+from geomech.files import whole_file
+from geomech.study.bench import Study
+from geomech.tables.mat import ABOUT, ENTRIES, RESIDUAL
+
+
+def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
+    """Write alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M), for xi = ``sign`` A alphadot; rows run over
+    alpha1 as of ndgrid, or over alpha2 as of meshgrid. Beside them ABOUT, a JSON text of sign, frame, body length, unit
+    and spline, and the fit residual (3, N, M). The file appears whole or not at all; SceneError for other than two joints."""
+    from scipy.io import savemat
+
+    scene, fitted = study.scene, study.fitted
+    if len(fitted.axes) != 2:
+        raise SceneError(f"{scene.name}: a .mat file takes a body of two joints: write a .nc file")
+    run = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
+    factor = 1.0 if sign == "+" else -1.0
+    shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
+    entries = dict(zip(ENTRIES, factor * fitted.A.reshape(6, *fitted.A.shape[2:])))
+    s = scene.system
+    about = {
+        "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": s.unit, "interpolation": fitted.degree,
+        "conventions": f"xi = {sign} A alphadot; alpha_k is the heading of link k+1 minus that of link k, link 1 the tail",
+    }  # fmt: skip
+    arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, RESIDUAL: fitted.residual}.items()}
+    with whole_file(path) as part:
+        savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)

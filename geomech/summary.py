@@ -1,0 +1,57 @@
+"""What a value says of itself in a line: shapes, ranges, units, and what a fit left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+ROWS = ("x", "y", "theta")
+
+
+def grid(axes: Sequence[np.ndarray]) -> str:
+    """Its shapes and their ranges."""
+    ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
+    alike = len(set(ranges)) == 1 and len(ranges) > 1
+    names = [f"alpha_{k + 1}" for k in range(len(axes))]
+    told = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if alike else ""
+    told = told or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
+    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {told} rad"
+
+
+def span(values) -> str:
+    """Smallest and largest of the numbers; "nothing" without any."""
+    values = np.asarray(values, float)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return "nothing"
+    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def spans(values) -> str:
+    """`span` of each of x, y and theta, on the first axis."""
+    return ", ".join(f"{row} {span(v)}" for row, v in zip(ROWS, values))
+
+
+def masked(values) -> str:
+    """How many shapes are singular, to be added; empty if none is."""
+    count = int(np.isnan(np.asarray(values)).any(0).sum())
+    return f"; {count} singular" if count else ""
+
+
+def left(residual, speed) -> str:
+    """What a fit left of each component, rms over all shapes, over the rms of xi."""
+    if np.isnan(residual).all():
+        return "fit residual unknown"
+    parts = [np.sqrt(np.nanmean(r**2) / max(np.nanmean(s**2), 1e-300)) for r, s in zip(residual, speed)]
+    return "fit leaves " + ", ".join(f"{row} {_percent(x)}" for row, x in zip(ROWS, parts)) + " of the rms of xi"
+
+
+def _percent(x: float) -> str:
+    return f"{100 * x:.2g} %" if x > 1e-8 else "0 %"
+
+
+def poses(values) -> str:
+    """The ranges of x, y and theta of poses or velocities (..., 3)."""
+    return spans(np.moveaxis(np.asarray(values, float).reshape(-1, 3), -1, 0))

@@ -1,0 +1,140 @@
+"""A table of the connection read from a file: what another run, another program or an experiment found.
+
+Where the file has the odd harmonics of the velocity beside A (`geomech.harmonics`), xi depends on the direction of
+alphadot as in the scene it came from, and A is its linear part; else xi = A alphadot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech import tables
+from geomech.errors import number, short
+from geomech.field import Field
+from geomech.reconstruct import displacement, trajectory
+from geomech.systems.base import Plain
+
+
+@dataclass(frozen=True)
+class Table(Plain):
+    """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout. file: in a scene from a file relative to
+    that file's folder, else to the current one. sign: "+" or "-" for xi = + or - A alphadot in the file, order: "ndgrid"
+    or "meshgrid"; if left out as the file says or shows (`tables.load`). body_length: of the body in the file's unit of
+    length, where the file does not say it: results are then in body lengths. sha256: of the file, filled in if left out;
+    given, the file must have it. The file is read once, when the system is made.
+
+    Its field has the file's own grid; [numerics] grid, extent, directions, harmonics and interpolation say nothing here.
+    """
+
+    file: str
+    sign: str = ""
+    order: str = ""
+    body_length: float = 1.0
+    sha256: str = ""
+
+    kind = "table"
+    kinks = True
+    together = 1 << 16
+
+    def __post_init__(self):
+        if not isinstance(self.file, (str, Path)):
+            raise ValueError(f"file must be the name of a .nc or .mat file, got {short(self.file)}")
+        object.__setattr__(self, "file", str(Path(self.file).absolute()))
+        for name in ("sign", "order", "sha256"):
+            if not isinstance(getattr(self, name), str):
+                raise ValueError(f"{name} must be text, got {short(getattr(self, name))}")
+        number("body_length", self.body_length, 1e-9, 1e9)
+        held = tables.load(self.file, self.sign, self.order)
+        if self.sha256.lower() not in ("", held.sha256):
+            raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")
+        if held.connection.field.masked:
+            raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those")
+        if self.body_length != 1.0 and (held.unit, held.length) != ("BL", 1.0):
+            raise ValueError(
+                f"{self.file} says the body's length itself, {held.length:g} {held.unit}: drop body_length"
+            )
+        object.__setattr__(self, "sha256", held.sha256)
+        object.__setattr__(self, "held", tables.scaled(held, 1.0 / self.body_length))
+
+    def __reduce__(self):
+        return Table, (self.file, self.sign, self.order, self.body_length, self.sha256)
+
+    joints = property(lambda self: len(self.held.connection.axes))
+    length = property(lambda self: self.held.length)
+    unit = property(lambda self: self.held.unit)
+    frame = property(lambda self: self.held.frame)
+    mirror = property(lambda self: self.held.mirror)
+    linear = property(lambda self: self.held.harmonics is None)
+
+    def in_frame(self, frame: str) -> Table:
+        raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
+
+    def stored(self, name: str):
+        return {"connection": self.held.connection, "harmonics": self.held.harmonics}.get(name)
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) looked up; ValueError outside the table's grid."""
+        return self.held.table.velocity(alpha, alphadot)
+
+    def single(self, alpha, alphadot) -> dict:
+        """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, nan if unknown."""
+        told = super().single(alpha, alphadot)
+        left = np.linalg.norm(self._left(np.asarray(alpha, float), np.asarray(alphadot, float)))
+        return {**told, "status": "looked up", "residual": float(left)}
+
+    def _left(self, alpha, alphadot) -> np.ndarray:
+        """(..., 3): rms of what A, or the harmonics, leave of xi at a shape, for alphadot of that length."""
+        table = self.held.table
+        return Field(table.axes, table.residual, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
+
+    def own_error(self, alpha, alphadot) -> np.ndarray:
+        """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
+        lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
+        sums up like a random walk of k steps."""
+        xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
+        net = displacement(xi)
+        halves = [displacement(half.velocity(alpha, alphadot)) for half in self.held.halves]
+        apart = [np.stack([np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]], -1) for h in halves]
+        error = np.maximum(*apart)
+        if self.held.told:
+            pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
+            lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
+            left = self._left(alpha, alphadot)
+            along = np.stack([np.hypot(left[..., 0], left[..., 1]) + lever * left[..., 2], left[..., 2]], -1)
+            error += 2 * np.pi * along.mean(-2) / np.sqrt(self.held.highest)
+        return error / [self.length, 1.0]
+
+    def about(self) -> dict:
+        return {"table": self.file.encode("utf-8", "backslashreplace"), "table_sha256": self.sha256}
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the file leaves open, and how it is taken."""
+        return tuple(f"{self.file}: {line}" for line in self.held.said)
+
+    def told(self) -> list[str]:
+        held = self.held
+        lines = [f"table ({self.file}: {held.connection!r})"]
+        if held.harmonics:
+            lines.append(
+                f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}"
+            )
+        else:
+            lines.append("A alone: xi = A alphadot is taken as exact, and what the fit left is part of every error")
+        if not held.told:
+            lines.append("the file does not tell what its fit left: errors are those of the grid alone")
+        lines.append(
+            f"stored as {tables.SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}"
+        )
+        return [
+            *lines,
+            *held.said,
+            "its field has the grid of the file; [numerics] grid, extent and directions say nothing",
+        ]
+
+    @property
+    def because(self) -> str:
+        return "(the velocity at every shape, looked up)"

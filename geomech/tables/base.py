@@ -1,0 +1,156 @@
+"""What a file of a connection holds, and how it is checked."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.errors import SceneError, choose
+from geomech.files import read, why
+from geomech.gaits import Circle
+from geomech.harmonics import Harmonics
+from geomech.reconstruct import displacement
+
+LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
+LARGEST_ANGLE = 4 * np.pi  # rad of a shape variable, beyond which it is taken for degrees
+LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
+SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
+ORDERS = ("ndgrid", "meshgrid")
+ROWS = ("x", "y", "theta")
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
+
+    harmonics: the odd harmonics of xi beside A, where the file has them. length: of the body, in ``unit``, "BL" or "m".
+    frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
+    the file."""
+
+    connection: Connection
+    harmonics: Harmonics | None = None
+    length: float = 1.0
+    unit: str = "BL"
+    frame: str = "that of the table"
+    sign: str = "+"
+    order: str = "ndgrid"
+    said: tuple[str, ...] = ()
+    sha256: str = ""
+
+    @property
+    def table(self) -> Connection | Harmonics:
+        """What the velocity is looked up in."""
+        return self.harmonics or self.connection
+
+    @property
+    def highest(self) -> int:
+        """Harmonic that is kept; 1 for A alone."""
+        return self.harmonics.highest if self.harmonics else 1
+
+    @property
+    def told(self) -> bool:
+        """Whether the file tells what its fit left of the velocity."""
+        return bool(np.isfinite(self.table.residual).any())
+
+    @cached_property
+    def halves(self) -> tuple[Connection | Harmonics, ...]:
+        """`table` on every second point of each axis, from the first and from the second, with both ends kept."""
+        return self.table.half(0), self.table.half(1)
+
+    @cached_property
+    def mirror(self) -> bool:
+        """Whether left and right are alike: A_x even, A_y and A_theta of A odd times odd, to rounding."""
+        c = self.connection
+        if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
+            return False
+        there = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(3, 1, *[1] * len(c.axes))
+        return bool(np.abs(there - c.A).max() <= 1e-9 * np.abs(c.A).max())
+
+
+def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
+    """The connection in a file of `geomech connection`, .nc or .mat; SceneError, one line, if it holds none.
+
+    sign: "+" or "-" for xi = + or - A alphadot; if left out as the file says, or made out (`detected_sign`). order:
+    "ndgrid" or "meshgrid", the way arrays of a .mat file run; if left out as alpha1 and alpha2 in it run."""
+    from geomech.tables import mat, netcdf
+
+    readers = {".nc": netcdf.parse, ".mat": mat.parse}
+    path = Path(path)
+    if path.suffix.lower() not in readers:
+        raise SceneError(f"cannot read the table {path}: end the name in {' or '.join(readers)}")
+    for what, word, known in (("sign", sign, SIGNS), ("order", order, ORDERS)):
+        if word != "":
+            choose(what, word, known)
+    try:
+        raw = read(path, LARGEST)
+    except (OSError, ValueError) as error:
+        raise SceneError(f"cannot read the table {path}: {why(error)}") from None
+    try:
+        return readers[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
+    except ValueError as error:
+        raise SceneError(f"the table {path} {error}") from None
+
+
+def scaled(held: Stored, factor: float) -> Stored:
+    """The same with all lengths times ``factor``."""
+    if factor == 1.0:
+        return held
+    by = np.array([factor, factor, 1.0])
+    times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
+    c, h = held.connection, held.harmonics
+    c = Connection(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree)
+    h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
+    return replace(held, connection=c, harmonics=h)
+
+
+def checked_axis(name: str, values: np.ndarray) -> np.ndarray:
+    """values (N,) as ascending angles, or ValueError."""
+    axis = numbers(name, values)
+    if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
+        raise ValueError(f"has no grid: {name} must be at least 4 ascending angles in rad")
+    if (largest := np.abs(axis).max()) > LARGEST_ANGLE:
+        raise ValueError(f"has {name} up to {largest:.4g} where angles are in rad: convert it if these are degrees")
+    return axis
+
+
+def numbers(name: str, values) -> np.ndarray:
+    """values as floats in the machine's order of bytes; ValueError if they are none, or not finite."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"has {name} that is no array of real numbers")
+    array = array.astype(float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}: mend it")
+    if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
+        raise ValueError(f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}: mend it")
+    return array
+
+
+def _first(bad: np.ndarray) -> str:
+    return "index (" + ", ".join(map(str, np.argwhere(bad)[0])) + ")"
+
+
+def rms(A: np.ndarray, residual: np.ndarray | None = None) -> np.ndarray:
+    """(3, N_1, ...): rms of xi over uniform directions of alphadot, from A (3, d, N_1, ...) and its fit residual."""
+    return np.sqrt((A**2).mean(1) + (0.0 if residual is None else residual**2))
+
+
+def detected_sign(connection: Connection) -> str:
+    """ "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two joints that meets more drag across than along.
+
+    With alpha_k the heading of link k+1 minus that of link k, a counter-clockwise circle then carries it backwards, as
+    its CCF_x is negative about the straight shape, in every frame of the body (Hatton et al., PRL 110, 078101 (2013)).
+    ValueError where both signs, or neither, would have it so."""
+    half = min(float(a[-1] - a[0]) / 2 for a in connection.axes)
+    centre = tuple(float(a[0] + a[-1]) / 2 for a in connection.axes)
+    alpha, alphadot = Circle(centre=centre).cycle(64, [0.3 * half, 0.5 * half])
+    xi = connection.velocity(alpha, alphadot)
+    for sign, value in (("+", 1.0), ("-", -1.0)):
+        if (displacement(value * xi)[:, 0] < 0).all() and (displacement(-value * xi)[:, 0] > 0).all():
+            return sign
+    raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")

@@ -1,0 +1,115 @@
+"""A connection from the NetCDF file that `geomech connection` wrote (`geomech.output.netcdf`)."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.harmonics import Harmonics
+from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, numbers, rms
+
+SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
+UNITS = {"body length": "BL", "m": "m"}
+ANGLES = ("rad", "radian", "radians")
+
+
+def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
+    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
+    if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
+        raise ValueError(_what_else(raw))
+    if order not in ("", "ndgrid"):
+        raise ValueError("names its dimensions: drop order")
+    from scipy.io import netcdf_file
+
+    try:  # what is damaged makes SciPy raise whatever comes first
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            file = netcdf_file(io.BytesIO(raw), mmap=False)
+            found = {name: (tuple(v.dimensions), np.array(v[:])) for name, v in file.variables.items()}
+            units = {name: _text(getattr(v, "units", b"")) for name, v in file.variables.items()}
+            told = {name: value for name, value in vars(file).items() if not name.startswith("_")}
+    except Exception:
+        raise ValueError(f"is damaged or cut short: {SOURCE}") from None
+    return _stored(found, units, told, sign, sha256)
+
+
+def _what_else(raw: bytes) -> str:
+    if raw[:4] == b"\x89HDF":
+        return "is NetCDF-4 (HDF5): save it as classic NetCDF, from xarray by to_netcdf(..., format='NETCDF3_64BIT')"
+    return f"is no NetCDF file{', but a MATLAB one: end its name in .mat' if raw[:6] == b'MATLAB' else f': {SOURCE}'}"
+
+
+def _text(value) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Stored:
+    joints = len(found["joint"][1]) if "joint" in found and found["joint"][1].ndim == 1 else 0
+    names = tuple(f"alpha_{k + 1}" for k in range(joints))
+    if missing := [name for name in ("joint", *names, "A", "fit_residual") if name not in found]:
+        raise ValueError(f"holds no connection, {missing[0]} is missing: {SOURCE}")
+    for name in names:
+        if units[name] not in ("", *ANGLES):
+            raise ValueError(f"has {name} in {units[name]!r}: shapes are angles in rad")
+    axes = tuple(checked_axis(name, found[name][1]) for name in names)
+    pick = lambda name, *lead: _array(found, name, (*lead, *names), axes)
+    A, residual = pick("A", "component", "joint"), pick("fit_residual", "component")
+    if A.shape[:2] != (3, joints) or residual.shape[0] != 3 or not _rows(found):
+        raise ValueError(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
+    masked = np.isnan(A).any((0, 1))
+    _masks("A", A, masked, told)
+    unknown = np.isnan(residual).all()
+    _masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
+    speed = pick("speed", "component") if "speed" in found else rms(A, residual)
+    length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))
+    length = float(length) if np.ndim(length) == 0 and np.asarray(length).dtype.kind in "iuf" else np.nan
+    if unit is None or not 0 < length < 1e9:
+        raise ValueError(f"has a body_length or length_unit that makes no sense: {SOURCE}")
+    degree = int(d) if (d := told.get("interpolation", 3)) in (1, 2, 3, 4, 5) else 3
+    if min(map(len, axes)) <= degree:
+        raise ValueError(f"has too few shapes for a spline of degree {degree}: {SOURCE}")
+    stated = next((s for s, text in SIGNS.items() if text == _text(told.get("sign_of_A", b""))), "+")
+    sign = sign or stated
+    turn = 1.0 if sign == "+" else -1.0
+    harmonics = None
+    if "harmonics" in found and not masked.any():
+        rows = pick("harmonics", "component", "coefficient")
+        left = pick("harmonics_residual", "component") if "harmonics_residual" in found else residual
+        if rows.shape[0] != 3 or left.shape[0] != 3 or rows.shape[1] % 2 or not rows.size:
+            raise ValueError(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
+        harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
+    connection = Connection(axes, turn * A, residual, speed, degree)
+    frame = _text(told.get("frame", b"that of the table"))
+    return Stored(connection, harmonics, length, unit, frame, sign, "ndgrid", (), sha256)
+
+
+def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:
+    """A variable, or ValueError unless its dimensions are those, in that order, and its shape ends in the grid's."""
+    given, values = found[name]
+    if given != dimensions:
+        raise ValueError(f"has {name} over ({', '.join(given)}) where it must be ({', '.join(dimensions)}): {SOURCE}")
+    if values.dtype.kind != "f" or values.shape[-len(axes) :] != tuple(map(len, axes)):
+        raise ValueError(f"has {name} of shape {values.shape} that does not fit its grid: {SOURCE}")
+    return values.astype(float)
+
+
+def _rows(found: dict) -> bool:
+    """Whether the components are x, y and theta, in that order, if they are named."""
+    if "component" not in found:
+        return True
+    names = found["component"][1]
+    if names.dtype.kind == "S" and names.ndim == 2:
+        names = [b"".join(row).rstrip(b"\0 ").decode("ascii", "replace") for row in names]
+    return [str(name) for name in names] == list(ROWS)
+
+
+def _masks(name: str, values: np.ndarray, masked: np.ndarray, told: dict) -> None:
+    """ValueError where values are nan elsewhere than at singular shapes, of which the file must speak, or not all there."""
+    if masked.any() and "singular_shapes" not in told:
+        numbers(name, values)
+    if not np.isnan(values[..., masked]).all():
+        raise ValueError(f"has {name} at singular shapes, where A is nan: {SOURCE}")
+    numbers(name, np.where(masked, 0.0, values))

@@ -1,0 +1,412 @@
+"""Connections in files: read back as they were, predicting what the scene they came from predicts, and never believed."""
+
+import io
+import json
+import pickle
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat, netcdf_file, savemat
+
+import rft
+from geomech import cli, tables
+from geomech import scene as scenes
+from geomech.connection import Connection
+from geomech.errors import SceneError
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
+from geomech.output import mat, netcdf, plots
+from geomech.output.explain import explain
+from geomech.scene import Numerics, Scene
+from geomech.study.accuracy import KNOBS
+from geomech.study.bench import Study
+from geomech.systems import NoSlipSnake, Swimmer, Table
+from rft.media import CATALOGUE
+
+GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
+UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
+GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
+
+
+def study(medium=GLASS, body=UNEVEN, **numerics):
+    return Study(Scene(Swimmer(medium, body), GAIT, Numerics(**{"grid": 9, "extent": 2.0, "harmonics": 5, **numerics})))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a.nc and a.mat of a table in a generic frame, and its study."""
+    folder, s = tmp_path_factory.mktemp("tables"), study()
+    netcdf.save_connection(folder / "a.nc", s)
+    mat.save_connection(folder / "a.mat", s)
+    return folder, s
+
+
+def same(a: Connection, b: Connection):
+    assert len(a.axes) == len(b.axes) and a.degree == b.degree
+    for x, y in zip((*a.axes, a.A, a.residual, a.speed), (*b.axes, b.A, b.residual, b.speed)):
+        np.testing.assert_array_equal(x, y)
+
+
+def test_netcdf_gives_back_every_digit(made):
+    folder, s = made
+    same(Connection.load(folder / "a.nc"), s.fitted)
+    held = tables.load(folder / "a.nc")
+    np.testing.assert_array_equal(held.harmonics.coefficients, s.table("harmonic").coefficients)
+    np.testing.assert_array_equal(held.harmonics.residual, s.table("harmonic").residual)
+    assert (held.length, held.unit, held.frame, held.sign, held.said) == (0.3, "m", "link-1", "+", ())
+    assert held.mirror and not tables.load(folder / "a.mat").harmonics
+
+
+def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
+    wave = Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
+    five = Study(Scene(Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))), wave, Numerics(grid=5, extent=1.1, interpolation=2)))
+    netcdf.save_connection(tmp_path / "a.nc", five)
+    same(Connection.load(tmp_path / "a.nc"), five.fitted)
+    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == ("adapted", "path", "direct")
+    snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
+    netcdf.save_connection(tmp_path / "b.nc", snake)
+    same(Connection.load(tmp_path / "b.nc"), snake.fitted)
+    with pytest.raises(ValueError, match="has singular shapes"):
+        Table(tmp_path / "b.nc")
+
+
+@pytest.mark.parametrize("sign", "+-")
+@pytest.mark.parametrize("order", ["ndgrid", "meshgrid"])
+def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
+    _, s = made
+    mat.save_connection(tmp_path / "a.mat", s, sign, order)
+    found = loadmat(tmp_path / "a.mat")
+    A = found["Ay2"] if order == "ndgrid" else found["Ay2"].T
+    np.testing.assert_array_equal(A, (1 if sign == "+" else -1) * s.fitted.A[1, 1])
+    run = np.meshgrid(*s.fitted.axes, indexing="ij" if order == "ndgrid" else "xy")
+    np.testing.assert_array_equal([found["alpha1"], found["alpha2"]], run)
+    again = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
+    np.testing.assert_array_equal(again.fitted.A, s.fitted.A)
+    np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
+    assert (again.scene.system.unit, again.scene.system.length, again.scene.frame) == ("m", 0.3, "link-1")
+    mat.save_connection(tmp_path / "b.mat", again, sign, order)
+    more = loadmat(tmp_path / "b.mat")
+    for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
+        np.testing.assert_array_equal(more[name], found[name])
+
+
+def plain_mat(path, c: Connection, sign=1.0, order="ndgrid", **more):
+    """As sysplotter has it, and nothing beside."""
+    run = (lambda x: x) if order == "ndgrid" else np.transpose
+    shapes = np.meshgrid(*c.axes, indexing="ij")
+    rows = {f"A{row}{k + 1}": run(sign * c.A[i, k]) for i, row in enumerate(("x", "y", "theta")) for k in (0, 1)}
+    savemat(path, {"alpha1": run(shapes[0]), "alpha2": run(shapes[1]), **rows, **more})
+
+
+@pytest.mark.parametrize("frame", ["mean", "link-1", "link-2", "link-3"])
+@pytest.mark.parametrize("medium", [GLASS, rft.Viscous(2.0), rft.Granular(6.0, 0.3)])
+def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
+    c = study(medium, rft.Chain((1, 1.3, 0.8), frame=frame)).fitted
+    for sign, order in ((1.0, "meshgrid"), (-1.0, "ndgrid")):
+        plain_mat(tmp_path / "a.mat", c, sign, order)
+        held = tables.load(tmp_path / "a.mat")
+        assert (held.sign, held.order) == ("+" if sign > 0 else "-", order)
+        assert "its sign is made out as xi = " + held.sign in held.said[-1]
+        np.testing.assert_array_equal(held.connection.A, c.A)
+        assert np.isnan(held.connection.residual).all() and not held.told
+        told = tables.load(tmp_path / "a.mat", sign="+")
+        np.testing.assert_array_equal(told.connection.A, sign * c.A)
+        assert not [line for line in told.said if "sign" in line]
+
+
+def test_a_sign_that_cannot_be_made_out_is_asked_for(tmp_path):
+    c = study().fitted
+    plain_mat(tmp_path / "a.mat", Connection(c.axes, np.ones_like(c.A), c.residual, c.speed))
+    with pytest.raises(SceneError, match=r"a\.mat does not tell the sign of A: say sign = '\+'"):
+        tables.load(tmp_path / "a.mat")
+    assert tables.load(tmp_path / "a.mat", "-").connection.A[0, 0, 0, 0] == -1
+
+
+def test_rows_of_angles_need_an_order(tmp_path):
+    c = study(grid=7).fitted
+    plain_mat(tmp_path / "a.mat", c)
+    found = {k: v for k, v in loadmat(tmp_path / "a.mat").items() if k[0] != "_"}
+    savemat(tmp_path / "a.mat", {**found, "alpha1": c.axes[0], "alpha2": c.axes[1]})
+    with pytest.raises(SceneError, match="leave the order open: say order"):
+        tables.load(tmp_path / "a.mat")
+    np.testing.assert_array_equal(tables.load(tmp_path / "a.mat", order="ndgrid").connection.A, c.A)
+    plain_mat(tmp_path / "a.mat", c)
+    with pytest.raises(SceneError, match="arrays that run as ndgrid's"):
+        tables.load(tmp_path / "a.mat", order="meshgrid")
+
+
+BODIES = {"even": rft.Chain((1, 1, 1)), "uneven": UNEVEN, "short head": rft.Chain((1, 1.3, 0.6), frame="link-2")}
+GAITS = (
+    Circle(),
+    Circle(centre=(0.4, -0.3), reverse=True),
+    Butterfly(),
+    Ellipse(semi_axes=(1, 0.4), tilt=0.7, centre=(-0.3, 0.2)),
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "medium", "ending"),
+    [
+        ("even", GLASS, ".nc"), ("uneven", GLASS, ".nc"), ("short head", CLOSE, ".nc"), ("uneven", rft.Viscous(2.0), ".nc"),
+        ("uneven", CLOSE, ".mat"), ("even", rft.Viscous(3.0), ".mat"),
+    ],
+)  # fmt: skip
+def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium, ending, tmp_path):
+    source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
+    (netcdf if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
+    ratios, length = [], source.scene.system.length
+    for gait in GAITS:
+        amplitudes = [0.3, 0.8, 1.2]
+        true = source.displacement("direct", gait, amplitudes)
+        told = table.study(amplitudes, ["area", "path", "harmonic", "direct"], gait)
+        for tier in ("area", "path", "harmonic", "direct"):
+            off = np.array(told[tier]) - true
+            assert (np.hypot(*off.T[:2]) / length <= np.array(told["estimate"][tier]) + 1e-12).all(), (tier, gait)
+            assert (np.abs(off[:, 2]) <= np.array(told["estimate_heading"][tier]) + 1e-12).all(), (tier, gait)
+        ratios += list(
+            np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]) * length
+        )
+        for tier in ("area", "path"):  # of the same connection
+            np.testing.assert_allclose(
+                told[tier], source.turned(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
+            )
+    assert np.median(ratios) < 60  # honest, not helpless
+    if ending == ".nc" and medium.dry:
+        assert max(told["estimate"]["direct"]) < 0.02  # by its harmonics: of A alone it is 0.1 or more
+
+
+def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch, capsys):
+    folder, s = made
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plots, "save", lambda fig, path: Path(path).touch())
+    (tmp_path / "t").mkdir()
+    (tmp_path / "t" / "a.nc").write_bytes((folder / "a.nc").read_bytes())
+    text = '[system]\nkind = "table"\nfile = "a.nc"\n[gait]\nkind = "circle"\namplitude = 0.8\n'
+    (tmp_path / "t" / "t.toml").write_text(text)
+
+    def run(*args):
+        monkeypatch.setattr("sys.argv", ["geomech", *args])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err
+
+    for args in (
+        ("velocity", "t/t.toml", "--alpha", "0.5,0.3", "--alphadot", "1,0", "--json"),
+        ("connection", "t/t.toml", "-o", "b.nc"),
+        ("connection", "t/t.toml", "-o", "b.mat", "--sign", "-"),
+        ("ccf", "t/t.toml", "--plot", "a.png"),
+        ("displacement", "t/t.toml", "--amplitudes", "0.4,0.8", "--json"),
+        ("sweep", "t/t.toml", "--over", "gait.amplitude=0.4,0.8", "-o", "s.nc"),
+        ("explain", "t/t.toml"),
+        ("run", "t/t.toml", "-o", "out"),
+    ):
+        code, out, err = run(*args)
+        assert (code, err) == (0, ""), (args, err)
+        if args[0] == "velocity":
+            xi = tables.load(folder / "a.nc").harmonics.velocity(np.array([0.5, 0.3]), np.array([1.0, 0.0]))
+            np.testing.assert_allclose(json.loads(out)["xi"], xi)
+    same(Connection.load("b.nc"), s.fitted)
+    assert run("displacement", "t/t.toml", "--amplitudes", "5")[0] == 2
+    before = (tmp_path / "t" / "a.nc").read_bytes()
+    for args, said in (
+        (("connection", "t/t.toml", "-o", "t/a.nc"), "it is an input"),
+        (("ccf", "t/t.toml", "--plot", "a.png", "--grid", "9"), "has its file's own grid: drop --grid"),
+        (("connection", "t/t.toml", "-o", "c.nc", "--sign", "-"), "--sign is that of a .mat file"),
+        (("connection", "t/t.toml", "-o", "c.mat", "--sign", "x"), "use one of +, -"),
+    ):
+        code, out, err = run(*args)
+        assert (code, out) == (2, "") and said in err and err.count("\n") == 1
+    assert (tmp_path / "t" / "a.nc").read_bytes() == before
+    told = explain(scenes.load("t/t.toml"))
+    assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
+    assert not [k for k in KNOBS if k.applies(scenes.load("t/t.toml")) and k.name in ("grid", "directions")]
+    written = scenes.toml(Scene(Table("t/a.nc"), Circle()))
+    assert scenes.parse(written).system == Table("t/a.nc")
+    again = pickle.loads(pickle.dumps(Table("t/a.nc")))
+    assert again == Table("t/a.nc") and len(pickle.dumps(again)) < 1000
+
+
+def test_a_table_is_told_its_unit_once(made, tmp_path):
+    folder, s = made
+    with pytest.raises(ValueError, match="says the body's length itself, 0.3 m: drop body_length"):
+        Table(folder / "a.mat", body_length=3.0)
+    with pytest.raises(ValueError, match="is not the file whose sha256 is given"):
+        Table(folder / "a.mat", sha256="0" * 64)
+    plain_mat(tmp_path / "a.mat", s.fitted)
+    thirds, ones = Table(tmp_path / "a.mat", body_length=3.0), Table(tmp_path / "a.mat")
+    assert thirds.unit == ones.unit == "BL"
+    xi = ones.velocity([0.2, 0.4], [1.0, -0.5])
+    np.testing.assert_allclose(thirds.velocity([0.2, 0.4], [1.0, -0.5]), xi / [3, 3, 1], rtol=1e-13)
+    with pytest.raises(ValueError, match="has the frame it was made in"):
+        ones.in_frame("mean")
+
+
+def altered(raw, **changes):
+    """The bytes of a NetCDF file with variables replaced, renamed or left out (None), or their dimensions turned round."""
+    out = io.BytesIO()
+    with netcdf_file(io.BytesIO(raw), mmap=False) as old, netcdf_file(out, "w", version=2) as new:
+        for key, value in vars(old).items():
+            if key.startswith("_") or key in (
+                "fp",
+                "filename",
+                "mode",
+                "dimensions",
+                "variables",
+                "version_byte",
+                "use_mmap",
+                "maskandscale",
+            ):
+                continue
+            setattr(new, key, changes.pop(key, value))
+        for name, size in old.dimensions.items():
+            new.createDimension(name, changes.get("size", {}).get(name, size))
+        for name, v in old.variables.items():
+            change = changes.get(name, lambda x: x)
+            if change is None:
+                continue
+            dims = tuple(reversed(v.dimensions)) if changes.get("turned") == name else v.dimensions
+            values = np.asarray(change(v[:].copy()))
+            w = new.createVariable(name, v.typecode(), dims)
+            w[:] = values.transpose() if changes.get("turned") == name else values
+            w.units = changes.get("units", {}).get(name, getattr(v, "units", b""))
+        new.flush()
+        return out.getvalue()
+
+
+def put(where, value):
+    def change(x):
+        x[where] = value
+        return x
+
+    return change
+
+
+BAD = {
+    "missing": ({"A": None}, "A is missing"),
+    "no axis": ({"alpha_2": None}, "alpha_2 is missing"),
+    "nan": ({"A": put((1, 0, 2, 3), np.nan)}, r"A that is not finite \(nan or inf\) at index \(1, 0, 2, 3\)"),
+    "inf": ({"fit_residual": put((1, 2, 3), np.inf)}, "fit_residual that is not finite"),
+    "nan of harmonics": ({"harmonics": put((1, 2, 3, 0), np.nan)}, "harmonics that is not finite"),
+    "huge": ({"A": lambda x: 1e200 * x}, "above 1e\\+09"),
+    "degrees": (
+        {"alpha_1": np.degrees},
+        "alpha_1 up to 114.6 where angles are in rad: convert it if these are degrees",
+    ),
+    "units": ({"units": {"alpha_1": "degrees"}}, "alpha_1 in 'degrees'"),
+    "not ascending": ({"alpha_2": lambda x: x[::-1]}, "alpha_2 must be at least 4 ascending"),
+    "turned": ({"turned": "A"}, r"A over \(alpha_2, alpha_1, joint, component\) where it must be"),
+    "unit": ({"length_unit": b"furlong"}, "length_unit that makes no sense"),
+    "length": ({"body_length": -1.0}, "body_length"),
+    "component": ({"component": lambda x: x[::-1]}, "rows x, y, theta"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
+    changes, said = BAD[name]
+    raw = (made[0] / "a.nc").read_bytes()
+    (tmp_path / "a.nc").write_bytes(altered(raw))
+    tables.load(tmp_path / "a.nc")  # as it is it is good
+    (tmp_path / "a.nc").write_bytes(altered(raw, **changes))
+    with pytest.raises(SceneError, match=said) as caught:
+        tables.load(tmp_path / "a.nc")
+    assert str(caught.value).startswith(f"the table {tmp_path / 'a.nc'} ")
+    text = f'[system]\nkind = "table"\nfile = "{tmp_path}/a.nc"\n[gait]\nkind = "circle"\n'
+    with pytest.raises(SceneError, match=said):
+        scenes.parse(text, "s.toml")
+
+
+@pytest.mark.parametrize("ending", ["nc", "mat"])
+def test_damaged_files_are_refused_in_one_line(ending, made, tmp_path):
+    """Cut short anywhere, or with bytes changed: refused in one line, or read as a table that is finite."""
+    raw, path = (made[0] / f"a.{ending}").read_bytes(), tmp_path / f"a.{ending}"
+    rng = np.random.default_rng(1)
+    cuts = [raw[:n] for n in (0, 3, 10, 127, 130, 500, 2000, len(raw) // 2, len(raw) - 9)]
+    some = [bytearray(raw) for _ in range(150)]
+    for changed in some:
+        for k in rng.integers(0, 4000, rng.integers(1, 6)):
+            changed[k % len(raw)] = rng.integers(256)
+    for k, bad in enumerate(cuts + some):
+        path.write_bytes(bad)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            held, said = read(path)
+        assert (held is None) != (said == "")
+        assert said == "" or (said.startswith(f"the table {path} ") and "\n" not in said)
+        assert held is None or (k >= len(cuts) and np.isfinite(held.connection.A).all())
+
+
+def read(path):
+    """(table, "") or (None, what is wrong with the file)."""
+    try:
+        return tables.load(path), ""
+    except SceneError as error:
+        return None, str(error)
+
+
+def test_endings_that_lie(made, tmp_path):
+    folder, _ = made
+    nc, mat_file = (folder / "a.nc").read_bytes(), (folder / "a.mat").read_bytes()
+    hdf = b"\x89HDF\r\n\x1a\n" + bytes(600)
+    old = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(384) + hdf
+    for name, raw, said in (
+        ("a.mat", nc, "is no MATLAB file, but a NetCDF one: end its name in .nc"),
+        ("a.nc", mat_file, "is no NetCDF file, but a MATLAB one: end its name in .mat"),
+        ("a.nc", hdf, r"is NetCDF-4 \(HDF5\): save it as classic NetCDF"),
+        ("a.mat", hdf, r"is a MATLAB 7.3 \(HDF5\) file: save it in MATLAB by"),
+        ("a.mat", old, r"is a MATLAB 7.3 \(HDF5\) file"),
+        ("a.mat", b"t,x,y\n1,2,3\n", "no MATLAB file"),
+        ("a.nc", b"t,x,y\n1,2,3\n", "is no NetCDF file: write it anew"),
+        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .nc or .mat"),
+    ):
+        (tmp_path / name).write_bytes(raw)
+        with pytest.raises(SceneError, match=said):
+            Connection.load(tmp_path / name)
+    with pytest.raises(SceneError, match="cannot read the table .*No such file"):
+        Connection.load(tmp_path / "none.nc")
+    (tmp_path / "d.nc").mkdir()
+    with pytest.raises(SceneError, match="no ordinary file"):
+        Connection.load(tmp_path / "d.nc")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"Ay2": None}, "has no Ay2: a connection is alpha1, alpha2, Ax1"),
+        ({"Ay2": np.zeros((9, 8))}, r"Ay2 of shape \(9, 8\) where alpha1 and alpha2 make it \(9, 9\)"),
+        ({"Ax1": np.full((9, 9), np.nan)}, "Ax1 that is not finite"),
+        ({"Ax1": np.full((9, 9), 1j)}, "Ax1 that is no array of real numbers"),
+        ({"Ax1": "text"}, "Ax1 that is no array of real numbers"),
+        ({"Ax1": {"a": 1}}, "Ax1 that is no array of real numbers"),
+        ({"alpha1": np.ones((9, 9))}, "alpha1 must be at least 4 ascending angles"),
+        ({"alpha1": np.arange(81.0).reshape(9, 9) / 81}, "span no grid"),
+        ({"alpha1": np.ones((3, 3, 3))}, "span no grid"),
+        ({"degrees": True}, "alpha1 up to 114.6 where angles are in rad"),
+    ],
+)
+def test_bad_mat_is_refused_in_one_line(changes, said, made, tmp_path):
+    plain_mat(tmp_path / "a.mat", made[1].fitted)
+    found = {k: v for k, v in loadmat(tmp_path / "a.mat").items() if k[0] != "_"}
+    if changes.pop("degrees", False):
+        changes = {k: np.degrees(found[k]) for k in ("alpha1", "alpha2")}
+    found = {k: v for k, v in {**found, **changes}.items() if v is not None}
+    for compressed in (False, True):
+        savemat(tmp_path / "a.mat", found, do_compression=compressed)
+        with pytest.raises(SceneError, match=said):
+            tables.load(tmp_path / "a.mat")
+
+
+def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path, monkeypatch):
+    c = made[1].fitted
+    plain_mat(tmp_path / "a.mat", c)
+    found = {k: v for k, v in loadmat(tmp_path / "a.mat").items() if k[0] != "_"}
+    for options in ({"do_compression": True}, {"format": "4"}):
+        savemat(tmp_path / "a.mat", found, **options)
+        np.testing.assert_array_equal(tables.load(tmp_path / "a.mat").connection.A, c.A)
+    monkeypatch.setattr("geomech.tables.matlab.LARGEST", 100_000)
+    savemat(tmp_path / "a.mat", {**found, "more": np.zeros(10**6)}, do_compression=True)
+    with pytest.raises(SceneError, match="is damaged, cut short, or no MATLAB file"):
+        tables.load(tmp_path / "a.mat")
