@@ -40,6 +40,18 @@ class Connection:
         size = f"A {summary.spans(self.A)}; {summary.left(self.residual, self.speed)}"
         return f"Connection({summary.grid(self.axes)}{gone}; {size})"
 
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.connection(self)
+
+    def to_xarray(self, unit: str = "BL"):
+        """A Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`. unit: of lengths, "BL"
+        or "m". ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.connection(self, unit)
+
     @cached_property
     def field(self) -> Field:
         return Field(self.axes, self.A, self.degree)

@@ -41,6 +41,18 @@ class Field:
         what = "x".join(map(str, lead)) or "one"
         return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; values {size})"
 
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.field(self)
+
+    def to_xarray(self, name: str = "ccf", unit: str = "BL"):
+        """A DataArray; of three components it is taken for a CCF, with its units. unit: of lengths, "BL" or "m".
+        ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.field(self, name, unit)
+
     @property
     def joints(self) -> int:
         return len(self.axes)

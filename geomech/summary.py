@@ -54,4 +54,4 @@ def _percent(x: float) -> str:
 
 def poses(values) -> str:
     """The ranges of x, y and theta of poses or velocities (..., 3)."""
-    return spans(np.moveaxis(np.asarray(values, float).reshape(-1, 3), -1, 0))
+    return spans(np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0))

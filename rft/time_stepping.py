@@ -47,7 +47,8 @@ class TimeSteps(NamedTuple):
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
-        size = f"{np.size(self.status)} gaits of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
+        count = np.size(self.status)
+        size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, {self.cycles} cycles: {kinds}"
         return f"TimeSteps({size}; residual up to {np.max(self.residual, initial=0.0):.1e})"
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from geomech.errors import SceneError
 from geomech.files import whole_file
 from geomech.output import plots
-from geomech.output.netcdf import COMPONENTS, attribute
+from geomech.output.netcdf import COMPONENTS, UNITS, Variable, attribute
 from geomech.scene import write as written
 from geomech.scene.model import Scene
 from geomech.study.sweep import AMPLITUDE
@@ -20,13 +20,11 @@ def save(path: Path, scene: Scene, results: dict) -> None:
     from scipy.io import netcdf_file
 
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        file.title = attribute(f"Net displacement per cycle of the scene {scene.name}")
-        file.scene = attribute(written.toml(scene))
-        names = []
-        for parameter, values in results["over"].items():
-            names.append(parameter.replace(".", "_").replace("-", "_"))
-            file.createDimension(names[-1], len(values))
-            axis = file.createVariable(names[-1], "f8", (names[-1],))
+        for key, text in attributes(scene).items():
+            setattr(file, key, attribute(text))
+        for name, parameter, values in parameters(results):
+            file.createDimension(name, len(values))
+            axis = file.createVariable(name, "f8", (name,))
             axis[:] = values
             axis.long_name = parameter
         file.createDimension("component", 3)
@@ -34,15 +32,31 @@ def save(path: Path, scene: Scene, results: dict) -> None:
         component = file.createVariable("component", "c", ("component", "component_length"))
         component[:] = np.array([list(c.ljust(5, "\0")) for c in COMPONENTS], "S1")
         component._Encoding = "ascii"
-        unit = "body length" if scene.system.unit == "BL" else "m"
-        for name, dims, units in (
-            ("displacement", (*names, "component"), f"{unit} (x, y), rad (theta)"),
-            ("estimate", tuple(names), "body length"),
-            ("estimate_heading", tuple(names), "rad"),
-        ):
-            variable = file.createVariable(name, "f8", dims)
-            variable[:] = results[name]
-            variable.units = units
+        for v in variables(scene, results):
+            variable = file.createVariable(v.name, "f8", v.dimensions)
+            variable[:] = v.values
+            variable.units = v.units
+
+
+def attributes(scene: Scene) -> dict[str, str]:
+    """Of a file of a sweep."""
+    return {"title": f"Net displacement per cycle of the scene {scene.name}", "scene": written.toml(scene)}
+
+
+def parameters(results: dict) -> list[tuple[str, str, np.ndarray]]:
+    """(name of the dimension, parameter, values) of each that is swept."""
+    over = results["over"].items()
+    return [(name.replace(".", "_").replace("-", "_"), name, np.array(values, float)) for name, values in over]
+
+
+def variables(scene: Scene, results: dict) -> list[Variable]:
+    """Of a file of a sweep, without its coordinates."""
+    names, unit = tuple(name for name, *_ in parameters(results)), UNITS[scene.system.unit]
+    return [
+        Variable("displacement", (*names, "component"), results["displacement"], f"{unit} (x, y), rad (theta)", ""),
+        Variable("estimate", names, results["estimate"], "body length", ""),
+        Variable("estimate_heading", names, results["estimate_heading"], "rad", ""),
+    ]
 
 
 def draw(scene: Scene, results: dict):

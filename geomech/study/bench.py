@@ -17,6 +17,7 @@ from geomech.gaits.base import checked_gait
 from geomech.scene.model import Scene
 from geomech.study import cost, estimate
 from geomech.study.offer import METHODS, lookups, methods, tiers
+from geomech.study.results import Displacements
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import axes
@@ -32,8 +33,24 @@ class Study:
         self.scene, self._tables = scene, {} if tables is None else tables
 
     def __repr__(self) -> str:
-        held = sorted({str(key[0]) for key in self._tables})
+        held = sorted({str(key[0]) for key in self.computed})
         return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(held) or 'nothing yet'})"
+
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.study(self)
+
+    def to_xarray(self):
+        """A Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.of_study(self)
+
+    @property
+    def computed(self) -> tuple:
+        """What tables there are, each (name, system, ...), all that it depends on."""
+        return tuple(self._tables)
 
     def turned(self, **numerics) -> Study:
         """The bench of the scene with some of its [numerics] changed; None keeps a value."""
@@ -138,7 +155,8 @@ class Study:
             key: {m: errors[m][:, k].tolist() for m in methods}
             for k, key in enumerate(("estimate", "estimate_heading"))
         }
-        return {"amplitude": amplitudes.tolist(), **{m: found[m] for m in methods}, **estimates, "seconds": seconds}
+        table = {"amplitude": amplitudes.tolist(), **{m: found[m] for m in methods}, **estimates, "seconds": seconds}
+        return Displacements(table, scene, gait)
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> cost.Cost:
         """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""

@@ -14,6 +14,7 @@ from geomech.scene.model import Scene
 from geomech.study import cost
 from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
+from geomech.study.results import Displacements
 from geomech.tiers import TIERS
 
 MOST_PHASES = 1 << 16
@@ -58,7 +59,7 @@ def cheapest(
             poses = study.displacement(method, gait, amplitudes)
             error = against_direct(scene, poses, gait, amplitudes)
             if error[:, 0].max() <= tol:
-                return _answer(method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
+                return _answer(scene, gait, method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         found = " and ".join(f"{n} {name}" for name, n in settings.items())
@@ -66,7 +67,7 @@ def cheapest(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             "raise --tol, or lower [numerics] regularisation and tolerance"
         )
-    return _answer("direct", amplitudes, poses, error, settings, start)
+    return _answer(scene, gait, "direct", amplitudes, poses, error, settings, start)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
@@ -91,8 +92,8 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
     return (poses, error), {"phases": phases, **({"pieces": pieces} if scene.system.cut else {})}
 
 
-def _answer(method, amplitudes, poses, error, settings, start) -> dict:
-    return {
+def _answer(scene, gait, method, amplitudes, poses, error, settings, start) -> Displacements:
+    table = {
         "amplitude": amplitudes.tolist(),
         method: poses.tolist(),
         "estimate": error[:, 0].tolist(),
@@ -101,3 +102,4 @@ def _answer(method, amplitudes, poses, error, settings, start) -> dict:
         "settings": settings,
         "seconds": {method: time.perf_counter() - start},
     }
+    return Displacements(table, scene, gait)

@@ -19,6 +19,7 @@ from geomech.scene.read import from_tables
 from geomech.study import estimate, kept
 from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, price
+from geomech.study.results import Swept
 from rft import SOLVER
 
 LARGEST = 1_000_000  # points
@@ -86,7 +87,8 @@ def sweep(
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
     errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
-    return {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
+    found = {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
+    return Swept(found, scene)
 
 
 def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:

@@ -35,7 +35,8 @@ class Cycle(NamedTuple):
     to_come: np.ndarray
 
     def __repr__(self) -> str:
-        size = f"{np.size(self.speed)} gaits of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}"
+        count = np.size(self.speed)
+        size = f"{count} gait{'s' * (count != 1)} of {np.shape(self.xi)[-2]} phases, net {summary.poses(self.net)}"
         more = f"; {self.cycles} cycles" * (self.cycles > 1) + "; with work" * (self.work is not None)
         return f"Cycle({size}; residual up to {np.max(self.residual, initial=0.0):.1e}{more})"
 

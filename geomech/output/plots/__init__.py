@@ -1,4 +1,6 @@
-"""Plots: each draws on the Axes it is given, or a new one, and returns it. No pyplot, so no global state."""
+"""Plots: each draws on the Axes it is given and returns it. Without any it draws where you stand: on pyplot's current Axes if
+you have a figure of pyplot open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
+"""
 
 from geomech.output.plots.displacements import displacement, net
 from geomech.output.plots.drag import drag_figure

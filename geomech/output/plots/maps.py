@@ -107,10 +107,10 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @styled
-def draw_gait(gait: Gait, ax, color: str = "black"):
+def draw_gait(gait: Gait, ax=None, color: str = "black"):
     """The gait's curve with a dot at its start and an arrow along it."""
     t = np.linspace(0, 2 * np.pi, 400)
-    curve = gait.shape(t)
+    ax, curve = axes_of(ax), gait.shape(t)
     ax.plot(*curve.T, color=color, lw=1.2)
     ax.plot(*curve[0], "o", color=color, ms=3)
     ax.annotate("", curve[58], curve[50], arrowprops={"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 from pathlib import Path
 
 from geomech.errors import SceneError
@@ -38,16 +39,21 @@ def styled(draw):
 
 @styled
 def figure(width: float, height: float, columns: int = 1, rows: int = 1):
-    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap."""
-    from matplotlib.figure import Figure
+    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap; both show in a notebook."""
+    from geomech.output.plots.shown import ShownAxes, ShownFigure
 
-    fig = Figure(figsize=(width, height), layout="constrained")
+    fig = ShownFigure(figsize=(width, height), layout="constrained")
     fig.get_layout_engine().set(wspace=0.06)
-    return fig, fig.subplots(rows, columns, squeeze=False)
+    return fig, fig.subplots(rows, columns, squeeze=False, subplot_kw={"axes_class": ShownAxes})
 
 
 def axes_of(ax):
-    return figure(3.4, 3.0)[1][0, 0] if ax is None else ax
+    """ax; without it the Axes that pyplot stands at, where the caller has a figure of pyplot open, else new ones that a
+    notebook shows."""
+    if ax is not None:
+        return ax
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    return pyplot.gca() if pyplot and pyplot.get_fignums() else figure(3.4, 3.0)[1][0, 0]
 
 
 def check_format(path: str | Path) -> Path:

@@ -1,0 +1,97 @@
+"""Results as data sets of xarray, with the names, dimensions, units and attributes that their NetCDF files have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.field import Field
+from geomech.output import sweeps
+from geomech.output.netcdf import (
+    COMPONENTS,
+    UNITS,
+    Variable,
+    angle_of,
+    angles_of,
+    attributes,
+    of_ccf,
+    of_connection,
+    variables,
+)
+from geomech.study.bench import Study
+from geomech.study.results import Displacements, Swept
+
+
+def xarray():
+    """The package, or ImportError that says how to get it."""
+    try:
+        import xarray
+    except ImportError:
+        raise ImportError("to_xarray needs the package xarray: pip install xarray") from None
+    return xarray
+
+
+def dataset(found: Iterable[Variable], coordinates: Mapping, attrs: Mapping | None = None):
+    """A Dataset of variables. coordinates: (values, attributes) by name of dimension."""
+    xr, found = xarray(), list(found)
+    told = lambda v: {name: text for name, text in (("units", v.units), ("long_name", v.long_name)) if text}
+    used = {name for v in found for name in v.dimensions}
+    return xr.Dataset(
+        {v.name: (v.dimensions, np.array(v.values), told(v)) for v in found},
+        {name: (name, *coordinates[name]) for name in coordinates if name in used},
+        dict(attrs or {}),
+    )
+
+
+def of_shapes(axes: Sequence[np.ndarray]) -> dict:
+    """Coordinates of components, joints and shapes."""
+    rows = {"component": (list(COMPONENTS), {}), "joint": (np.arange(1, len(axes) + 1, dtype="i4"), {})}
+    names = enumerate(zip(angles_of(axes), axes))
+    return {**rows, **{name: (axis, {"units": "rad", "long_name": angle_of(k)}) for k, (name, axis) in names}}
+
+
+def of_study(study: Study):
+    """As the file of `geomech connection`: A, its fit residual, the CCF and what else that has."""
+    return dataset(variables(study), of_shapes(study.fitted.axes), attributes(study))
+
+
+def connection(fitted: Connection, unit: str):
+    """A, its fit residual and the rms of xi. unit: of lengths, "BL" or "m"."""
+    return dataset(of_connection(fitted, unit), of_shapes(fitted.axes), {"sign_of_A": "xi = + A alphadot"})
+
+
+def field(values: Field, name: str, unit: str):
+    """A DataArray; with rows x, y and theta it is a CCF, in its units."""
+    lead = values.values.shape[: -values.joints]
+    if lead == (3,):
+        return dataset([of_ccf(values, unit, name)], of_shapes(values.axes))[name]
+    dimensions = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
+    return dataset([Variable(name, dimensions, values.values, "", "")], of_shapes(values.axes))[name]
+
+
+def displacements(table: Displacements):
+    """displacement (tier, amplitude, component) and its errors (tier, amplitude)."""
+    names, unit = table.tiers, UNITS[table.scene.system.unit]
+    each = lambda key: np.array([table.errors(key)[name] for name in names])
+    poses = np.array([table[name] for name in names], float).reshape(len(names), len(table["amplitude"]), 3)
+    over = ("tier", "amplitude")
+    found = [
+        Variable(
+            "displacement", (*over, "component"), poses, f"{unit} (x, y), rad (theta)", "net displacement per cycle"
+        ),
+        Variable("estimate", over, each("estimate"), "body length", "estimated error of the position"),
+        Variable("estimate_heading", over, each("estimate_heading"), "rad", "estimated error of the heading"),
+    ]
+    amplitude = np.array(table["amplitude"], float), {"long_name": table.gait.amplitude_label}
+    coordinates = {"tier": (names, {}), "amplitude": amplitude, "component": (list(COMPONENTS), {})}
+    attrs = {"title": f"Net displacement per cycle of the scene {table.scene.name}", "frame": table.scene.frame}
+    return dataset(found, coordinates, attrs)
+
+
+def swept(results: Swept):
+    """As the file that `sweeps.save` writes."""
+    coordinates = {name: (values, {"long_name": parameter}) for name, parameter, values in sweeps.parameters(results)}
+    coordinates["component"] = list(COMPONENTS), {}
+    return dataset(sweeps.variables(results.scene, results), coordinates, sweeps.attributes(results.scene))

@@ -1,0 +1,87 @@
+"""What a notebook shows of results: a line, a small table or a picture, as HTML. Nothing is computed for it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.field import Field
+from geomech.output import plots, sweeps
+from geomech.study.bench import Study
+from geomech.study.results import Displacements, Swept
+
+MOST_ROWS = 40
+DPI = 90
+
+
+def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None) -> str:
+    """A line, a table of at most MOST_ROWS, a Figure."""
+    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(_text(x))}</{tag}>"
+    parts = [f"<p>{html.escape(line)}</p>"]
+    if rows:
+        lines = [("th", head)] * bool(head) + [("td", row) for row in rows[:MOST_ROWS]]
+        body = "".join(f"<tr>{''.join(cell(tag, x) for x in row)}</tr>" for tag, row in lines)
+        parts.append(f"<table>{body}</table>")
+        if len(rows) > MOST_ROWS:
+            parts.append(f"<p>and {len(rows) - MOST_ROWS} rows more</p>")
+    if picture is not None:
+        parts.append(f'<img alt="{html.escape(line)}" src="data:image/png;base64,{_encoded(picture)}"/>')
+    return "<div>" + "".join(parts) + "</div>"
+
+
+def _text(x) -> str:
+    return f"{x:.4g}" if isinstance(x, (float, np.floating)) else str(x)
+
+
+def _encoded(picture) -> str:
+    with io.BytesIO() as file:
+        picture.savefig(file, format="png", dpi=DPI)
+        return base64.b64encode(file.getvalue()).decode()
+
+
+def connection(fitted: Connection) -> str:
+    """Its rows as arrows over shape space, or its line where shape space is no plane."""
+    return page(repr(fitted), picture=plots.connection_figure(fitted, "length") if len(fitted.axes) == 2 else None)
+
+
+def field(values: Field) -> str:
+    """Its components as colours over shape space, as those of a CCF; its line for any other."""
+    drawn = values.joints == 2 and values.values.shape[0] == 3 and values.values.ndim == 3
+    return page(repr(values), picture=plots.ccf_figure(values, unit="length") if drawn else None)
+
+
+def study(bench: Study) -> str:
+    """Its scene, tiers and, where it is computed already, the CCF with the scene's gait."""
+    scene, held = bench.scene, {key[0] for key in bench.computed}
+    rows = [
+        ("system", scene.system.told()[0]),
+        ("gait", repr(scene.gait)),
+        ("numerics", repr(scene.numerics)),
+        ("tiers", ", ".join(bench.tiers)),
+        ("computed", ", ".join(sorted(held)) or "nothing yet"),
+    ]
+    drawn = {"ccf", "error of the ccf"} <= held and scene.system.joints == 2
+    maps = lambda: plots.ccf_figure(bench.curvature, [scene.gait], scene.system.unit, bench.curvature_error)
+    return page(f"Study of {scene.name}", (), rows, maps() if drawn else None)
+
+
+def displacements(table: Displacements) -> str:
+    """A row an amplitude and tier."""
+    unit, rows = table.scene.system.unit, []
+    each = [table.errors(key) for key in ("estimate", "estimate_heading")]
+    for k, amplitude in enumerate(table["amplitude"]):
+        for name in table.tiers:
+            errors = (f"{e[name][k]:.1e}" for e in each)
+            rows.append((amplitude, name, *(float(x) + 0.0 for x in np.round(table[name][k], 12)), *errors))
+    head = ("amplitude", "tier", f"x ({unit})", f"y ({unit})", "heading (rad)", "error (BL)", "error of heading (rad)")
+    return page(f"Net displacement per cycle of {table.scene.name}", head, rows)
+
+
+def swept(results: Swept) -> str:
+    """Against one parameter, or as a map over two; its line for more."""
+    return page(repr(results), picture=sweeps.draw(results.scene, results) if len(results["over"]) <= 2 else None)

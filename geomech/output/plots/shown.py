@@ -1,0 +1,26 @@
+"""Figures and axes that a notebook shows by themselves, without pyplot."""
+
+from __future__ import annotations
+
+import io
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+DPI = 110
+
+
+class ShownFigure(Figure):
+    """A Figure that is a picture where a notebook's cell ends with it."""
+
+    def _repr_png_(self) -> bytes:
+        with io.BytesIO() as file:
+            self.savefig(file, format="png", dpi=DPI)
+            return file.getvalue()
+
+
+class ShownAxes(Axes):
+    """Axes that show their figure where a notebook's cell ends with them."""
+
+    def _repr_png_(self) -> bytes:
+        return self.get_figure(root=True)._repr_png_()

@@ -1,0 +1,182 @@
+"""What results say of themselves: a line, HTML and pictures for notebooks, data sets of xarray."""
+
+import base64
+import builtins
+import json
+import pickle
+import re
+import sys
+
+import numpy as np
+import pytest
+import xarray
+
+import rft
+from geomech.gaits import Circle, Ellipse
+from geomech.output import netcdf, plots, sweeps
+from geomech.scene import Numerics, Scene
+from geomech.study import sweep
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from geomech.systems import NoSlipSnake, Swimmer
+from rft.media import CATALOGUE
+
+GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
+UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
+PNG = b"\x89PNG\r\n"
+
+
+@pytest.fixture(scope="module")
+def study():
+    made = Study(
+        Scene(Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, UNEVEN), GAIT, Numerics(grid=7, extent=2.0, harmonics=5))
+    )
+    made.compute_field()
+    return made
+
+
+@pytest.fixture(scope="module")
+def table(study):
+    return study.study([0.5, 1.0, 1.5], ["area", "direct"])
+
+
+@pytest.fixture(scope="module")
+def swept(study):
+    return sweep.sweep(study.scene, {"gait.amplitude": [0.5, 1.0, 1.2], "body.length": [0.3, 0.6]})
+
+
+def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
+    system, alpha = study.scene.system, np.zeros((5, 2))
+    cycle = study.scene.cycle(phases=32, work=True)
+    steps = Swimmer(system.medium, rft.Chain(), (rft.Transient(0.1),)).time_steps(*Circle().cycle(16), 2, work=True)
+    for value, *said in (
+        (
+            study.fitted,
+            "Connection(7 x 7 shapes, alpha_1 and alpha_2 from -2 to 2 rad; A x -",
+            "; fit leaves x ",
+            " % of the rms",
+        ),
+        (study.curvature, "Field(3 components on 7 x 7 shapes", "theta "),
+        (study.table("harmonic"), "Harmonics(7 x 7 shapes", "odd, up to 5", "fit leaves"),
+        (study.table("adapted"), "Family(25 curves of Ellipse(", "amplitudes 0 to 1", "128 phases"),
+        (system.solve(alpha, alpha + 1), "Solution((5,) samples: 5 sliding; residual up to"),
+        (system.solve([0.3, 0.2], [1, 0]), "Solution(xi = (", "stuck, residual"),
+        (cycle, "Cycle(1 gait of 32 phases, net x ", "with work"),
+        (cycle.work, "Work((32,) samples of 2 joints; power "),
+        (steps, "TimeSteps(1 gait of 16 phases, 2 cycles: 1 "),
+        (study.scene, "Scene(scene: Swimmer(medium=Granular(C=1.8", "grid=7"),
+        (study, "Study(Scene(", "tiers area, adapted, path, harmonic, direct; computed: ", "connection"),
+        (swept, "Swept(scene over gait.amplitude (3: 0.5 to 1.2) x body.length (2: 0.3 to 0.6); net x "),
+    ):
+        text = repr(value)
+        assert len(text) < 600 and "\n" not in text
+        assert [x for x in said if x not in text] == [], text
+    assert repr(table).splitlines()[0].startswith("scene: displacement per cycle (m)")
+    snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
+    assert "rad; 7 singular; A x" in repr(snake.fitted) and " singular; values" in repr(snake.curvature)
+    three = Study(Scene(Swimmer(rft.Viscous(), rft.Chain((1, 1, 1, 1))), rft_wave(), Numerics(grid=4, extent=1.0)))
+    assert "4 x 4 x 4 shapes, alpha_1 to alpha_3 from -1 to 1 rad" in repr(three.fitted)
+    assert "fit leaves x 0 %, y 0 %, theta 0 %" in repr(three.fitted) and "<img" not in three.fitted._repr_html_()
+
+
+def rft_wave():
+    from geomech.gaits import Fourier
+
+    return Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
+
+
+def pictures(html):
+    return [base64.b64decode(x) for x in re.findall(r'src="data:image/png;base64,([^"]+)"', html)]
+
+
+def test_notebooks_get_tables_and_pictures(study, table, swept):
+    for value in (study.fitted, study.curvature, swept):
+        html = value._repr_html_()
+        (picture,) = pictures(html)
+        assert picture.startswith(PNG) and html.count("<div>") == html.count("</div>") == 1
+    html = table._repr_html_()
+    cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", html)
+    assert cells[:3] == ["amplitude", "tier", "x (m)"] and len(cells) == 7 * (1 + 3 * 2)
+    assert [float(x) for x in cells[9:12]] == pytest.approx(table["area"][0], rel=1e-3, abs=1e-9)
+    fresh = Study(study.scene)
+    assert pictures(fresh._repr_html_()) == [] and "nothing yet" in fresh._repr_html_()
+    assert fresh.computed == ()  # nothing is computed to be shown
+    assert study.curvature.values is not None and study.curvature_error.values is not None
+    assert len(pictures(study._repr_html_())) == 1
+    assert "<script>" not in Study(study.scene.changed(name="<script>"))._repr_html_()
+    many = study.study(np.linspace(0.1, 1, 50), ["area"])._repr_html_()
+    assert many.count("<tr>") == 41 and "and 10 rows more" in many
+
+
+def test_results_remain_dicts(study, table, swept):
+    assert isinstance(table, dict) and json.loads(json.dumps(table)) == dict(table)
+    again = pickle.loads(pickle.dumps(table))
+    assert again == table and again.scene == study.scene
+    assert set(swept) == {"over", "displacement", "estimate", "estimate_heading"}
+
+
+def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
+    netcdf.save_connection(tmp_path / "a.nc", study)
+    with xarray.open_dataset(tmp_path / "a.nc") as data:
+        xarray.testing.assert_identical(study.to_xarray(), data.load())
+        for mine in (study.fitted.to_xarray("m"), study.curvature.to_xarray(unit="m").to_dataset()):
+            assert {"A", "fit_residual", "speed"} == set(mine) or {"ccf"} == set(mine)
+            for name in mine:
+                xarray.testing.assert_identical(mine[name], data[name])
+    sweeps.save(tmp_path / "b.nc", study.scene, swept)
+    with xarray.open_dataset(tmp_path / "b.nc") as data:
+        xarray.testing.assert_identical(swept.to_xarray(), data.load())
+    other = study.fitted.field.to_xarray("A")
+    assert other.dims == ("dimension_0", "dimension_1", "alpha_1", "alpha_2") and other.name == "A"
+
+
+def test_displacements_as_a_data_set(study, table):
+    data = table.to_xarray()
+    assert data.displacement.dims == ("tier", "amplitude", "component")
+    assert data.displacement.sel(tier="area", amplitude=1.0, component="y") == table["area"][1][1]
+    np.testing.assert_array_equal(data.estimate.sel(tier="direct"), table["estimate"]["direct"])
+    np.testing.assert_array_equal(data.estimate_heading.sel(tier="area"), table["estimate_heading"]["area"])
+    assert data.displacement.units == "m (x, y), rad (theta)" and data.estimate.units == "body length"
+    assert data.amplitude.long_name == GAIT.amplitude_label and data.attrs["frame"] == "link-1"
+    one = cheapest(study.scene, [0.5, 1.0], 1e-2)
+    assert one.to_xarray().tier.values == [one["tier"]]
+    assert "displacement per cycle" in repr(one) and one["tier"] in one._repr_html_()
+
+
+def test_without_xarray_it_is_said(study, monkeypatch):
+    found = builtins.__import__
+
+    def none(name, *args, **kwargs):
+        if name == "xarray":
+            raise ImportError(name)
+        return found(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", none)
+    with pytest.raises(ImportError, match="to_xarray needs the package xarray: pip install xarray"):
+        study.fitted.to_xarray()
+
+
+def test_plots_draw_where_they_stand(study, table):
+    """On the Axes given; else on pyplot's current ones, if there is a figure of pyplot; else on new ones that show."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    pyplot.close("all")
+    draw = (
+        lambda **where: plots.ccf_map(study.curvature, **where),
+        lambda **where: plots.vector_field(study.fitted, **where),
+        lambda **where: plots.displacement(table, **where),
+        lambda **where: plots.draw_gait(GAIT, **where),
+    )
+    for one in draw:
+        ax = one()
+        assert pyplot.get_fignums() == [] and ax._repr_png_().startswith(PNG)
+        assert ax.figure._repr_png_().startswith(PNG)
+        figure, (first, second) = pyplot.subplots(1, 2)
+        assert one(ax=first) is first and not second.lines and not second.collections
+        pyplot.sca(second)
+        assert one() is second and pyplot.gcf() is figure
+        pyplot.close("all")
+    assert "matplotlib.pyplot" in sys.modules
