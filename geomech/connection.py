@@ -19,6 +19,8 @@ from geomech.field import Field, as_axes, half_of
 from geomech.velocity import fits, tried
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
+EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
+EVEN = 1e-6  # of the largest velocity: a solver's rounding is below it
 SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
 
 
@@ -170,6 +172,20 @@ def sampled(
         mask = crossed(singularity(alpha[:, 0]).reshape(*map(len, axes)))
         fields = [np.where(mask, np.nan, x) for x in fields]
     return fields
+
+
+def even_part(velocity: Velocity, axes, singularity: Callable | None = None) -> np.ndarray | None:
+    """(3, N_1, ..., N_d): rms over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1, which a fit from
+    half of the directions takes for 0; None where it is nothing but rounding at a few shapes that stand for all."""
+    axes = tuple(np.asarray(a, float) for a in axes)
+    unit = directions(len(axes), EVEN_DIRECTIONS * len(axes))
+    rng = np.random.default_rng(0)
+    some = np.stack([rng.uniform(a[0], a[-1], (EVEN_SHAPES, 1)) for a in axes], -1)
+    forth, back = (evaluate(velocity, some, sign * unit, masked=singularity is not None) for sign in (1.0, -1.0))
+    if np.nanmax(np.abs(forth + back)) <= EVEN * np.nanmax(np.abs(forth)):
+        return None
+    both = lambda alpha, alphadot: velocity(alpha, alphadot) + velocity(alpha, -alphadot)
+    return sampled(both, axes, unit, lambda xi: (np.sqrt((xi**2).mean(1)).T,), 1, singularity=singularity)[0]
 
 
 def crossed(d: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
-from geomech import cli, tables
+from geomech import cli, connection, tables
 from geomech import scene as scenes
 from geomech.connection import Connection
 from geomech.errors import SceneError
@@ -19,7 +19,7 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.output import mat, netcdf, plots
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
-from geomech.study.accuracy import KNOBS
+from geomech.study import accuracy, estimate
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from rft.media import CATALOGUE
@@ -177,6 +177,40 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         assert max(told["estimate"]["direct"]) < 0.02  # by its harmonics: of A alone it is 0.1 or more
 
 
+@pytest.mark.parametrize("ending", [".nc", ".mat"])
+def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
+    """Skin friction that tells forwards from backwards: A, and odd harmonics, know nothing of it."""
+    swimmer = Swimmer(GLASS, UNEVEN, (rft.SkinFriction(0.05, 0.25),))
+    source = Study(Scene(swimmer, GAIT, Numerics(grid=15, extent=2.0, harmonics=9)))
+    alpha, unit = np.array([source.fitted.axes[0][3], source.fitted.axes[1][10]]), connection.directions(2, 8)
+    both = swimmer.velocity(alpha, unit) + swimmer.velocity(alpha, -unit)
+    np.testing.assert_allclose(source.even_part[:, 3, 10], np.sqrt((both**2).mean(0)), rtol=1e-6)
+    assert study().even_part is None
+    (netcdf if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
+    assert ("xi is not odd in alphadot" in explain(table)) == (ending == ".nc")
+    for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
+        amplitudes = gait.amplitude * np.array([0.3, 0.8, 1.1])
+        poses, errors = estimate.direct(table, gait, amplitudes, 128)
+        off = estimate.apart(poses, source.displacement("direct", gait, amplitudes), 0.3)
+        assert (off <= errors).all()
+    if ending == ".nc":
+        netcdf.save_connection(tmp_path / "b.nc", Study(table))
+        np.testing.assert_array_equal(tables.load(tmp_path / "b.nc").even, source.even_part)
+
+
+def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
+    plain_mat(tmp_path / "a.mat", made[1].fitted)
+    bare = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
+    assert bare.scene.system.single([0.2, 0.3], [1, 0])["residual"] is None
+    netcdf.save_connection(tmp_path / "a.nc", bare)
+    held = tables.load(tmp_path / "a.nc")
+    np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
+    assert not held.told and "fit residual unknown" in repr(held.connection)
+    mat.save_connection(tmp_path / "b.mat", bare)
+    assert not tables.load(tmp_path / "b.mat").told
+
+
 def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch, capsys):
     folder, s = made
     monkeypatch.chdir(tmp_path)
@@ -201,6 +235,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
         ("displacement", "t/t.toml", "--amplitudes", "0.4,0.8", "--json"),
         ("sweep", "t/t.toml", "--over", "gait.amplitude=0.4,0.8", "-o", "s.nc"),
         ("explain", "t/t.toml"),
+        ("displacement", "t/t.toml", "--amplitudes", "0.4,0.8", "--tol", "0.3"),
         ("run", "t/t.toml", "-o", "out"),
     ):
         code, out, err = run(*args)
@@ -222,7 +257,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
     told = explain(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
-    assert not [k for k in KNOBS if k.applies(scenes.load("t/t.toml")) and k.name in ("grid", "directions")]
+    assert [k.label for k in accuracy._knobs(scenes.load("t/t.toml"))] == ["direct: phases", "adapted: curves"]
     written = scenes.toml(Scene(Table("t/a.nc"), Circle()))
     assert scenes.parse(written).system == Table("t/a.nc")
     again = pickle.loads(pickle.dumps(Table("t/a.nc")))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from registry import GAITS
+from registry import GAITS, SYSTEMS
 
 import rft
 from geomech import connection, curvature, family, harmonics, reconstruct
@@ -40,7 +40,7 @@ PARTS = {
     "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
     "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Solver": Solver(),
     "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
-    "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
+    "Table": SYSTEMS["table"], "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not

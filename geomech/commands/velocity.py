@@ -29,4 +29,5 @@ def velocity(
     unit = scene.system.unit
     print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{unit}, {unit}, rad per unit time")
     steps = f", {out['iterations']} iterations" if "iterations" in out else ""
-    print(f"{out['status']}, residual {out['residual']:.1e}{steps}")
+    residual = "unknown" if out["residual"] is None else f"{out['residual']:.1e}"
+    print(f"{out['status']}, residual {residual}{steps}")

@@ -23,6 +23,9 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     if len(fitted.axes) != 2:
         raise SceneError(f"{scene.name}: a .mat file takes a body of two joints: write a .nc file")
     run = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
+    even = study.even_part  # counts at half of all directions
+    left = fitted.residual if even is None else np.sqrt(fitted.residual**2 + even**2 / 2)
+    rest = {} if np.isnan(left).any() else {RESIDUAL: left}
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
     entries = dict(zip(ENTRIES, factor * fitted.A.reshape(6, *fitted.A.shape[2:])))
@@ -31,6 +34,6 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
         "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": s.unit, "interpolation": fitted.degree,
         "conventions": f"xi = {sign} A alphadot; alpha_k is the heading of link k+1 minus that of link k, link 1 the tail",
     }  # fmt: skip
-    arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, RESIDUAL: fitted.residual}.items()}
+    arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, **rest}.items()}
     with whole_file(path) as part:
         savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)

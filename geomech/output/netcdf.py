@@ -71,6 +71,10 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature_error, unit, "ccf_error", name))
     if "harmonic" in lookups:
         found += of_harmonics(study.table("harmonic"), unit)
+    if (even := study.even_part) is not None:
+        units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+        name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
+        found.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
     return found
 
 

@@ -57,6 +57,8 @@ class Knob:
         system = scene.system
         if system.linear and self.setting in ("regularisation", "directions"):
             return False
+        if self.setting == "regularisation" and system.solver is None:
+            return False
         if self.setting in (*TIERS["path"].depends_on, *TIERS["harmonic"].depends_on) and system.stored("connection"):
             return False
         if self.tier != "direct" and TIERS[self.tier].is_direct(system):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.connection import Connection
+from geomech.connection import Connection, even_part
 from geomech.curvature import ccf
 from geomech.curvature import error as ccf_error
 from geomech.errors import SceneError, choose, named, real_array, short
@@ -89,6 +89,15 @@ class Study:
     def fitted(self) -> Connection:
         """The least-squares connection on the scene's grid."""
         return self.table("path")
+
+    @property
+    def even_part(self) -> np.ndarray | None:
+        """What of the velocity is even in alphadot, as skin friction makes it (`connection.even_part`): None if nothing."""
+        system = self.scene.system
+        if system.stored("connection"):
+            return system.stored("even part")
+        make = lambda: even_part(system.velocity, self.fitted.axes, system.singularity)
+        return self._kept("even part", ("grid", "extent"), (), make)
 
     @property
     def curvature(self) -> Field:

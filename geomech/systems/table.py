@@ -73,38 +73,43 @@ class Table(Plain):
         raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
 
     def stored(self, name: str):
-        return {"connection": self.held.connection, "harmonics": self.held.harmonics}.get(name)
+        held = self.held
+        return {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}.get(name)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) looked up; ValueError outside the table's grid."""
         return self.held.table.velocity(alpha, alphadot)
 
     def single(self, alpha, alphadot) -> dict:
-        """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, nan if unknown."""
+        """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, None if unknown."""
         told = super().single(alpha, alphadot)
-        left = np.linalg.norm(self._left(np.asarray(alpha, float), np.asarray(alphadot, float)))
-        return {**told, "status": "looked up", "residual": float(left)}
+        shapes = np.asarray(alpha, float), np.asarray(alphadot, float)
+        left = np.linalg.norm(self._times(self.held.table.residual, *shapes)) if self.held.told else None
+        return {**told, "status": "looked up", "residual": left if left is None else float(left)}
 
-    def _left(self, alpha, alphadot) -> np.ndarray:
-        """(..., 3): rms of what A, or the harmonics, leave of xi at a shape, for alphadot of that length."""
-        table = self.held.table
-        return Field(table.axes, table.residual, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
+    def _times(self, values, alpha, alphadot) -> np.ndarray:
+        """(..., 3): values (3, N_1, ...) at a shape times |alphadot|."""
+        return Field(self.held.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
     def own_error(self, alpha, alphadot) -> np.ndarray:
         """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
         lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
-        sums up like a random walk of k steps."""
+        sums up like a random walk of k steps; what is even in alphadot does not."""
         xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
         net = displacement(xi)
         halves = [displacement(half.velocity(alpha, alphadot)) for half in self.held.halves]
         apart = [np.stack([np.hypot(*np.moveaxis(h - net, -1, 0)[:2]), np.abs(h - net)[..., 2]], -1) for h in halves]
-        error = np.maximum(*apart)
-        if self.held.told:
-            pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
-            lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
-            left = self._left(alpha, alphadot)
-            along = np.stack([np.hypot(left[..., 0], left[..., 1]) + lever * left[..., 2], left[..., 2]], -1)
-            error += 2 * np.pi * along.mean(-2) / np.sqrt(self.held.highest)
+        error, held = np.maximum(*apart), self.held
+        pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
+        lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
+        for known, values, times in (
+            (held.told, held.table.residual, held.highest),
+            (held.even is not None, held.even, 1),
+        ):
+            if known:
+                left = self._times(values, alpha, alphadot)
+                along = np.stack([np.hypot(left[..., 0], left[..., 1]) + lever * left[..., 2], left[..., 2]], -1)
+                error += 2 * np.pi * along.mean(-2) / np.sqrt(times)
         return error / [self.length, 1.0]
 
     def about(self) -> dict:
@@ -124,6 +129,8 @@ class Table(Plain):
             )
         else:
             lines.append("A alone: xi = A alphadot is taken as exact, and what the fit left is part of every error")
+        if held.even is not None:
+            lines.append("xi is not odd in alphadot: what is even is part of every error")
         if not held.told:
             lines.append("the file does not tell what its fit left: errors are those of the grid alone")
         lines.append(

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.connection import Connection
-from geomech.errors import SceneError, choose
+from geomech.errors import SceneError, choose, short
 from geomech.files import read, why
 from geomech.gaits import Circle
 from geomech.harmonics import Harmonics
@@ -28,12 +28,14 @@ ROWS = ("x", "y", "theta")
 class Stored:
     """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
 
-    harmonics: the odd harmonics of xi beside A, where the file has them. length: of the body, in ``unit``, "BL" or "m".
+    harmonics: the odd harmonics of xi beside A, where the file has them. even: (3, N_1, ...), rms of
+    xi(alphadot) + xi(-alphadot), if that is not 0. length: of the body, in ``unit``, "BL" or "m".
     frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
     the file."""
 
     connection: Connection
     harmonics: Harmonics | None = None
+    even: np.ndarray | None = None
     length: float = 1.0
     unit: str = "BL"
     frame: str = "that of the table"
@@ -80,6 +82,8 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     from geomech.tables import mat, netcdf
 
     readers = {".nc": netcdf.parse, ".mat": mat.parse}
+    if not isinstance(path, (str, Path)):
+        raise SceneError(f"a table is a .nc or .mat file, got {short(path)}")
     path = Path(path)
     if path.suffix.lower() not in readers:
         raise SceneError(f"cannot read the table {path}: end the name in {' or '.join(readers)}")
@@ -105,16 +109,18 @@ def scaled(held: Stored, factor: float) -> Stored:
     c, h = held.connection, held.harmonics
     c = Connection(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
-    return replace(held, connection=c, harmonics=h)
+    return replace(held, connection=c, harmonics=h, even=None if held.even is None else times(held.even))
 
 
-def checked_axis(name: str, values: np.ndarray) -> np.ndarray:
+def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
     """values (N,) as ascending angles, or ValueError."""
     axis = numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
         raise ValueError(f"has no grid: {name} must be at least 4 ascending angles in rad")
-    if (largest := np.abs(axis).max()) > LARGEST_ANGLE:
-        raise ValueError(f"has {name} up to {largest:.4g} where angles are in rad: convert it if these are degrees")
+    if np.abs(axis).max() > largest:
+        raise ValueError(
+            f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad: convert it if these are degrees"
+        )
     return axis
 
 

@@ -6,6 +6,7 @@ Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Conne
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 import warnings
@@ -14,7 +15,7 @@ import numpy as np
 
 from geomech.connection import Connection
 from geomech.tables import matlab
-from geomech.tables.base import ORDERS, SIGNS, Stored, checked_axis, detected_sign, numbers, rms
+from geomech.tables.base import LARGEST_ANGLE, ORDERS, SIGNS, Stored, checked_axis, detected_sign, numbers, rms
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
@@ -48,7 +49,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     own = (about["length"], about["unit"]) if stated else (1.0, "BL")
     frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
     turned = plain if sign == "+" else Connection(axes, -A, residual, plain.speed, degree)
-    return Stored(turned, None, *own, frame[:60], sign, order, said, sha256)
+    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
@@ -83,20 +84,21 @@ def _of_version_4(raw: bytes) -> dict[str, np.ndarray]:
 
 def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
     """(the angles of both axes, the order in which arrays run over them)."""
+    angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in found else 2 * np.pi)
     first, second = (numbers(name, found[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
             raise ValueError(
                 "has alpha1 and alpha2 as rows, which leave the order open: say order = 'ndgrid' or 'meshgrid'"
             )
-        return (checked_axis("alpha1", first.ravel()), checked_axis("alpha2", second.ravel())), order
+        return (angles("alpha1", first.ravel()), angles("alpha2", second.ravel())), order
     if first.ndim != 2 or first.shape != second.shape:
         raise ValueError(f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid")
     for name, (a, b) in zip(ORDERS, ((first, second), (first.T, second.T))):
         if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
             if order not in ("", name):
                 raise ValueError(f"has arrays that run as {name}'s: drop order")
-            return (checked_axis("alpha1", a[:, 0]), checked_axis("alpha2", b[0])), name
+            return (angles("alpha1", a[:, 0]), angles("alpha2", b[0])), name
     raise ValueError(
         "has alpha1 and alpha2 that span no grid: one must change along rows alone, the other along columns"
     )

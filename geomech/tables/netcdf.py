@@ -83,7 +83,10 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
         harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
     connection = Connection(axes, turn * A, residual, speed, degree)
     frame = _text(told.get("frame", b"that of the table"))
-    return Stored(connection, harmonics, length, unit, frame, sign, "ndgrid", (), sha256)
+    even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
+    if even is not None and even.shape[0] != 3:
+        raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
+    return Stored(connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256)
 
 
 def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:
