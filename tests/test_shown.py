@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 import xarray
+from registry import SYSTEMS
 
 import rft
 from geomech.gaits import Circle, Ellipse
@@ -126,6 +127,10 @@ def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
     sweeps.save(tmp_path / "b.nc", study.scene, swept)
     with xarray.open_dataset(tmp_path / "b.nc") as data:
         xarray.testing.assert_identical(swept.to_xarray(), data.load())
+    bare = Study(Scene(SYSTEMS["table"], GAIT))
+    netcdf.save_connection(tmp_path / "c.nc", bare)
+    with xarray.open_dataset(tmp_path / "c.nc") as data:
+        xarray.testing.assert_identical(bare.to_xarray(), data.load())
     other = study.fitted.field.to_xarray("A")
     assert other.dims == ("dimension_0", "dimension_1", "alpha_1", "alpha_2") and other.name == "A"
 

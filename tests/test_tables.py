@@ -1,5 +1,6 @@
 """Connections in files: read back as they were, predicting what the scene they came from predicts, and never believed."""
 
+import dataclasses
 import io
 import json
 import pickle
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
@@ -177,6 +179,45 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         assert max(told["estimate"]["direct"]) < 0.02  # by its harmonics: of A alone it is 0.1 or more
 
 
+def random_scene(rng):
+    """A three-link swimmer in any medium, half of those in sand with skin friction, a gait that reaches the field's edge."""
+    k = rng.integers(4)
+    sands = rft.Granular(10 ** rng.uniform(-1, 1), rng.uniform(0.1, 1.2)), GLASS, rft.Coulomb()
+    medium = sands[k] if k < 3 else rft.Viscous(10 ** rng.uniform(0.1, 1.5))
+    skin = rft.SkinFriction(*rng.uniform(0.05, 0.3, 2))
+    body = rft.Chain(
+        tuple(rng.uniform(0.5, 2, 3)), rng.uniform(0.1, 3), ("mean", "link-1", "link-2", "link-3")[rng.integers(4)]
+    )
+    extent = rng.uniform(1.2, 2.6)
+    numerics = Numerics(grid=int(rng.integers(9, 33)), extent=extent, harmonics=int(2 * rng.integers(0, 8) + 1))
+    where = {"centre": tuple(0.3 * extent * rng.uniform(-1, 1, 2)), "reverse": bool(rng.integers(2))}
+    ellipse = Ellipse(semi_axes=tuple(rng.uniform(0.2, 1, 2)), tilt=rng.uniform(0, 3), **where)
+    fourier = Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)), **where)
+    gait = (Circle(**where), ellipse, Butterfly(**where), fourier)[rng.integers(4)]
+    room = 0.98 * (extent - np.abs(gait.centre).max()) / np.abs(gait.unit(np.linspace(0, 2 * np.pi, 500))).max()
+    effects = (skin,) if k < 3 and rng.integers(2) else ()
+    return Scene(Swimmer(medium, body, effects), dataclasses.replace(gait, amplitude=room), numerics)
+
+
+@pytest.mark.soak
+def test_errors_of_tables_of_random_scenes_cover(tmp_path):
+    ratios = {".nc": [], ".mat": []}
+    for seed in range(100):
+        source = Study(random_scene(np.random.default_rng(seed)))
+        gait, length = source.scene.gait, source.scene.system.length
+        amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
+        for ending, module in ((".nc", netcdf), (".mat", mat)):
+            module.save_connection(tmp_path / f"a{ending}", source)
+            poses, errors = estimate.direct(Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256)
+            off = estimate.apart(poses, source.displacement("direct", None, amplitudes), length)
+            ratios[ending].append(errors / np.maximum(off, 1e-12))
+    for ending, found in ratios.items():
+        found = np.array(found)
+        covered, median = (found >= 1).mean((0, 1)), np.median(found[..., 0])
+        print(f"{ending}: {found.size // 2} positions and headings, covered {covered}, median {median:.3g} errors")
+        assert (covered >= 0.98).all() and median < 25
+
+
 @pytest.mark.parametrize("ending", [".nc", ".mat"])
 def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     """Skin friction that tells forwards from backwards: A, and odd harmonics, know nothing of it."""
@@ -309,6 +350,22 @@ def altered(raw, **changes):
             w.units = changes.get("units", {}).get(name, getattr(v, "units", b""))
         new.flush()
         return out.getvalue()
+
+
+def test_files_of_less_and_files_that_xarray_wrote_are_read(made, tmp_path):
+    folder, s = made
+    raw = (folder / "a.nc").read_bytes()
+    (tmp_path / "a.nc").write_bytes(altered(raw, speed=None, harmonics=None, harmonics_residual=None))
+    held = tables.load(tmp_path / "a.nc")
+    assert held.harmonics is None
+    np.testing.assert_allclose(held.connection.speed, s.fitted.speed, rtol=1e-12)
+    with xarray.open_dataset(folder / "a.nc") as data:
+        turned = data.assign(A=-data.A, harmonics=-data.harmonics).assign_attrs(sign_of_A="xi = - A alphadot")
+        turned.to_netcdf(tmp_path / "b.nc", engine="scipy")
+    assert tables.load(tmp_path / "b.nc").sign == "-"
+    same(Connection.load(tmp_path / "b.nc"), s.fitted)
+    harmonics = tables.load(tmp_path / "b.nc").harmonics
+    np.testing.assert_array_equal(harmonics.coefficients, s.table("harmonic").coefficients)
 
 
 def put(where, value):

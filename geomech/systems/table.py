@@ -94,7 +94,8 @@ class Table(Plain):
     def own_error(self, alpha, alphadot) -> np.ndarray:
         """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
         lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
-        sums up like a random walk of k steps; what is even in alphadot does not."""
+        sums up like a random walk of k steps; what is even in alphadot does not, and a gait may keep to directions where it is
+        largest, sqrt(2) times the rms of one harmonic."""
         xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
         net = displacement(xi)
         halves = [displacement(half.velocity(alpha, alphadot)) for half in self.held.halves]
@@ -102,18 +103,15 @@ class Table(Plain):
         error, held = np.maximum(*apart), self.held
         pose = trajectory(xi, 2 * np.pi * np.arange(phases) / phases)
         lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
-        for known, values, times in (
-            (held.told, held.table.residual, held.highest),
-            (held.even is not None, held.even, 1),
-        ):
-            if known:
-                left = self._times(values, alpha, alphadot)
-                along = np.stack([np.hypot(left[..., 0], left[..., 1]) + lever * left[..., 2], left[..., 2]], -1)
-                error += 2 * np.pi * along.mean(-2) / np.sqrt(times)
+        left = [(held.table.residual, 1 / np.sqrt(held.highest))] if held.told else []
+        left += [(held.even, np.sqrt(2))] if held.even is not None else []
+        for values, factor in left:
+            x, y, theta = np.moveaxis(self._times(values, alpha, alphadot), -1, 0)
+            error += 2 * np.pi * factor * np.stack([np.hypot(x, y) + lever * theta, theta], -1).mean(-2)
         return error / [self.length, 1.0]
 
     def about(self) -> dict:
-        return {"table": self.file.encode("utf-8", "backslashreplace"), "table_sha256": self.sha256}
+        return {"table": self.file, "table_sha256": self.sha256}
 
     @property
     def assumed(self) -> tuple[str, ...]:
