@@ -12,8 +12,15 @@ from geomech.systems.base import Cycle, System, checked_system
 from geomech.tiers.base import Numerics
 
 
-@dataclass(frozen=True)
-class Scene:
+class Told:
+    """How a scene shows itself: its name and its parts, in a line of readable length."""
+
+    def __repr__(self) -> str:
+        return f"Scene({self.name}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
+
+
+@dataclass(frozen=True, repr=False)
+class Scene(Told):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
     TOML it was read from, if it was; `geomech.scene.write` says whether it still holds. files: others it was read from."""
 
@@ -21,8 +28,8 @@ class Scene:
     gait: Gait
     numerics: Numerics = field(default_factory=Numerics)
     name: str = "scene"
-    text: str = field(default="", repr=False, compare=False)
-    files: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    text: str = field(default="", compare=False)
+    files: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self):
         with named(self.name):
@@ -36,9 +43,6 @@ class Scene:
         """UnitWarning if a gait turns a joint by more than a full turn."""
         if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
             self.system.note_angles(gait.largest(amplitudes))
-
-    def __repr__(self) -> str:
-        return f"Scene({self.name}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
 
     @property
     def frame(self) -> str:
