@@ -17,7 +17,7 @@ from geomech.harmonics import Harmonics
 from geomech.reconstruct import displacement
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
-LARGEST_ANGLE = 4 * np.pi  # rad of a shape variable, beyond which it is taken for degrees
+LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 ORDERS = ("ndgrid", "meshgrid")
