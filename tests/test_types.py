@@ -40,7 +40,8 @@ PARTS = {
     "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
     "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Solver": Solver(),
     "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
-    "Table": SYSTEMS["table"], "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
+    "table, system": SYSTEMS["table"],
+    "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
