@@ -126,7 +126,7 @@ class Table(Plain):
                 f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}"
             )
         else:
-            lines.append("A alone: xi = A alphadot is taken as exact, and what the fit left is part of every error")
+            lines.append("A alone: xi = A alphadot" + ", and what the fit left is part of every error" * held.told)
         if held.even is not None:
             lines.append("xi is not odd in alphadot: what is even is part of every error")
         if not held.told:
