@@ -4,18 +4,34 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from typing import Annotated
 
 import typer
 
-from geomech import terminal
+from geomech import __version__, terminal
 from geomech.commands import COMMANDS
+from geomech.commands.options import PluginOption, load_plugins, with_plugins
 
-app = typer.Typer(
-    add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
-    help="Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait.",
-)  # fmt: skip
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode=None)
 for name in COMMANDS:
-    app.command()(getattr(import_module(f"geomech.commands.{name}"), name))
+    app.command()(with_plugins(getattr(import_module(f"geomech.commands.{name}"), name)))
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"geomech {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def geomech(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+    plugin: PluginOption = None,
+):
+    """Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait."""
+    load_plugins(plugin)
 
 
 def main(argv: list[str] | None = None) -> None:

@@ -102,7 +102,7 @@ def _notes():
 
 def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int:
     try:
-        code = app(args=argv, standalone_mode=False)
+        code = app(args=argv, prog_name="geomech", standalone_mode=False)
         if code == 130:  # an interrupt that typer caught
             raise KeyboardInterrupt
         if sys.stdout:

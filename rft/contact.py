@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from rft.bodies.base import Kinematics
-from rft.loads import element_load, parse
-from rft.media.base import Medium
+from rft.loads import element_load, rule_for
+from rft.media.base import Medium, dry_terms, viscous_terms
 from rft.sides import sided
 
 
@@ -90,11 +90,11 @@ class Averages(PerSample):
 
     def __post_init__(self):
         object.__setattr__(self, "averages", element_load(self.medium, self.rule))
-        object.__setattr__(self, "nodes", parse(self.rule)[1])
+        object.__setattr__(self, "nodes", rule_for(self.medium, self.rule)[1])
 
     @property
     def rate_independent(self) -> bool:
-        return bool(self.medium.dry) and not any(self.medium.viscous or ())
+        return bool(dry_terms(self.medium)) and not any(viscous_terms(self.medium) or ())
 
     def __call__(self, v_t, v_n, spin, eps):
         return self.averages(v_t, v_n, spin, eps)

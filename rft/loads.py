@@ -24,10 +24,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.media.base import Medium, TermLaw, require_law
+from rft.media.base import Medium, TermLaw, is_closed, require_law
 
 TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
 SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
+QUADRATURE = "gauss:24"  # in place of "exact" where a medium has no closed form
 SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
@@ -79,10 +80,10 @@ class Ends:
 def exact(medium: Medium) -> LoadLaw:
     """The closed-form load of a medium made of dry and viscous terms (paper Eqs. 2-3 among them).
 
-    Raises ValueError if the medium has a law without such terms; use 'gauss:N' or 'midpoint:N' there.
+    Raises ValueError if the medium has a law without such terms, of which `element_load` takes QUADRATURE.
     """
-    if medium.dry is None or medium.viscous is None:
-        raise ValueError(f"{type(medium).__name__} has no closed-form link integral: use loads='gauss:24'")
+    if not is_closed(medium):
+        raise ValueError(f"{type(medium).__name__} has no closed-form link integral: use loads={QUADRATURE!r}")
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)  # those with an axial part first
     axial = sum(k_t != 0.0 for _, k_t, _ in terms)
     q, k_t, k_n = np.array(terms).reshape(-1, 3).T
@@ -150,7 +151,7 @@ def _weigh(k: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
 def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:
     """The load by a quadrature rule on [-1, 1] (weights summing to 1), for any medium with a `traction`."""
     s, weight = (np.asarray(x, float)[:, None, None] for x in (nodes, weights))
-    if medium.dry and any(medium.viscous):
+    if is_closed(medium) and medium.dry and any(medium.viscous):
         return _sum(quadrature(_dry_part(medium), nodes, weights), medium)
 
     def load(v_t, v_n, spin, eps):
@@ -218,10 +219,16 @@ def parse(how: str) -> tuple[str, int]:
     raise ValueError(f"loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000, got {str(how)[:60]!r}")
 
 
-def element_load(medium: Medium, how: str = "exact") -> LoadLaw:
-    """The load of a medium on an element, ``how`` as in `parse`; ValueError for what is no medium."""
-    require_law(medium)
+def rule_for(medium: Medium, how: str) -> tuple[str, int]:
+    """As `parse`, but for QUADRATURE where "exact" is asked of a medium without a closed form."""
     kind, count = parse(how)
+    return (kind, count) if kind != "exact" or is_closed(medium) else parse(QUADRATURE)
+
+
+def element_load(medium: Medium, how: str = "exact") -> LoadLaw:
+    """The load of a medium on an element by `rule_for`; ValueError for what is no medium."""
+    require_law(medium)
+    kind, count = rule_for(medium, how)
     if kind == "exact":
         return exact(medium)
     return {"midpoint": midpoint, "gauss": gauss}[kind](medium, count)

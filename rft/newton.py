@@ -20,6 +20,7 @@ import numpy as np
 from rft.bodies.base import Body
 from rft.contact import SIDE, Model, rows
 from rft.linear import solve3
+from rft.media.base import is_closed, is_linear
 from rft.path import follow
 from rft.samples import Samples
 from rft.workers import each, keep_freed_memory, workers
@@ -103,7 +104,7 @@ class Balance:
         medium = model.medium
         lateral = abs(float(medium.traction(0.0, 1.0)[1]))
         self.base = tolerance + 1e-14 * max(1.0, lateral / model.unit)  # rounding of the largest forces
-        self.limit, self.linear = self.base, medium.dry == ()
+        self.limit, self.linear = self.base, is_linear(medium)
 
     @classmethod
     def of(cls, model: Model, body: Body, regularisation: float, tolerance: float) -> Balance:
@@ -137,13 +138,12 @@ class Balance:
         unit, medium = self.model.unit, self.model.medium
         if self.linear:
             return unit * scale
-        if medium.dry is None:
+        if not is_closed(medium):
             along, across = (
                 np.abs(medium.traction(*v)[k]) for k, v in enumerate(((scale, 0 * scale), (0 * scale, scale)))
             )
             return np.where(along > 0, along, across)
-        viscous = medium.viscous[0] if medium.viscous else 0.0
-        return unit + viscous * np.maximum(scale - 1.0, 0.0)
+        return unit + medium.viscous[0] * np.maximum(scale - 1.0, 0.0)
 
     def samples(self, index: np.ndarray) -> Samples:
         """Those of the batch."""

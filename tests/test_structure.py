@@ -8,8 +8,9 @@ import mutants
 from geomech.commands import COMMANDS
 
 ROOT = pathlib.Path(__file__).parents[1]
-# Beside the systems: a command lists the named media, a sweep puts effects side by side, a calibration fits a law.
-KNOW_MECHANICS = {"commands/scenes.py", "study/batch.py", "study/calibration.py", "study/sweep.py"}
+# Beside the systems: a command lists the named media, a sweep puts effects side by side, a calibration fits a law, and a class
+# of one's own is told to be an effect.
+KNOW_MECHANICS = {"commands/scenes.py", "kinds.py", "study/batch.py", "study/calibration.py", "study/sweep.py"}
 
 
 def imports(path):

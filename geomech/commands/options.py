@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import inspect
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -13,10 +15,20 @@ import typer
 
 from geomech import terminal
 from geomech.errors import SceneError, check_angle, named
-from geomech.files import refuse_inputs, whole_file
+from geomech.files import note, refuse_inputs, whole_file
+
+
+def scene_names() -> list[str]:
+    """Of the built-in scenes, found without reading any, for a shell that completes them."""
+    folder = Path(__file__).parents[1] / "scene" / "builtin"
+    return sorted(p.stem for p in folder.glob("*.toml"))
+
 
 SceneArgument = Annotated[
-    str, typer.Argument(metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file")
+    str,
+    typer.Argument(
+        metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file", autocompletion=scene_names
+    ),
 ]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
@@ -40,6 +52,39 @@ FolderOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
+
+
+PluginOption = Annotated[
+    Optional[list[Path]],
+    typer.Option(
+        "--plugin", metavar="FILE.py", help="Python file with laws, bodies, gaits, effects, systems of your own"
+    ),
+]
+
+
+def load_plugins(files: list[Path] | None) -> None:
+    """Let scenes name what is in the files; see `geomech.kinds.load_file`."""
+    for path in files or ():
+        from geomech.kinds import load_file
+
+        load_file(path)
+
+
+def with_plugins(command: Callable) -> Callable:
+    """A command that also takes ``--plugin``, as all do that take a scene; any other as it is."""
+    signature = inspect.signature(command, eval_str=True)
+    if not {"name", "plugins"} & {*signature.parameters} or "plugin" in signature.parameters:
+        return command
+
+    @functools.wraps(command)
+    def run(plugin=None, **given):
+        load_plugins(plugin)
+        return command(**given)
+
+    more = inspect.Parameter("plugin", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
+    run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), more])
+    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}
+    return run
 
 
 def check_netcdf(path: Path, matlab: bool = False) -> None:
@@ -158,8 +203,11 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
 
 
 def allow(scene, cost, yes: bool) -> None:
-    """Say what is to come if it takes long; SceneError if it takes too long to be begun without --yes."""
+    """Say what is to come if it takes long, or otherwise than expected; SceneError if it takes too long to be begun
+    without --yes."""
     cost.check(scene.name, yes)
+    for line in scene.system.notes:
+        note(f"{scene.name}: {line}")
     if not cost.small:
         terminal.tell(f"{scene.name}: {cost}")
 

@@ -8,14 +8,18 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.options import FolderOption, MediumOption, YesOption, allow, loaded
+from geomech.commands.options import FolderOption, MediumOption, YesOption, allow, loaded, scene_names
 from geomech.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"
+SceneOrOurs = Annotated[
+    str,
+    typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file", autocompletion=scene_names),
+]
 
 
 def run(
-    name: Annotated[str, typer.Argument(metavar="[SCENE]", help="a built-in name or a TOML file")] = DEFAULT_SCENE,
+    name: SceneOrOurs = DEFAULT_SCENE,
     out: FolderOption = Path("results"),
     medium: MediumOption = None,
     yes: YesOption = False,

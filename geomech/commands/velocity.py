@@ -9,6 +9,7 @@ import typer
 
 from geomech.commands.options import JsonOption, SceneArgument, numbers
 from geomech.errors import named
+from geomech.files import note
 
 
 def velocity(
@@ -21,6 +22,8 @@ def velocity(
     from geomech.scene import load
 
     scene, asked = load(name), (("--alpha", alpha), ("--alphadot", alphadot))
+    for line in scene.system.notes:
+        note(f"{scene.name}: {line}")
     with named(scene.name):
         out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
     if as_json:

@@ -15,6 +15,7 @@ import msgspec
 from geomech.errors import SceneError, UnitWarning, choose, named, short
 from geomech.files import note, read_text
 from geomech.gaits import KINDS as GAITS
+from geomech.kinds import choose_kind
 from geomech.scene import slips
 from geomech.scene.medium import with_files
 from geomech.scene.model import Numerics, Scene, checked_scene
@@ -213,7 +214,7 @@ def _medium(place: str, table: dict):
 def _kind(place: str, table: dict, key: str, kinds: Mapping[str, type]) -> str:
     if key not in table:
         raise SceneError(f"{place} has no {key!r}: add {key} = one of {', '.join(kinds)}")
-    return choose(f"{place} {key}", table[key], kinds)
+    return choose_kind(f"{place} {key}", table[key], kinds)
 
 
 def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type], fill=lambda place, table, kind: table):

@@ -13,6 +13,7 @@ import numpy as np
 from geomech import __version__
 from geomech.errors import SceneError, real_array, short
 from geomech.files import note
+from geomech.kinds import code
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
@@ -139,8 +140,9 @@ def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     of_system = {f.name: repr(getattr(system, f.name)) for f in dataclasses.fields(system) if f.name != "solver"}
     numerics = f"{scene.numerics}, {system.solver}"
     parts = {"system": system.kind, **of_system, "gait": repr(scene.gait), "numerics": numerics}
+    own = {"own code": code()} if code() else {}
     over = [[name, list(x)] for name, x in values.items()]
-    return {"geomech": __version__, "solver": SOLVER, "scene": scene.text, **parts, "over": over}
+    return {"geomech": __version__, "solver": SOLVER, **own, "scene": scene.text, **parts, "over": over}
 
 
 class _Rows(list):

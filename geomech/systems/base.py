@@ -80,7 +80,8 @@ class Plain:
     time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
     joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed: forces
-    on an element have an exact form, which finer loads come near to.
+    on an element have an exact form, which finer loads come near to. notes: lines on what its user may not expect of how
+    it is computed.
     """
 
     kind = "system"
@@ -94,6 +95,7 @@ class Plain:
     together = 1 << 12
     held = cut = 0
     closed = joint_angles = False
+    notes: tuple[str, ...] = ()
     settling = 0.0
     engine = "algebraic"
 
@@ -221,4 +223,12 @@ def checked_system(system):
     """system, or ValueError if it is nothing of the kind."""
     if isinstance(system, type) or not all(hasattr(system, x) for x in ("joints", "velocity", "run", "lacks")):
         raise ValueError(f"system must be a system such as Swimmer(medium, body), got {short(system)}")
+    refuse_mutable(system)
     return system
+
+
+def refuse_mutable(*parts) -> None:
+    """ValueError for a part of a class that has no hash: tables are kept under the system that they are of."""
+    for part in parts:
+        if type(part).__hash__ is None:
+            raise ValueError(f"{type(part).__name__} must be a value: put @dataclass(frozen=True) above the class")

@@ -8,7 +8,7 @@ import numpy as np
 
 from rft.contact import SIDE, Model, PerSample
 from rft.effects.base import Effect
-from rft.media.base import check_ranges, require
+from rft.media.base import check_ranges, is_linear, require
 from rft.media.catalogue import GRAVITY
 from rft.premise import Premise
 
@@ -52,7 +52,7 @@ class GrainInertia(Effect):
 
     def apply(self, model: Model) -> Model:
         medium = model.medium
-        require(medium.dry != (), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
+        require(not is_linear(medium), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         k = self._known_k(medium)
         beta = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)

@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.base import Kinematics
 from rft.contact import Averages, Contact, Model
 from rft.effects.base import Effect
-from rft.media.base import check_ranges, require
+from rft.media.base import check_ranges, is_linear, require, viscous_terms
 from rft.media.coulomb import Coulomb
 
 
@@ -35,7 +35,7 @@ class TowedSled(Effect):
 
     def apply(self, model: Model) -> Model:
         medium = model.medium
-        dry = medium.dry != () and not any(medium.viscous or ())
+        dry = not is_linear(medium) and not any(viscous_terms(medium) or ())
         require(dry, f"a towed sled takes a medium without viscous drag, got {type(medium).__name__}")
         sled = Contact(Averages(Coulomb()), self.behind, stations=(0.0,), buried=False, factors=(self,))
         return model.touching("sled", sled)

@@ -1,6 +1,6 @@
 """Force laws, one file each, and the catalogue of named media."""
 
-from rft.media.base import Medium, TermLaw, is_linear
+from rft.media.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent
 from rft.media.catalogue import CATALOGUE
 from rft.media.coulomb import Coulomb
 from rft.media.granular import Granular
@@ -9,4 +9,17 @@ from rft.media.viscous import Viscous
 
 LAWS = {"granular": Granular, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
 
-__all__ = ["CATALOGUE", "LAWS", "Coulomb", "Granular", "Medium", "Table", "TermLaw", "Viscous", "is_linear"]
+__all__ = [
+    "CATALOGUE",
+    "LAWS",
+    "Coulomb",
+    "Granular",
+    "Medium",
+    "Table",
+    "TermLaw",
+    "Viscous",
+    "is_closed",
+    "is_linear",
+    "is_mirror",
+    "is_rate_independent",
+]

@@ -16,14 +16,15 @@ class Medium(Protocol):
 
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the
     closed-form link integrals of `rft.loads`. A law of another form sets both to None, supplies
-    `traction` alone and is integrated by quadrature. ``k``, where a medium has one, is that of Eq. 2 (`Granular`).
+    `traction` alone and is integrated by quadrature: it may leave out all else, which then is as said here (`dry_terms`,
+    `viscous_terms`, `is_mirror`). ``k``, where a medium has one, is that of Eq. 2 (`Granular`).
     A measured medium may have a ``covariance`` (n, n), of the parameters that ``uncertain`` names, in their order; it
     changes no force (`checked_covariance`).
     """
 
-    dry: tuple[tuple[float, float, float], ...] | None
-    viscous: tuple[float, float] | None
-    mirror: bool  # left and right are alike: f_n is odd, f_t even in v_n
+    dry: tuple[tuple[float, float, float], ...] | None = None
+    viscous: tuple[float, float] | None = None
+    mirror: bool = False  # left and right are alike: f_n is odd, f_t even in v_n
 
     def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -63,14 +64,51 @@ class TermLaw:
         )
 
 
+def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
+    """The rate-independent terms (q, k_t, k_n) of a medium's closed form, None where it has none."""
+    return getattr(medium, "dry", None)
+
+
+def viscous_terms(medium) -> tuple[float, float] | None:
+    """(c_t, c_n) of a medium's closed form, None where it has none."""
+    return getattr(medium, "viscous", None)
+
+
+def is_closed(medium) -> bool:
+    """Whether the medium has a closed form, so that its integrals over a link are exact."""
+    return dry_terms(medium) is not None and viscous_terms(medium) is not None
+
+
+def is_mirror(medium) -> bool:
+    """Whether the medium says that left and right are alike; then a field takes half the balances."""
+    return bool(getattr(medium, "mirror", False))
+
+
 SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
 def require_law(medium: Medium) -> None:
-    """Raise ValueError for what is no medium."""
-    good = all(hasattr(medium, name) for name in ("dry", "viscous", "traction")) and not isinstance(medium, type)
+    """Raise ValueError for what is no medium, or whose `traction` cannot be asked for the drag on arrays of elements."""
+    good = hasattr(medium, "traction") and not isinstance(medium, type)
     require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    if is_closed(medium):
+        return
+    name = f"{type(medium).__name__}.traction"
+    try:
+        with np.errstate(all="ignore"):
+            f_t, f_n = medium.traction(1.0, 0.0)
+            f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} must take (v_t, v_n, eps=0.0) and return (f_t, f_n), eps being the speed below which dry friction is "
+            f"rounded off: {error}"
+        ) from error
+    except Exception as error:
+        raise ValueError(f"{name} fails: {type(error).__name__}: {error}") from error
+    shapes = np.shape(f_t), np.shape(f_n)
+    good = set(shapes) <= {(), (1,), (2, 3)}
+    require(good, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
 
 
 def require_drag(medium: Medium) -> None:
@@ -93,7 +131,21 @@ def require_drag(medium: Medium) -> None:
 
 def is_linear(medium: Medium) -> bool:
     """Whether drag is proportional to velocity, so that the body velocity is linear in alphadot."""
-    return medium.dry == ()
+    return dry_terms(medium) == () and is_closed(medium)
+
+
+def is_rate_independent(medium: Medium) -> bool:
+    """Whether it does not matter how fast a gait is run: drag grows with the same power of the speed in all directions."""
+    if is_closed(medium):
+        return not (medium.dry and any(medium.viscous))
+    speeds = np.logspace(-3, 1, 5)[:, None]
+    with np.errstate(all="ignore"):
+        f = np.stack(np.broadcast_arrays(*medium.traction(speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))))
+    size = np.sqrt((f**2).sum((0, 2)))
+    if not np.isfinite(size).all() or not size.all():
+        return False
+    form, growth = f / size[:, None], size[1:] / size[:-1]
+    return bool(np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max())
 
 
 def real_array(name: str, x) -> np.ndarray:

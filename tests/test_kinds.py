@@ -1,0 +1,410 @@
+"""Laws, bodies, gaits, effects and systems of one's own: by a file, by `register`, by an installed package."""
+
+import importlib.metadata
+import json
+import math
+import pathlib
+import re
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from geomech import cli, kinds
+from geomech.errors import SceneError
+from geomech.gaits import KINDS as GAITS
+from geomech.gaits import Circle, Gait
+from geomech.kinds import FAMILIES, load_file, register
+from geomech.output.explain import explain
+from geomech.scene import Numerics, Scene, load, parse, toml
+from geomech.study import estimate
+from geomech.study.bench import Study
+from geomech.study.sweep import question
+from geomech.systems import Plain, Premise, Swimmer
+from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
+from rft.contact import SIDE
+from rft.effects import Effect
+from rft.media.base import TermLaw, is_rate_independent
+
+README = (pathlib.Path(__file__).parents[1] / "README.md").read_text()
+SMALL = Numerics(grid=7, phases=32)
+
+
+@pytest.fixture(autouse=True)
+def as_before(monkeypatch):
+    before = {group: dict(family.kinds) for group, family in FAMILIES.items()}
+    modules = set(sys.modules)
+    monkeypatch.setattr(kinds, "_code", {})
+    yield
+    for group, family in FAMILIES.items():
+        family.kinds.clear()
+        family.kinds.update(before[group])
+    for name in set(sys.modules) - modules:
+        if name.startswith("geomech_plugin_"):
+            del sys.modules[name]
+
+
+def told(capsys, *argv):
+    with pytest.raises(SystemExit) as left:
+        cli.main(list(argv))
+    return left.value.code, *capsys.readouterr()
+
+
+class Bare:
+    """A law that supplies its traction and nothing else."""
+
+    def __init__(self, law):
+        self.of = law
+
+    def traction(self, v_t, v_n, eps=0.0):
+        return self.of.traction(v_t, v_n, eps)
+
+
+LAW = """
+from dataclasses import dataclass
+@dataclass(frozen=True)
+class Thick:
+    "thickness (-): drag over speed."
+    thickness: float = 1.0
+    law = "thick"
+    def traction(self, v_t, v_n, eps=0.0):
+        return self.thickness * v_t, 2.5 * self.thickness * v_n
+"""
+SCENE = """[medium]\nlaw = "thick"\nthickness = 3.0\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
+[gait]\nkind = "circle"\ncentre = [0.2, -0.1]\n[numerics]\ngrid = 7\nphases = 32\n"""
+
+
+def test_the_law_of_the_readme_runs_as_it_stands_there(tmp_path, capsys, monkeypatch):
+    section = README.partition("## Laws, bodies")[2].partition("\n## ")[0]
+    (law,), scene = re.findall(r"```python\n(.*?)```", section, re.S), re.search(r"```toml\n(.*?)```", section, re.S)[1]
+    assert len(law.splitlines()) == 15
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "power.py").write_text(law)
+    (tmp_path / "power.toml").write_text(scene)
+    command = re.search(r"`geomech (displacement power\.toml .*?)`", section)[1]
+    code, out, err = told(capsys, *command.split(), "--json", "--methods", "direct")
+    assert code == 0
+    assert err.count("\n") == 1
+    assert "power gives its traction alone" in err and "gauss:24" in err and "five times" in err
+    module = {}
+    exec(law, module)
+    shear = Swimmer(module["Power"](0.4), Chain())
+    net = json.loads(out)["direct"]
+    np.testing.assert_allclose(net, shear.run(*Circle().cycle(256, [0.5, 1.0])).net, atol=1e-9)
+    assert {p.name for p in tmp_path.iterdir()} == {"power.py", "power.toml"}  # no cache beside them
+    # With the power 1 it is a viscous law of the same ratio, whose integrals are exact.
+    alike = Swimmer(module["Power"](1.0), Chain()).run(*Circle().cycle(32)).net
+    np.testing.assert_allclose(alike, Swimmer(Viscous(3.0), Chain()).run(*Circle().cycle(32)).net, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", [Viscous(3.7), Granular(C=2.3, gamma0=0.4)], ids=["viscous", "granular"])
+def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
+    gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
+    exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
+    finer = bare.turned(loads="gauss:192")  # an eighth of the error
+    for tier in (
+        ("area", "direct") if exact.scene.system.linear else exact.methods
+    ):  # a linear law looks nothing else up
+        ours, theirs, better = (x.displacement(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
+        size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
+        assert off < 0.04 * size
+        assert estimate.distance(ours, better).max() <= max(off / 4, 1e-9)
+    poses, errors = estimate.direct(bare.scene, gait, amplitudes, 128)
+    truth = estimate.direct(exact.scene, gait, amplitudes, 1024)[0]
+    assert (estimate.apart(poses, truth, 1.0) <= errors + 1e-9).all()
+    assert exact.tiers == bare.tiers
+
+
+def test_a_law_of_traction_alone_takes_effects_and_backbones():
+    fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4), (EndCaps(0.1),) * 0)
+    exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
+    alpha, alphadot = np.full((2, 7), 0.3) * [[1], [-2]], np.cos(np.arange(14.0)).reshape(2, 7)
+    np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
+    assert fine.evaluations == 24 * exact.evaluations
+    assert "gauss:24" in explain(Scene(fine, load("sandfish-close").gait.__class__(elements=8), SMALL))
+    assert fine.finer().solver.loads == "gauss:48"
+    assert fine.about()["loads"] == "gauss:24"
+    told_otherwise = fine.with_solver(loads="midpoint:10")
+    assert (told_otherwise.notes, told_otherwise.finer().solver.loads) == ((), "midpoint:20")
+
+
+def test_the_speed_matters_under_a_law_of_no_one_power():
+    class Mud(TermLaw):
+        dry, viscous = ((1.0, 1.0, 1.5),), (1.0, 2.0)
+
+    for mud in (Mud(), Bare(Mud())):
+        assert not is_rate_independent(mud)
+        swimmer = Swimmer(mud, Chain())
+        assert swimmer.lacks == Premise.RATE_INDEPENDENT
+        with pytest.raises(
+            ValueError, match="no connection or CCF with the law .*no one power of the speed: use the dir"
+        ):
+            Study(Scene(swimmer, Circle(), SMALL)).displacement("path")
+    for law in (Viscous(), Coulomb(), Bare(Viscous()), Bare(Granular(1.8, 0.24)), Bare(Coulomb())):
+        assert is_rate_independent(law)
+
+
+def test_tractions_that_cannot_be_asked_are_refused_with_one_line():
+    class NoRounding:
+        def traction(self, v_t, v_n):
+            return v_t, v_n
+
+    class Wrong:
+        def __init__(self, f):
+            self.traction = lambda v_t, v_n, eps=0.0: f(v_t, v_n)
+
+    for law, said in (
+        (NoRounding(), r"NoRounding.traction must take \(v_t, v_n, eps=0.0\)"),
+        (Wrong(lambda t, n: t), "must take|must return|fails"),
+        (
+            Wrong(lambda t, n: (t, np.ones(5))),
+            r"must return arrays of the velocities' shape \(2, 3\), got \(2, 3\) and \(5,",
+        ),
+        (Wrong(lambda t, n: 1 / 0), "Wrong.traction fails: ZeroDivisionError"),
+        (Wrong(lambda t, n: (-t, -n)), "no drag at any velocity"),
+    ):
+        with pytest.raises(ValueError, match=said) as caught:
+            body_velocity(law, Chain(), np.zeros(2), np.ones(2))
+        assert "\n" not in str(caught.value)
+
+
+# One of each family, not of 1's and 0's, as a file would hold it.
+@dataclass(frozen=True)
+class Hinge:
+    """Two plates. angle (rad): of one to the other at rest."""
+
+    angle: float = 0.2
+    length = 1.0
+    joints = 2
+    kind = "hinge"
+
+    def motion(self, alpha, alphadot):
+        return Chain((1, 2, 1)).motion(alpha + self.angle, alphadot)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peanut(Gait):
+    """waist (-): how far it is drawn in."""
+
+    waist: float = 0.3
+    harmonics = 3
+    kind = "peanut"
+
+    def unit(self, t):
+        t = np.asarray(t, float)
+        return np.stack([np.cos(t), np.sin(t) * (1 - self.waist * np.sin(t) ** 2)], -1)
+
+    def unit_rate(self, t):
+        t = np.asarray(t, float)
+        return np.stack([-np.sin(t), np.cos(t) * (1 - 3 * self.waist * np.sin(t) ** 2)], -1)
+
+
+@dataclass(frozen=True)
+class Slick(Effect):
+    """by (-): factor of the drag along."""
+
+    by: float = 0.5
+    kind = "slick"
+    limit = "by = 1"
+    cost = "one multiplication"
+
+    def apply(self, model):
+        return model.changed(SIDE, factors=(self,))
+
+    def __call__(self, v_t, v_n, spin):
+        return self.by, None
+
+
+@dataclass(frozen=True)
+class Car(Plain):
+    """base (m): between the axles."""
+
+    base: float = 0.4
+    kind = "car"
+    joints = 2
+    linear = True
+
+    def velocity(self, alpha, alphadot):
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        v = alphadot[..., 0]
+        return np.stack([v, 0 * v, v * np.tan(0.3 * np.tanh(alpha[..., 1])) / self.base], -1)
+
+
+OWN = {
+    "hinge": '[medium]\nname = "coulomb"\n[body]\nkind = "hinge"\nangle = -0.1\n[gait]\nkind = "circle"\n',
+    "peanut": '[medium]\nname = "viscous-2"\n[body]\nkind = "chain"\n[gait]\nkind = "peanut"\nwaist = 0.1\n',
+    "slick": '[medium]\nname = "coulomb"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n[[effects]]\nkind = "slick"\n',
+    "car": '[system]\nkind = "car"\nbase = 0.3\n[gait]\nkind = "circle"\n',
+}
+PARTS = {"hinge": Hinge, "peanut": Peanut, "slick": Slick, "car": Car}
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_one_of_each_family_runs_everywhere_and_round_trips(name):
+    text = OWN[name] + "[numerics]\ngrid = 7\nphases = 32\n"
+    with pytest.raises(SceneError, match=f"{name}' is unknown"):
+        parse(text)
+    assert register(PARTS[name]) is PARTS[name]
+    scene = parse(text)
+    assert parse(toml(scene)) == scene
+    anew = toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
+    assert f'"{name}"' in anew
+    assert toml(parse(anew)) == anew
+    assert name in explain(scene)
+    study = Study(scene)
+    table = study.study([0.4, 0.7], study.methods)
+    assert np.isfinite(table["direct"]).all()
+    with pytest.raises(ValueError, match="car|hinge|peanut|slick"):
+        register(type("Other", (PARTS[name],), {"__module__": "elsewhere"}))  # two of one name
+
+
+def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, capsys, monkeypatch):
+    (tmp_path / "thick.py").write_text(LAW)
+    (tmp_path / "thick.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    velocity = ["velocity", "thick.toml", "--alpha", "0.3,0.2", "--alphadot", "1,0", "--json"]
+    code, out, err = told(capsys, *velocity)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1 and "'thick' is unknown" in err and "--plugin" in err
+    code, out, err = told(capsys, *velocity, "--plugin", "thick.py")
+    assert code == 0
+    xi = body_velocity(Viscous(2.5), Chain((1, 1.4, 0.8)), [0.3, 0.2], [1, 0]).xi
+    np.testing.assert_allclose(json.loads(out)["xi"], xi, atol=1e-9)
+    assert told(capsys, "--plugin", "thick.py", *velocity)[:2] == (0, out)
+    (tmp_path / "more.py").write_text(LAW.replace("thick", "thin").replace("Thick", "Thin"))
+    assert told(capsys, *velocity, "--plugin", "more.py", "--plugin", "thick.py")[:2] == (0, out)
+    (tmp_path / "thick.py").write_text(LAW.replace("2.5", "1.0"))  # mended: the new one counts
+    assert told(capsys, *velocity, "--plugin", "thick.py")[1] != out
+
+
+def test_every_command_that_takes_a_scene_takes_plugins():
+    for command in cli.app.registered_commands:
+        text = str(command.callback.__annotations__)
+        assert ("--plugin" in text) == ("SCENE" in text or command.callback.__name__ == "keys"), command.callback
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("law = ", "line 1: SyntaxError"),
+        ("import nothing_of_that_name", "line 1: ModuleNotFoundError: No module named 'nothing_of_that_name'"),
+        ("x = 1\nraise SystemExit(3)", "line 2: SystemExit: 3"),
+        ("x = 1", 'no class in it has a law = "..."'),
+        (LAW.replace('"thick"', '"granular"'), "is named 'granular', as one that is built in: give it another name"),
+        (LAW.replace("(frozen=True)", ""), "must be a value: put @dataclass(frozen=True) above it"),
+        (LAW.replace("law =", "law: str ="), "has law as a parameter: write law = 'thick' without a type"),
+        (LAW.replace('"thick"', "3"), 'has no name: give the class law = "..."'),
+        (LAW.replace("traction", "drag"), "is no part of a scene: a law is a class with `traction`"),
+        (LAW + LAW.replace("Thick", "Other"), "is named 'thick', as the Thick of"),
+        (LAW + LAW.replace("Thick", "Other").replace('"thick"', '"viscous"'), "built in"),
+    ],
+)
+def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, said, tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=".") as caught:
+        load_file(path)
+    assert said in str(caught.value)
+    assert str(caught.value).startswith(f"--plugin {path}")
+    assert kinds.code() == {}
+    assert "thick" not in FAMILIES["geomech.media"].kinds
+    assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
+
+
+def test_names_of_no_python_file_are_refused(tmp_path):
+    for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
+        with pytest.raises(SceneError, match=said):
+            load_file(tmp_path / name if name else "")
+    (tmp_path / "own.py").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="--plugin"):
+        load_file(tmp_path / "own.py")
+
+
+def test_a_sweep_knows_the_code_it_was_computed_with(tmp_path):
+    (tmp_path / "thick.py").write_text(LAW)
+    load_file(tmp_path / "thick.py")
+    asked = [question(parse(SCENE), {"gait.amplitude": [1.0]})]
+    (tmp_path / "thick.py").write_text(LAW.replace("2.5", "2.6"))
+    load_file(tmp_path / "thick.py")
+    asked.append(question(parse(SCENE), {"gait.amplitude": [1.0]}))
+    assert asked[0] != asked[1]
+    assert {k for k in asked[0] if asked[0][k] != asked[1][k]} == {"own code"}
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Makes an installed package of this code that offers ``name`` in a group."""
+
+    def install(code, name="thick", group="geomech.media", dist="sands", value="{}:Thick"):
+        module = f"{dist}_laws"
+        (tmp_path / f"{module}.py").write_text(code)
+        info = tmp_path / f"{dist}-1.2.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {dist}\nVersion: 1.2\n")
+        (info / "entry_points.txt").write_text(f"[{group}]\n{name} = {value.format(module)}\n")
+        monkeypatch.syspath_prepend(str(tmp_path))
+        importlib.invalidate_caches()
+        monkeypatch.delitem(sys.modules, module, raising=False)
+
+    return install
+
+
+def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
+    package(LAW)
+    package("raise RuntimeError('loaded unasked')", "other", dist="broken")
+    assert load("three-link-viscous")
+    assert "sands_laws" not in sys.modules
+    assert "thick" in kinds.offered("geomech.media")
+    scene = parse(SCENE)
+    assert type(scene.system.medium).__module__ == "sands_laws"
+    assert parse(toml(scene)) == scene
+    assert kinds.code() == {"the package sands 1.2": "sands_laws:Thick"}
+
+
+def test_entry_points_of_all_families_are_read(package):
+    for name, group in (("hinge", "bodies"), ("peanut", "gaits"), ("slick", "effects"), ("car", "systems")):
+        package("from test_kinds import *", name, f"geomech.{group}", group, f"{{}}:{PARTS[name].__name__}")
+        assert parse(OWN[name])
+        assert type(parse(OWN[name])) is Scene
+
+
+@pytest.mark.parametrize(
+    ("code", "more", "said"),
+    [
+        ("import no_such_thing", {}, "'thick' of the package sands 1.2 cannot be loaded: ModuleNotFoundError"),
+        ("x = 1", {}, "of the package sands 1.2 cannot be loaded: AttributeError"),
+        ("Thick = 3", {}, "of the package sands 1.2: 3 is no part of a scene"),
+        (LAW.replace('"thick"', '"thin"'), {}, "of the package sands 1.2: its law is 'thin': give both one name"),
+        (LAW.replace("(frozen=True)", ""), {}, "of the package sands 1.2: a law of one's own, Thick, must be a value"),
+        ("from test_kinds import Hinge as Thick", {}, "of the package sands 1.2: Hinge is not a law"),
+    ],
+)
+def test_a_broken_package_is_named_in_one_line(code, more, said, package):
+    package(code, **more)
+    with pytest.raises(SceneError, match=".") as caught:
+        parse(SCENE)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_packages_of_one_name_and_built_in_names(package):
+    package(LAW)
+    package(LAW, dist="muds")
+    with pytest.raises(SceneError, match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one"):
+        parse(SCENE)
+    package("raise RuntimeError", "viscous", dist="clash")
+    assert type(load("three-link-viscous").system.medium) is Viscous  # the built-in one stands
+
+
+def test_parts_are_values_and_need_not_be_registered_from_python():
+    class Loose(Bare):
+        __hash__ = None
+
+    with pytest.raises(ValueError, match="frozen"):
+        Scene(Swimmer(Loose(Viscous()), Chain()), Circle())
+    scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
+    assert Study(scene).displacement("area").shape == (3,)
+    with pytest.raises(SceneError, match="Bare is of no kind that a scene file can name"):
+        toml(scene)
+    assert set(GAITS) == {*kinds.BUILT_IN["geomech.gaits"]}
