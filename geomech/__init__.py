@@ -1,3 +1,70 @@
-"""Geometric mechanics of locomotion: connections, curvature constraint functions, displacement of gaits."""
+"""Geometric mechanics of locomotion: from a force law to the displacement of a gait.
+
+    scene = geomech.load("three-link-glass")      # a built-in name, or a TOML file
+    study = geomech.Study(scene)
+    study.displacement("direct", amplitudes=[0.5, 1.0])
+
+load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
+Study                                   what follows: connection, CCF, displacements and their errors
+media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
+tiers                                   ways to predict a displacement
+connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
+undulation, plots                       swimmers that undulate; figures
+
+On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
+    from geomech import connection as connection
+    from geomech import curvature as curvature
+    from geomech import gaits as gaits
+    from geomech import reconstruct as reconstruct
+    from geomech import systems as systems
+    from geomech import tiers as tiers
+    from geomech.kinds import register as register
+    from geomech.output import plots as plots
+    from geomech.scene import Numerics as Numerics
+    from geomech.scene import Scene as Scene
+    from geomech.scene import load as load
+    from geomech.scene import toml as toml
+    from geomech.study import undulation as undulation
+    from geomech.study.bench import Study as Study
+    from geomech.systems import Swimmer as Swimmer
+    from rft import bodies as bodies
+    from rft import effects as effects
+    from rft import media as media
 
 __version__ = "0.1.0"
+
+_MODULES = {  # by the name they have here; none is imported before it is asked for
+    **{name: f"geomech.{name}" for name in ("connection", "curvature", "gaits", "reconstruct", "systems", "tiers")},
+    **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
+    "plots": "geomech.output.plots",
+    "undulation": "geomech.study.undulation",
+}
+_OBJECTS = {
+    **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scene"),
+    "Study": "geomech.study.bench",
+    "Swimmer": "geomech.systems",
+    "register": "geomech.kinds",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name in _MODULES:
+        found = import_module(_MODULES[name])
+    elif name in _OBJECTS:
+        found = getattr(import_module(_OBJECTS[name]), name)
+    else:
+        raise AttributeError(f"module 'geomech' has no attribute {name!r}")
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*_MODULES, *_OBJECTS, "__doc__", "__file__", "__name__", "__path__", "__version__"})

@@ -7,7 +7,11 @@ import difflib
 import math
 import numbers
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class SceneError(ValueError):
@@ -45,7 +49,7 @@ def check_angle(what: str, largest: float) -> None:
 
 
 @contextlib.contextmanager
-def named(place: str):
+def named(place: str) -> Iterator[None]:
     """Say of what is wrong that it is so in this scene, unless it says so itself."""
     try:
         yield
@@ -82,7 +86,7 @@ def is_whole(value: object) -> bool:
     return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
 
 
-def real_array(name: str, values):
+def real_array(name: str, values) -> np.ndarray:
     """values as a NumPy array of floats, or ValueError naming it."""
     import numpy as np  # the command starts without it
 

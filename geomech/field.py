@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -93,11 +94,11 @@ class Field:
         return out
 
     @cached_property
-    def spline(self):
+    def spline(self) -> Any:
         self._refuse_masks()
         return _tensor_spline(self)
 
-    def antiderivative(self, axis: int):
+    def antiderivative(self, axis: int) -> Any:
         """The spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
         self._refuse_masks()
         return _tensor_spline(self, integrate=axis)

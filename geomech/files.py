@@ -10,7 +10,7 @@ import secrets
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from geomech.errors import SceneError
@@ -79,7 +79,7 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path):
+def whole_file(path: str | Path) -> Iterator[Path]:
     """A path to write to, of the same name; moved to ``path`` on success, removed on failure. SceneError if nothing can
     be written there."""
     refused = lambda error: SceneError(f"cannot write {path}: {why(error)}; choose another output")
@@ -99,7 +99,7 @@ def whole_file(path: str | Path):
 
 
 @contextlib.contextmanager
-def whole_folder(path: str | Path, inputs: Iterable[Path] = ()):
+def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
     SceneError if that cannot be, or if one would replace an input."""
     refused = lambda error: SceneError(f"cannot write the folder {path}: {why(error)}; choose another with -o")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import sympy as sp
 
 
@@ -15,7 +18,7 @@ def ccf(A: sp.Matrix, alpha, i: int = 0, j: int = 1) -> sp.Matrix:
     return A[:, j].diff(alpha[i]) - A[:, i].diff(alpha[j]) + bracket(A[:, i], A[:, j])
 
 
-def velocity(A: sp.Matrix, alpha):
+def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
     """The callable velocity(alpha, alphadot) -> xi that `geomech.connection.fit` and `geomech.tiers.direct.direct` take."""
     import numpy as np
 

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import typer
@@ -23,7 +24,7 @@ PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is
 
 
 @contextlib.contextmanager
-def progress(title: str):
+def progress(title: str) -> Iterator[Callable[[float], None]]:
     """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
     if not sys.stderr.isatty():
         yield lambda fraction: None
@@ -44,7 +45,7 @@ class Stopped(BaseException):
 
 
 @contextlib.contextmanager
-def stoppable():
+def stoppable() -> Iterator[None]:
     """INT, TERM and HUP raise `Stopped`, so that nothing half-written stays behind. Those that are ignored, as HUP is under
     nohup, stay so."""
     heard = [-math.inf]

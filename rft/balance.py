@@ -103,7 +103,7 @@ def checked_body(body) -> Body:
     return body
 
 
-def checked_input(body, alpha, alphadot, regularisation, tolerance):
+def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
     checked_body(body)
     in_range("regularisation", regularisation, 1e-15, 1e3)
     in_range("tolerance", tolerance, 1e-15, 1e3)

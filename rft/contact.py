@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -23,11 +23,11 @@ from rft.sides import sided
 class PerSample:
     """Base of what holds parameters: an array has the samples of a batch on its last axis, or one element there for all."""
 
-    def take(self, index):
+    def take(self, index) -> Self:
         """The same for the samples ``index``; itself where nothing differs from sample to sample."""
         return self.having(**{f.name: x[..., index] for f in fields(self) if _differs(x := getattr(self, f.name))})
 
-    def having(self, **values):
+    def having(self, **values) -> Self:
         """The same with some parameters set, to arrays for one; checks, which are for single numbers, are not repeated."""
         if not values:
             return self
@@ -96,7 +96,7 @@ class Averages(PerSample):
     def rate_independent(self) -> bool:
         return bool(dry_terms(self.medium)) and not any(viscous_terms(self.medium) or ())
 
-    def __call__(self, v_t, v_n, spin, eps):
+    def __call__(self, v_t, v_n, spin, eps) -> np.ndarray:
         return self.averages(v_t, v_n, spin, eps)
 
 

@@ -50,7 +50,7 @@ class HeavyApproach(Approach):
         self.cycles: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self.step, self.failures = np.zeros((3, samples)), np.zeros(samples, int)
 
-    def after(self, start, end, moved):
+    def after(self, start, end, moved) -> np.ndarray:
         last, self.moved = self.moved, moved
         if start is None:  # the first cycle starts from rest
             return self.drift

@@ -14,6 +14,7 @@ positive determinant.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -87,7 +88,7 @@ class _Walk:
         return _Walk(**{k: x.take(keep) if k in moves else x[..., keep] for k, x in parts.items()})
 
 
-def follow(problem, index: np.ndarray, wanted: float, budget: int):
+def follow(problem, index: np.ndarray, wanted: float, budget: int) -> Iterator[tuple]:
     """Solve the samples ``index`` (B,) of a `rft.newton.Balance` under way. Yields (their places in the batch, xi (3, b),
     element velocities, residual (b,), evaluations (b,)) as they end, with residual inf where the budget is spent.
     wanted: the size of a step's first correction, by which the next step is chosen."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 
-def viscous_chain(lengths=(1, 1, 1), ratio=2, link: int = 2):
+def viscous_chain(lengths=(1, 1, 1), ratio=2, link: int = 2) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]]:
     """A(alpha) of a chain of links in a linear medium, in the frame of one link.
 
     lengths: of the links, divided by their sum; exact numbers or symbols. ratio: normal over axial drag.

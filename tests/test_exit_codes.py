@@ -24,9 +24,10 @@ COMMANDS = {
     "calibrate": ["-o", "out.toml", "--plot", "out.svg"],
     "explain": [],
     "scenes": [],
+    "keys": [],
 }
-SOLVING = [name for name in COMMANDS if name not in ("calibrate", "explain", "scenes")]
-SUBJECT = {"scenes": [], "calibrate": ["dem-rod-drag"]}  # where it is no scene
+SUBJECT = {"scenes": [], "keys": [], "calibrate": ["dem-rod-drag"]}  # where it is no scene
+SOLVING = [name for name in COMMANDS if name not in ("explain", *SUBJECT)]
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
 
 
@@ -86,8 +87,9 @@ def refused(told, said):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_the_user_can_mend_ends_with_2(name, ended):
     refused(ended(*arguments(name), "--fast"), "No such option: --fast")
-    if name == "scenes":
+    if name in ("scenes", "keys"):
         refused(ended("scenes", "--show", "three-link-glas"), "did you mean 'three-link-glass'")
+        refused(ended("keys", "gaits"), "did you mean 'gait'")
         return
     what = "drag" if name == "calibrate" else "scene"
     refused(ended(name, "nothing", *COMMANDS[name]), f"{what}: 'nothing' is unknown")

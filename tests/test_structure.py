@@ -8,9 +8,11 @@ import mutants
 from geomech.commands import COMMANDS
 
 ROOT = pathlib.Path(__file__).parents[1]
-# Beside the systems: a command lists the named media, a sweep puts effects side by side, a calibration fits a law, and a class
-# of one's own is told to be an effect.
-KNOW_MECHANICS = {"commands/scenes.py", "kinds.py", "study/batch.py", "study/calibration.py", "study/sweep.py"}
+# Beside the systems: a command lists the named media, a sweep puts effects side by side, a calibration fits a law, a class of
+# one's own is told to be an effect, and the top shows media, bodies and effects to type checkers.
+KNOW_MECHANICS = {
+    "__init__.py", "commands/scenes.py", "kinds.py", "study/batch.py", "study/calibration.py", "study/sweep.py",
+}  # fmt: skip
 
 
 def imports(path):

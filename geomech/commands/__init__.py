@@ -12,4 +12,5 @@ COMMANDS = (
     "calibrate",
     "explain",
     "scenes",
+    "keys",
 )

@@ -9,13 +9,17 @@ import typer
 from geomech.errors import choose
 
 
-def scenes(show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's TOML")] = None):
+def scenes(
+    show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's or medium's TOML")] = None,
+):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
     from geomech.scene import builtin_names, load
+    from geomech.scene.write import medium_toml
 
     if show is not None:
-        print(load(choose("--show", show, builtin_names())).text, end="")
+        name = choose("--show", show, [*builtin_names(), *rft.CATALOGUE])
+        print(medium_toml(name, rft.CATALOGUE[name]) if name in rft.CATALOGUE else load(name).text, end="")
         return
     for scene_name in builtin_names():
         print(f"{scene_name:24} {load(scene_name).text.splitlines()[0].lstrip('# ')}")

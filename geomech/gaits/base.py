@@ -16,9 +16,11 @@ LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 class Gait:
     """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
 
-    amplitude: scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
+    amplitude (-): scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
     reflected through the centre, alpha - centre -> centre - alpha at every phase. All gaits and tiers keep to that.
-    centre: shape angles (rad), the origin if left empty. reverse: run the curve backwards, t -> -t, from the same start.
+    centre (rad): shape angles, the origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
+    start.
+
     angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
     """
 

@@ -21,8 +21,9 @@ UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still count
 class Centreline(Gait):
     """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude scales them.
 
-    file: CSV; in a scene from a file relative to that file's folder, else to the current one. Its header line says
-    what it holds, in any order of the rows:
+    file (-): CSV; in a scene from a file relative to that file's folder, else to the current one.
+
+    Its header line says what it holds, in any order of the rows:
       t,s,curvature   curvature in rad per body length at s, 0 at the tail to 1 at the head; every s at every t
       t,point,x,y     points of the midline, numbered from the tail to the head; the same points at every t
       t,x,y           the same without numbers, in the order of the rows; frames may differ in their number
@@ -30,12 +31,18 @@ class Centreline(Gait):
     positive counter-clockwise and y runs upwards: pixels counted downwards give the mirror image. A midline keeps its
     length: each frame is scaled to its own, and where it lies and points to does not matter.
 
-    period: in the unit of t. Left out, the frames run over it once if the last repeats the first; else, if they are
-    equally spaced, it is their number times their spacing. In time the bends are a periodic cubic spline, of order 4 in
-    the spacing of the frames; along the body splines too, of order 4 in that of s, 3 in that of points. keep_harmonics,
-    keep_modes: smooth by least squares instead, with that many harmonics in time and Legendre modes of the curvature
-    along the body; 0 for none. sha256: of the file, filled in if left out; given, the file must have it. The file is
-    read once, when the gait is made.
+    elements (-): as many as the body has. period (unit of t): of the gait. Left out, the frames run over it once if the last
+    repeats the first; else, if they are equally spaced, it is their number times their spacing. amplitude (-): scales the
+    bends.
+
+    In time the bends are a periodic cubic spline, of order 4 in
+    the spacing of the frames; along the body splines too, of order 4 in that of s, 3 in that of points.
+
+    keep_harmonics (-): smooth by least squares instead, with that many harmonics in time; 0 for none. keep_modes (-): and
+    with that many Legendre modes of the curvature along the body; 0 for none. sha256 (-): of the file, filled in if left
+    out; given, the file must have it. centre (rad): takes none.
+
+    The file is read once, when the gait is made.
 
     Refused as slips of the tracking or of the pen: neighbouring elements or chords that bend by more than pi/2, a frame
     20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close.

@@ -42,7 +42,10 @@ class Series(Gait):
 
 @dataclass(frozen=True, kw_only=True)
 class Circle(Series):
-    """alpha = centre + amplitude (cos t, sin t): counter-clockwise, amplitude its radius in rad."""
+    """alpha = centre + amplitude (cos t, sin t): counter-clockwise.
+
+    amplitude (rad): its radius.
+    """
 
     angles = ("centre", "amplitude")
 
@@ -50,13 +53,16 @@ class Circle(Series):
     def amplitude_label(self) -> str:
         return "radius of the circle (rad)"
 
-    def coefficients(self):
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ellipse(Series):
-    """Semi-axes (rad at amplitude 1), the first turned counter-clockwise from alpha_1 by tilt (rad)."""
+    """Counter-clockwise about its centre.
+
+    semi_axes (rad): at amplitude 1. tilt (rad): by which the first is turned counter-clockwise from alpha_1.
+    """
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
     tilt: float = 0.0
@@ -69,7 +75,7 @@ class Ellipse(Series):
         number("tilt", self.tilt, -LARGEST, LARGEST)
         super().__post_init__()
 
-    def coefficients(self):
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         (a, b), c, s = self.semi_axes, math.cos(self.tilt), math.sin(self.tilt)
         return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
 
@@ -80,7 +86,7 @@ class Butterfly(Series):
     (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
     at amplitude 1."""
 
-    def coefficients(self):
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
         difference_sin = np.array([1.052, 0.0, 0.0859, 0.0, 0.0])
         return np.array([sum_cos, sum_cos]), np.array([difference_sin, -difference_sin])
@@ -88,7 +94,10 @@ class Butterfly(Series):
 
 @dataclass(frozen=True, kw_only=True)
 class Fourier(Series):
-    """Coefficients of one's own: cos and sin, each a row per joint, harmonics 1, 2 ... along the row (rad)."""
+    """A Fourier series of one's own.
+
+    cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the row.
+    """
 
     cos: tuple[tuple[float, ...], ...]
     sin: tuple[tuple[float, ...], ...]
@@ -102,5 +111,5 @@ class Fourier(Series):
             object.__setattr__(self, name, tuple(map(tuple, x.tolist())))
         super().__post_init__()
 
-    def coefficients(self):
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.cos), np.array(self.sin)

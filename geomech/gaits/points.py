@@ -12,8 +12,10 @@ from geomech.gaits.base import Gait, finite_array
 
 @dataclass(frozen=True, kw_only=True)
 class Points(Gait):
-    """The periodic cubic spline through points (P >= 3 rows of joint angles, rad), in order and back to the first,
-    phase running with chord length."""
+    """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
+
+    points (rad): three rows of joint angles or more.
+    """
 
     points: tuple[tuple[float, ...], ...]
     angles = ("centre", "points")

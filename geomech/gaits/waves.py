@@ -32,9 +32,11 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
 @dataclass(frozen=True, kw_only=True)
 class Sine(Gait):
     """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
-    tail. Its arc length is fixed, ``waves`` wavelengths of arc, whatever the amplitude.
+    tail. Its arc length is fixed, whatever the amplitude.
 
-    amplitude: A / lambda, the sine's amplitude over its wavelength. elements: as in the body (joints + 1). waves: > 0.
+    amplitude (-): A / lambda, the sine's amplitude over its wavelength, 0 to 10. elements (-): as many as the body has.
+    waves (-): wavelengths of arc on the body, > 0 and at most elements / 4. centre (rad): takes none.
+
     The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
     """
 

@@ -23,9 +23,21 @@ from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
-PHYSICAL = ("length", "frequency", "mass", "radius")  # sizes that a body and its effects share
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 LARGEST = 10_000_000  # bytes of a scene file
+
+
+@dataclasses.dataclass(frozen=True)
+class Physical:
+    """Sizes that a body and its effects share, given once for all that have them.
+
+    length (m): of the body. frequency (1/s): cycles per second. mass (kg): of the body. radius (body lengths): of the body.
+    """
+
+    length: float | None = None
+    frequency: float | None = None
+    mass: float | None = None
+    radius: float | None = None
 
 
 def builtin_names() -> list[str]:
@@ -169,7 +181,7 @@ class _Sizes:
 
     def __init__(self, name: str, physical: dict, frame):
         for key in physical:
-            choose(f"{name}: [physical] key", key, PHYSICAL)
+            choose(f"{name}: [physical] key", key, Physical.__dataclass_fields__)
         self.name, self.given, self.unused = name, dict(physical), {*physical}
         if frame is not None:
             self.given["frame"] = frame

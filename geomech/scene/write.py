@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
+import textwrap
 import tomllib
 
 from geomech.errors import SceneError
@@ -27,6 +29,18 @@ def toml(scene: Scene) -> str:
 def table(name: str, values: dict) -> str:
     """One table as TOML."""
     return _text({name: values})
+
+
+def medium_toml(name: str, entry) -> str:
+    """The table of a medium of the catalogue (`rft.media.catalogue.Entry`), with its source above."""
+    lines = textwrap.wrap(f"{name}: {entry.source}", 110)
+    if entry.axial_stress is not None:
+        lines.append(f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa")
+    angles = [
+        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in getattr(entry.medium, "angles", ())
+    ]
+    head = "".join(f"# {line}\n" for line in [*lines, *angles])
+    return head + table("medium", _of_kind(entry.medium, *PARTS["medium"]))
 
 
 def tables(scene: Scene) -> dict:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class Study:
             self._tables[key] = make()
         return self._tables[key]
 
-    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None):
+    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
         """What a tier looks up, computed once: a Connection, Harmonics or a Family; SceneError if it has none."""
         with named(self.scene.name):
             how = TIERS[choose("methods", tier, METHODS)]
@@ -192,7 +193,7 @@ class Study:
         return gait, amplitudes, chosen
 
 
-def timed(f: Callable):
+def timed(f: Callable) -> tuple[Any, float]:
     """(value, seconds)."""
     start = time.perf_counter()
     value = f()

@@ -41,7 +41,7 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
     return poses, sum(errors)
 
 
-def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
+def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, ...]:
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier; None: the gait's own amplitude."""
     size = scene.system.at_once(phases)
     groups = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -50,14 +50,29 @@ class System(Protocol):
     singularity: None, or a function of shapes (..., joints) that passes through 0 where the velocity does not exist.
     """
 
-    joints: int
-    length: float
-    unit: str
-    frame: str
-    mirror: bool
-    linear: bool
-    lacks: Premise
-    singularity: Callable | None
+    @property
+    def joints(self) -> int: ...
+
+    @property
+    def length(self) -> float: ...
+
+    @property
+    def unit(self) -> str: ...
+
+    @property
+    def frame(self) -> str: ...
+
+    @property
+    def mirror(self) -> bool: ...
+
+    @property
+    def linear(self) -> bool: ...
+
+    @property
+    def lacks(self) -> Premise: ...
+
+    @property
+    def singularity(self) -> Callable | None: ...
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) for alpha, alphadot (..., joints), in the body frame; nan at singular shapes."""
@@ -114,7 +129,7 @@ class Plain:
         """Whether its cycles are run until they repeat."""
         return self.settling > 0
 
-    def sample(self, alpha, alphadot):
+    def sample(self, alpha, alphadot) -> np.ndarray:
         """`velocity`, unchecked, to be timed."""
         return self.velocity(alpha, alphadot)
 
@@ -149,7 +164,7 @@ class Plain:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
         return max(1, VALUES_TOGETHER // (phases * (self.joints + 6)))
 
-    def stored(self, name: str):
+    def stored(self, name: str) -> Any:
         """Its own table, "connection" or "harmonics", where it is known by one; None where tables are computed."""
         return None
 
@@ -158,15 +173,15 @@ class Plain:
         0 for one that follows from a law."""
         return np.zeros((*np.shape(alpha)[:-2], 2))
 
-    def finer(self):
+    def finer(self) -> System | None:
         """The system with its velocity computed more exactly, None where it is exact already."""
         return None
 
-    def in_frame(self, frame: str):
+    def in_frame(self, frame: str) -> Self:
         """The system seen from another of its frames; ValueError if it has none of that name."""
         return dataclasses.replace(self, frame=frame)
 
-    def with_solver(self, **changes):
+    def with_solver(self, **changes) -> Self:
         """The system with some of its own [numerics] changed."""
         for name in changes:
             choose(f"the {self.kind}'s [numerics]", name, [f.name for f in dataclasses.fields(self.solver or NoSolver)])
@@ -219,7 +234,7 @@ class Plain:
         return "(the velocity at every shape, all shapes at once): nothing remembers, places are alike, no mass"
 
 
-def checked_system(system):
+def checked_system(system) -> System:
     """system, or ValueError if it is nothing of the kind."""
     if isinstance(system, type) or not all(hasattr(system, x) for x in ("joints", "velocity", "run", "lacks")):
         raise ValueError(f"system must be a system such as Swimmer(medium, body), got {short(system)}")

@@ -31,10 +31,13 @@ MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name
 
 @dataclass(frozen=True)
 class Solver:
-    """How the balance of forces is solved; part of [numerics]. loads: "exact", "midpoint:N", "gauss:N" (rft.loads).
-    regularisation: body lengths per radian (rft.balance). tolerance: normalised residual. cycles: of time stepping
-    (`rft.time_steps`); if left out until they are periodic, one where effects break symmetry. pieces: to a body length,
-    1 to 10,000, into which effects that vary along an element cut it (`rft.effects`)."""
+    """How the balance of forces is solved; part of [numerics].
+
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation (body lengths per rad): speed below which dry
+    friction is rounded off (rft.balance). tolerance (-): normalised residual. cycles (-): of time stepping
+    (`rft.time_steps`); if left out until they are periodic, one where effects break symmetry. pieces (-): to a body length,
+    1 to 10,000, into which effects that vary along an element cut it (`rft.effects`).
+    """
 
     loads: str = "exact"
     regularisation: float = 1e-6

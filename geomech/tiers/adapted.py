@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from geomech import family
@@ -21,22 +23,22 @@ class Adapted(Tier):
     plain = False
     depends_on = ("curves", "phases")
 
-    def reach(self, gait, amplitudes):
+    def reach(self, gait, amplitudes) -> tuple:
         """(gait, least <= 0, largest >= 0)."""
         a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
         return gait, float(a.min(initial=0.0)), float(a.max(initial=0.0))
 
-    def table(self, system, numerics, gait, least, largest, progress=None):
+    def table(self, system, numerics, gait, least, largest, progress=None) -> Any:
         if least == largest:  # rest, and nothing else
             return family.Family(gait, np.zeros(1), np.zeros((1, numerics.phases // 2, 3)))
         count, phases = numerics.curves, numerics.phases // 2
         return family.fit(system.velocity, gait, largest, count, phases, progress, least=least)
 
-    def solves(self, system, numerics, count, phases):
+    def solves(self, system, numerics, count, phases) -> int:
         return numerics.curves * (numerics.phases // 2)
 
-    def size(self, system, numerics):
+    def size(self, system, numerics) -> int:
         return numerics.curves * (numerics.phases // 2) * 3
 
-    def predict(self, table, system, gait, amplitudes, numerics):
+    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         return table.area(np.asarray(gait.amplitude if amplitudes is None else amplitudes, float))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from geomech.connection import SAMPLES_TOGETHER
@@ -44,12 +46,12 @@ class Area(Path):
     joints = offered = range(2, 3)
     whole = True
 
-    def is_direct(self, system):
+    def is_direct(self, system) -> bool:
         return False
 
-    def sample(self, system, numerics):
+    def sample(self, system, numerics) -> Callable | None:
         field = zeros(system, numerics, (3, 1))
         return lambda n: field(np.zeros((n, 2)))
 
-    def predict(self, table, system, gait, amplitudes, numerics):
+    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         return area(ccf(table), gait, amplitudes, numerics.phases)

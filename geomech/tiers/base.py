@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,12 @@ WHOLE = {  # numbers of [numerics], from and to
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely tiers compute; all optional, and part of [numerics] beside the system's own. directions: of alphadot in
-    the least-squares fit; if left out 8 for up to two joints, 16 a joint beyond. grid: points per joint, extent: rad on
-    either side. interpolation: spline degree. phases: per cycle. harmonics: the highest kept (odd). curves: in a family's
-    table."""
+    """How finely tiers compute; all optional, and part of [numerics] beside the system's own.
+
+    directions (-): of alphadot in the least-squares fit; if left out 8 for up to two joints, 16 a joint beyond.
+    grid (-): points per joint. extent (rad): of the field, on either side of 0. interpolation (-): degree of its splines.
+    phases (-): per cycle. harmonics (-): the highest kept, odd. curves (-): in the table of a family of gaits.
+    """
 
     directions: int | None = None
     grid: int = 31
@@ -94,7 +97,7 @@ class Tier:
         """What of a gait the table depends on: nothing."""
         return ()
 
-    def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None):
+    def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None) -> Any:
         """What is computed once for a system; None for nothing."""
 
     def solves(self, system: System, numerics: Numerics, count: int, phases: int) -> int:

@@ -36,10 +36,10 @@ class Direct(Tier):
     colour = "black"
     rests_on = NONE
 
-    def solves(self, system, numerics, count, phases):
+    def solves(self, system, numerics, count, phases) -> int:
         return count * phases
 
-    def predict(self, table, system, gait, amplitudes, numerics):
+    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         phases = numerics.phases
         if not system.steps:
             return direct(system.velocity, gait, amplitudes, phases)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from geomech import harmonics
@@ -22,23 +25,23 @@ class Harmonic(Path):
         """Enough above the highest harmonic for folding to stay small."""
         return max(24, (8 * numerics.harmonics) // 5)
 
-    def table(self, system, numerics, *reach, progress=None):
+    def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
             return own
         count, degree = self.directions(system, numerics), numerics.interpolation
         grid = axes(system, numerics)
         return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, highest=numerics.harmonics)
 
-    def solves(self, system, numerics, count, phases):
+    def solves(self, system, numerics, count, phases) -> int:
         return shapes(system, numerics) * self.directions(system, numerics)
 
-    def size(self, system, numerics):
+    def size(self, system, numerics) -> int:
         return (numerics.harmonics + 2) * 3 * numerics.grid**2
 
-    def sample(self, system, numerics):
+    def sample(self, system, numerics) -> Callable | None:
         field = zeros(system, numerics, (3, numerics.harmonics + 1))
         table = harmonics.Harmonics(field.axes, field.values, field.values[:, 0], field.degree)
         return lambda n: table.velocity(np.zeros((n, 2)), np.ones((n, 2)))
 
-    def predict(self, table, system, gait, amplitudes, numerics):
+    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         return path(system.velocity if self.is_direct(system) else table.velocity, gait, amplitudes, numerics.phases)

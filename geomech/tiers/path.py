@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from geomech import connection
@@ -53,14 +56,14 @@ class Path(Tier):
     on_grid = True
     depends_on = ("grid", "extent", "directions", "interpolation")
 
-    def is_direct(self, system):
+    def is_direct(self, system) -> bool:
         return system.linear
 
     def directions(self, system, numerics) -> int:
         """Of alphadot at each shape."""
         return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
 
-    def table(self, system, numerics, *reach, progress=None):
+    def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
             return own
         return connection.fit(
@@ -68,15 +71,15 @@ class Path(Tier):
             progress, system.mirror, singularity=system.singularity, trusted=True,
         )  # fmt: skip
 
-    def solves(self, system, numerics, count, phases):
+    def solves(self, system, numerics, count, phases) -> int:
         return shapes(system, numerics) * self.directions(system, numerics)
 
-    def size(self, system, numerics):
+    def size(self, system, numerics) -> int:
         return (system.joints + 3) * 3 * numerics.grid**system.joints
 
-    def sample(self, system, numerics):
+    def sample(self, system, numerics) -> Callable | None:
         field = zeros(system, numerics, (3, system.joints))
         return lambda n: field(np.zeros((n, system.joints)))
 
-    def predict(self, table, system, gait, amplitudes, numerics):
+    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         return path(system.velocity if self.is_direct(system) else table, gait, amplitudes, numerics.phases)

@@ -18,7 +18,11 @@ from rft.media.base import in_range, is_number, require, shown
 @dataclass(frozen=True)
 class Backbone:
     """A body of equal elements, bent at every one of the ``elements`` - 1 points between them, as a wave or a measured
-    centreline prescribes. length, frame: as for `Chain`."""
+    centreline prescribes.
+
+    elements (-): 3 to 2000. length (m): the whole body, in the unit wanted for displacement; 1 for body lengths.
+    frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., those of that element.
+    """
 
     elements: int = 100
     length: float = 1.0
@@ -49,7 +53,7 @@ class Backbone:
             return self.chain.motion(alpha, alphadot)
         return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
 
-    def frame_pose(self, frame: str, alpha, alphadot):
+    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """As `Chain.frame_pose`; "link-k" is the k-th element."""
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
@@ -60,7 +64,10 @@ class Backbone:
 class Serpenoid(Backbone):
     """Two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s), s from 0 at the
     tail to 1 at the head. A circle in (alpha_1, alpha_2) is a travelling wave: towards the head, run backwards
-    (reverse) towards the tail, which drives the body head first."""
+    (reverse) towards the tail, which drives the body head first.
+
+    waves (-): on the body, > 0 and at most elements / 4.
+    """
 
     waves: float = 1.0
 
@@ -81,7 +88,10 @@ class Serpenoid(Backbone):
 
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
-    """``sections`` of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
+    """Sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad).
+
+    sections (-): arcs, a divisor of elements.
+    """
 
     sections: int = 2
 

@@ -113,8 +113,11 @@ class Kinematics(NamedTuple):
 class Body(Protocol):
     """Any body whose shape is ``joints`` numbers and which is made of straight elements."""
 
-    length: float
-    joints: int
+    @property
+    def length(self) -> float: ...
+
+    @property
+    def joints(self) -> int: ...
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics: ...
 

@@ -16,9 +16,9 @@ from rft.media.base import in_range, real_array, require, shown
 class Chain:
     """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
 
-    lengths: relative link lengths, all > 0, at least two. length: the whole body, in the unit wanted for
-    displacement (1: body lengths; else metres). frame: "mean" (centre of mass of a uniform body, length-weighted
-    mean heading: the paper's) or "link-1", "link-2" ... (centre and heading of that link).
+    lengths (-): relative link lengths, all > 0, at least two. length (m): the whole body, in the unit wanted for
+    displacement; 1 for body lengths. frame (-): "mean", centre of mass of a uniform body and length-weighted mean heading
+    (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)

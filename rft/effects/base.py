@@ -6,7 +6,7 @@ import functools
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -83,19 +83,19 @@ class Effect(PerSample):
 class Process(Effect):
     """An effect with a past, or a place on the body or on the ground: what holds of it differs from site to site."""
 
-    def begin(self, site: Site):
+    def begin(self, site: Site) -> Any:
         """What is remembered before the first step; nothing by default."""
         return None
 
-    def at(self, state, site: Site):
+    def at(self, state, site: Site) -> Any:
         """What holds at one step: something with `apply`, as an effect has."""
         raise NotImplementedError
 
-    def after(self, state, site: Site, v: dict[str, np.ndarray]):
+    def after(self, state, site: Site, v: dict[str, np.ndarray]) -> Any:
         """What is remembered after a step that ended with velocities v (3, n, B) of every contact's elements."""
         return state
 
-    def kicked(self, state, site: Site, xi, change):
+    def kicked(self, state, site: Site, xi, change) -> Any:
         """What is remembered as if the body had moved faster by ``change`` than with xi, (3, B) each, after the last steps,
         of which that at ``site`` was the last; the ground does not notice."""
         return state

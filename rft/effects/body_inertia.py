@@ -8,6 +8,7 @@ after the first step).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +25,11 @@ UNIT_MASS = np.array([1.0, 1.0, 1 / 3])[:, None, None]  # <v_t>, <v_n> and <s v_
 class BodyInertia(Process):
     """A body of uniform mass along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
 
-    mass: kg. frequency: cycles per second, alphadot being per radian of phase. length: of the body, m. drag: N, of the
-    medium on the whole straight body along itself, 2 k rho g r |z| L by Eq. 2; in a viscous medium at one body length
-    per radian of phase. Only mass x length x (2 pi frequency)^2 / drag matters.
+    mass (kg): of the body. frequency (1/s): cycles per second, alphadot being per radian of phase. length (m): of the body.
+    drag (N): of the medium on the whole straight body along itself, 2 k rho g r |z| L by Eq. 2; in a viscous medium at one
+    body length per radian of phase.
+
+    Only mass x length x (2 pi frequency)^2 / drag matters.
     """
 
     mass: float
@@ -45,7 +48,7 @@ class BodyInertia(Process):
         require(self.inertia <= 1e6, f"inertia is {self.inertia:.3g} times the axial drag: beyond 1e6 no gait settles")
 
     @property
-    def inertia(self):
+    def inertia(self) -> Any:
         """mass x length x (2 pi frequency)^2 / drag, no unit."""
         return self.mass * self.length * (2 * np.pi * self.frequency) ** 2 / self.drag
 
@@ -93,7 +96,7 @@ class Momentum(PerSample):
         return model.pulled(self.having(unit=model.unit))
 
     @property
-    def size(self):
+    def size(self) -> Any:
         return self.rate * self.inertia * self.unit
 
     def __call__(self, xi: np.ndarray) -> np.ndarray:

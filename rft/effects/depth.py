@@ -16,10 +16,11 @@ from rft.premise import NONE, Premise
 class DepthProfile(Process):
     """Drag times |z| over the depth that the medium's drag is for: 2 k rho g r |z| of Eq. 2, its other factors the same.
 
-    along: |z| over that depth at equally spaced places from tail to head, linear between them; (1, 1) is level. slope:
-    what the place on the ground adds to it per body length (a surface that is not level above a level plane of motion),
-    rising in the direction ``towards``, rad from the frame's heading at the start. A piece of body
-    counts as its centre. With a slope, place and heading matter.
+    along (-): |z| over that depth at equally spaced places from tail to head, linear between them; [1, 1] is level.
+    slope (per body length): what the place on the ground adds to it, where the surface is not level above a level plane of
+    motion. towards (rad): the direction in which it rises, from the frame's heading at the start.
+
+    A piece of body counts as its centre. With a slope, place and heading matter.
     """
 
     along: tuple[float, ...] = (1.0, 1.0)
@@ -82,5 +83,5 @@ class Multiplied(PerSample):
 
     by: np.ndarray
 
-    def __call__(self, v_t, v_n, spin):
+    def __call__(self, v_t, v_n, spin) -> tuple[np.ndarray, np.ndarray]:
         return self.by, self.by

@@ -20,11 +20,13 @@ AHEAD = 2.0  # radii from the body's axis at which the ground it will meet is lo
 class DisturbedGround(Process):
     """Drag across times 1 - weakening x disturbance of the ground on the side an element moves to.
 
-    The body leaves a track of half width ``radius`` (body lengths), fully disturbed up to half a radius from its axis,
-    untouched beyond one and a half; disturbance, 0 to 1, does not heal (grains do not settle by themselves). The ground an
-    element will meet is looked up two radii to its left and right, outside its own present track. weakening: 0 to 1,
-    the share of drag lost in fully disturbed ground. Drag near disturbed ground falls substantially by experiment (paper
-    Sec. IV B); the form, and every number, are assumed. Ground further than two body lengths off may be forgotten.
+    radius (body lengths): half width of the track that the body leaves, 0.01 to 0.25. weakening (-): the share of drag lost
+    in fully disturbed ground, 0 to 1.
+
+    The track is fully disturbed up to half a radius from its axis, untouched beyond one and a half; disturbance, 0 to 1,
+    does not heal (grains do not settle by themselves). The ground an element will meet is looked up two radii to its left
+    and right, outside its own present track. Drag near disturbed ground falls substantially by experiment (paper Sec. IV
+    B); the form, and every number, are assumed. Ground further than two body lengths off may be forgotten.
     """
 
     radius: float
@@ -74,7 +76,7 @@ class Weakened(PerSample):
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, shares=(self,))
 
-    def __call__(self, v_n, spin):
+    def __call__(self, v_n, spin) -> tuple[np.ndarray, None, None]:
         return self.left, None, None
 
 

@@ -44,7 +44,8 @@ class _Caps(PerSample):
 class EndCaps(Effect):
     """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)), lateral e pi r^2 C_F sin psi.
 
-    radius: of the body, in body lengths, 0 to 1. head, tail: the factor e, 0 for none, 1 flat, 4 hemisphere.
+    radius (body lengths): of the body, 0 to 1. head, tail (-): the factor e of that end, 0 for none, 1 flat, 4 hemisphere.
+
     Source: the end forces of the cylinder in granular resistive force theory as written in third-party code, C_S / C_F
     being C of Eq. 3. Granular media only.
     """
@@ -71,7 +72,7 @@ class EndCaps(Effect):
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
         return motion.points([0, -1], motion.half[[0, -1]] * [[-1.0], [1.0]], weight)
 
-    def traction(self, medium: Granular, v_t, v_n, eps=0.0):
+    def traction(self, medium: Granular, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
         """(along, across) force of both ends together at velocity (v_t, v_n), in units of the body's axial drag."""
         across, along = _CapLaw(medium).traction(v_n, v_t, eps)
         factor = (self.head + self.tail) * math.pi * self.radius / 2

@@ -21,9 +21,10 @@ class GrainInertia(Effect):
     inertia of grains counts; the form is the momentum flux of grains swept up, as in impact laws).
 
     In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
-    frequency: cycles per second, alphadot being per radian of phase. length: of the body, m. depth: |z|, m.
-    strength: lambda, no unit; 1 is assumed. k: of Eq. 2, in place of the medium's own (2.5 for loose glass, 5.1 for
-    close); where neither gives one, that of loose glass is assumed.
+
+    frequency (1/s): cycles per second, alphadot being per radian of phase. length (m): of the body. depth (m): |z|.
+    strength (-): lambda; 1 is assumed. k (-): of Eq. 2, in place of the medium's own (2.5 for loose glass, 5.1 for close);
+    where neither gives one, that of loose glass is assumed.
     """
 
     frequency: float
@@ -65,7 +66,7 @@ class Flux(PerSample):
 
     beta: np.ndarray | float
 
-    def __call__(self, v_t, v_n, spin, eps):
+    def __call__(self, v_t, v_n, spin, eps) -> np.ndarray:
         out = np.zeros((3, 4, *v_n.shape))
         np.multiply(self.beta, squared_speed_load(v_n, spin), out=out[1:])
         return out

@@ -16,7 +16,10 @@ class SkinFriction(Effect):
     """Axial drag times forward / reference where an element slides towards its head, backward / reference where it
     slides towards its tail.
 
-    Coefficients of friction with the grains. The defaults are the shovel-nosed snake's against 0.3 mm glass, 0.109
+    forward, backward (-): coefficient of friction with the grains that way. reference (-): that of the rod whose drag was
+    measured.
+
+    The defaults are the shovel-nosed snake's against 0.3 mm glass, 0.109
     forward and 0.137 backward, and 0.2 for the aluminium of the measured rod (from the literature on the snake; that
     they scale the axial drag in proportion is assumed).
     """
@@ -36,5 +39,5 @@ class SkinFriction(Effect):
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, factors=(self,))
 
-    def __call__(self, v_t, v_n, spin):
+    def __call__(self, v_t, v_n, spin) -> tuple[np.ndarray, None]:
         return np.where(v_t >= 0, self.forward / self.reference, self.backward / self.reference), None

@@ -17,8 +17,10 @@ from rft.media.coulomb import Coulomb
 class TowedSled(Effect):
     """Coulomb friction, alike in all directions, at the end of a stiff bar that goes on from the tail in its direction.
 
-    pull: the sled's friction over the medium's drag on the whole straight body along itself, no unit. distance: of the sled
-    behind the tail, body lengths. It lies on the surface, so that the body's depth does not matter to it. Dry media only,
+    pull (-): the sled's friction over the medium's drag on the whole straight body along itself. distance (body lengths): of
+    the sled behind the tail.
+
+    It lies on the surface, so that the body's depth does not matter to it. Dry media only,
     for beside viscous drag friction would depend on the unit of time.
     """
 
@@ -44,5 +46,5 @@ class TowedSled(Effect):
         """The sled's point, of a body whose `Kinematics` is given."""
         return motion.points([0], -(motion.half[:1] + self.distance), np.ones((1, 1)))
 
-    def __call__(self, v_t, v_n, spin):
+    def __call__(self, v_t, v_n, spin) -> tuple[float, float]:
         return self.pull, self.pull

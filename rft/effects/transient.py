@@ -22,9 +22,11 @@ class Transient(Process):
     """Each element remembers how far the ground's response to motion to its left and to its right has developed, 0 to 1.
 
     Travel x one way brings that side's share h nearer to 1, dh/dx = 3 (1 - h) / travel, and takes the other side's away,
-    dh/dx = -3 h / travel. The drag across is the steady one times the share of the side it moves to. travel: body
-    lengths over which 95 % comes back; the paper gives about a fifth of the amplitude of an oscillating rod. That the
-    approach is exponential, that it starts from nothing, and that the drag along the body needs none are assumed.
+    dh/dx = -3 h / travel. The drag across is the steady one times the share of the side it moves to.
+
+    travel (body lengths): over which 95 % comes back; the paper gives about a fifth of the amplitude of an oscillating rod.
+
+    That the approach is exponential, that it starts from nothing, and that the drag along the body needs none are assumed.
     A piece of body remembers the means of its shares. At every step it is cut where it does not move across, and each part
     builds up with its own mean velocity, so that no travel gives the steady drag however long the pieces. Order 1 is that
     of a body that slides along itself as it reverses; with links that come to rest there, in a dry medium, it is 1/2.
@@ -70,7 +72,7 @@ class Developed(PerSample):
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, shares=(self,))
 
-    def __call__(self, v_n, spin):
+    def __call__(self, v_n, spin) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         velocity, _, inside = parts(v_n, spin)
         values, slopes = _developed(self.shares, SIGN * self.before, SIGN * velocity, self.dt, self.rate)
         slopes = SIGN * slopes

@@ -15,16 +15,13 @@ class Medium(Protocol):
         f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + eps^2),
 
     and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the
-    closed-form link integrals of `rft.loads`. A law of another form sets both to None, supplies
-    `traction` alone and is integrated by quadrature: it may leave out all else, which then is as said here (`dry_terms`,
-    `viscous_terms`, `is_mirror`). ``k``, where a medium has one, is that of Eq. 2 (`Granular`).
+    closed-form link integrals of `rft.loads`. A law of another form has neither (or None), supplies
+    `traction` alone and is integrated by quadrature. So all but `traction` may be left out (`dry_terms`, `viscous_terms`):
+    ``derivatives``, its slopes as `TermLaw` has them, else by differences; ``mirror``, True where left and right are alike,
+    f_n odd and f_t even in v_n, else not said (`is_mirror`); ``k``, that of Eq. 2 (`Granular`).
     A measured medium may have a ``covariance`` (n, n), of the parameters that ``uncertain`` names, in their order; it
     changes no force (`checked_covariance`).
     """
-
-    dry: tuple[tuple[float, float, float], ...] | None = None
-    viscous: tuple[float, float] | None = None
-    mirror: bool = False  # left and right are alike: f_n is odd, f_t even in v_n
 
     def traction(self, v_t, v_n, eps=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -48,7 +45,7 @@ class TermLaw:
             f_t, f_n = f_t + k_t * v_t / R, f_n + k_n * v_n / R
         return f_t, f_n
 
-    def derivatives(self, v_t, v_n, eps=0.0):
+    def derivatives(self, v_t, v_n, eps=0.0) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
         """((df_t/dv_t, df_t/dv_n), (df_n/dv_t, df_n/dv_n)); infinite slopes at rest are returned as 0."""
         (tt, nn), (tn, nt) = self.viscous, (0.0, 0.0)
         for q, k_t, k_n in self.dry:

@@ -17,9 +17,9 @@ class Granular(TermLaw):
     v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
     Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
 
-    C: the extra normal force (no unit), 0 to 1e6. gamma0: the angle at which it saturates, in radians,
-    strictly between 0 and pi/2. k: pressure across over the weight of the grains above, 1e-3 to 1e3, None if unknown; it
-    is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
+    C (-): the extra normal force, 0 to 1e6. gamma0 (rad): the angle at which it saturates, strictly between 0 and pi/2.
+    k (-): pressure across over the weight of the grains above, 1e-3 to 1e3, none if unknown; it is part of our unit of
+    force, so only what is measured against the weight of grains asks for it (grain inertia).
 
     covariance (-): that of C, gamma0 (in rad) and, where k is given, k or not, as ``uncertain`` says; it changes no force
     and is what drag measurements leave open (`rft.calibrate`).
@@ -48,7 +48,7 @@ class Granular(TermLaw):
         return ("C", "gamma0", "k")[: len(self.covariance or (0, 0))]
 
     @property
-    def dry(self):
+    def dry(self) -> tuple[tuple[float, float, float], ...]:
         # With v_t^2 + v_n^2 written out, C (v.n) / sqrt(tan^2 g0 + (v.n)^2)
         # = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2): a second dry term.
         return (1.0, 1.0, 1.0), (math.sin(self.gamma0), 0.0, self.C * math.cos(self.gamma0))

@@ -11,7 +11,8 @@ from rft.media.base import TermLaw, check_ranges, checked_covariance
 class Viscous(TermLaw):
     """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
 
-    ratio: normal over axial drag, 1e-8 to 1e8; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+    ratio (-): normal over axial drag, 1e-8 to 1e8; 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802
+    (1955).
 
     covariance (-): that of the ratio, 1 x 1; it changes no force and is what drag measurements leave open (`rft.calibrate`).
     """
@@ -25,5 +26,5 @@ class Viscous(TermLaw):
         object.__setattr__(self, "covariance", checked_covariance(self.covariance, 1))
 
     @property
-    def viscous(self):
+    def viscous(self) -> tuple[float, float]:
         return 1.0, float(self.ratio)

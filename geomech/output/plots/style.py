@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 from geomech.errors import SceneError
 from geomech.files import whole_file
@@ -24,11 +26,15 @@ STYLE = {
 }
 
 
-def styled(draw):
+Asked = ParamSpec("Asked")
+Drawn = TypeVar("Drawn")
+
+
+def styled(draw: Callable[Asked, Drawn]) -> Callable[Asked, Drawn]:
     """Make a drawing function use the project's style, whatever the caller's is."""
 
     @functools.wraps(draw)
-    def in_style(*args, **kwargs):
+    def in_style(*args: Asked.args, **kwargs: Asked.kwargs) -> Drawn:
         import matplotlib as mpl
 
         with mpl.rc_context(STYLE):
@@ -38,7 +44,7 @@ def styled(draw):
 
 
 @styled
-def figure(width: float, height: float, columns: int = 1, rows: int = 1):
+def figure(width: float, height: float, columns: int = 1, rows: int = 1) -> tuple[Any, Any]:
     """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap; both show in a notebook."""
     from geomech.output.plots.shown import ShownAxes, ShownFigure
 
@@ -47,7 +53,7 @@ def figure(width: float, height: float, columns: int = 1, rows: int = 1):
     return fig, fig.subplots(rows, columns, squeeze=False, subplot_kw={"axes_class": ShownAxes})
 
 
-def axes_of(ax):
+def axes_of(ax: Any) -> Any:
     """ax; without it the Axes that pyplot stands at, where the caller has a figure of pyplot open, else new ones that a
     notebook shows."""
     if ax is not None:

@@ -1,0 +1,27 @@
+"""geomech keys."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Optional
+
+import typer
+
+from geomech.commands.options import PluginOption, load_plugins
+from geomech.errors import SceneError
+
+
+def keys(
+    section: Annotated[
+        Optional[str], typer.Argument(metavar="[SECTION]", help="medium, body, gait, ... or all")
+    ] = None,
+    json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
+    plugin: PluginOption = None,
+):
+    """Every key of a scene file: type, unit, default and meaning; or a JSON Schema for editors."""
+    from geomech.scene import keys as told
+
+    load_plugins(plugin)
+    if json_schema and section is not None:
+        raise SceneError("--json-schema is that of whole scene files: drop SECTION")
+    print(json.dumps(told.schema(), indent=1) if json_schema else told.text(section), end="\n" if json_schema else "")

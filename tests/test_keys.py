@@ -1,0 +1,220 @@
+"""Every key of a scene file is told, from the class that reads it, and editors get a schema that agrees with the reader."""
+
+import copy
+import dataclasses
+import json
+import pathlib
+import re
+import tomllib
+
+import pytest
+
+from geomech import cli, kinds
+from geomech.errors import SceneError
+from geomech.scene import builtin_names, from_tables, load, parse
+from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
+from geomech.scene.read import TABLES
+from rft import CATALOGUE
+
+EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+@pytest.mark.parametrize(("table", "name", "kind"), EVERY, ids=[f"{t}-{n or k.__name__}" for t, n, k in EVERY])
+def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(table, name, kind):
+    """In the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
+    keys = keys_of(kind)
+    assert [k.name for k in keys] == [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
+    for key in keys:
+        place = f"{kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
+        assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
+        assert 0 < len(key.unit) < 25, place
+        assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
+        assert key.type != "value", f"{kind.__name__}.{key.name}: of a type that no scene file has"
+        assert key.degrees == (key.name in getattr(kind, "angles", ()))
+        assert key.unit == "rad" or not key.degrees
+
+
+def test_keys_are_told_as_they_are():
+    @dataclasses.dataclass(frozen=True)
+    class Base:
+        """first (rad): of the base. second, third (m): of both."""
+
+        first: float
+        second: float | None = None
+        third: tuple[tuple[int, ...], ...] = ()
+
+    @dataclasses.dataclass(frozen=True)
+    class Derived(Base):
+        """A thing. Not (a key): this one.
+
+        first (1/s): its own,
+        on two lines; (in brackets). fourth (-): "text".
+
+        More of first is not told.
+        """
+
+        fourth: str = "x"
+        fifth: bool = True
+        angles = ("third",)
+
+    assert meanings(Derived) == {
+        "first": ("1/s", "its own, on two lines; (in brackets)"), "second": ("m", "of both"), "third": ("m", "of both"),
+        "fourth": ("-", '"text"'),
+    }  # fmt: skip
+    keys = {k.name: k for k in keys_of(Derived)}
+    assert [(k.type, k.value) for k in keys.values()] == [
+        ("number", "required"), ("number", "none"), ("list of lists of whole numbers", "[]"), ("text", '"x"'),
+        ("true or false", "true"),
+    ]  # fmt: skip
+    assert keys["fifth"] == Key("fifth", {"type": "boolean"}, "", "", False, True, False)
+    assert keys["third"].degrees
+
+
+def run(capsys, *argv):
+    with pytest.raises(SystemExit) as left:
+        cli.main(list(argv))
+    return left.value.code, *capsys.readouterr()
+
+
+def test_the_command_prints_them_all_or_a_section(capsys):
+    code, out, err = run(capsys, "keys")
+    assert (code, err) == (0, "")
+    for table, name, kind in EVERY:
+        assert (f'"{name}"' if name else f"[{table}]") in out
+        for key in keys_of(kind):
+            assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} ", out, re.M), key.name
+    assert max(map(len, out.splitlines())) <= 120
+    assert [run(capsys, "keys", table)[0] for table in TABLES] == [0] * len(TABLES)
+    body = run(capsys, "keys", "body")[1]
+    assert "[body]" in body and "[gait]" not in body
+    assert 'frame    text             -  "mean" ' in body
+    assert re.search(
+        r"C +number +- +required +the extra normal force.*\n +gamma0 +number +rad .*as gamma0_deg", text("medium")
+    )
+    code, out, err = run(capsys, "keys", "bdy")
+    assert (code, out, err) == (2, "", "error: SECTION: 'bdy' is unknown; did you mean 'body'?\n")
+    assert run(capsys, "keys", "body", "--json-schema")[:2] == (2, "")
+
+
+def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
+    family = kinds.FAMILIES["geomech.media"].kinds
+    monkeypatch.setattr(kinds, "_code", {})
+    section = (ROOT / "README.md").read_text().partition("## Laws, bodies")[2]
+    path = tmp_path / "power.py"
+    path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
+    try:
+        code, out, _ = run(capsys, "keys", "medium", "--plugin", str(path))
+        assert code == 0
+        assert re.search(r'law = "power"\n  power +number +- +required +of the speed.*\n.*ratio +number +- +3.0', out)
+        made = json.loads(run(capsys, "keys", "--json-schema", "--plugin", str(path))[1])
+        assert {"const": "power"} in [x["properties"].get("law") for x in made["properties"]["medium"]["oneOf"]]
+    finally:
+        family.pop("power", None)
+
+
+@pytest.fixture(scope="module")
+def valid():
+    jsonschema = pytest.importorskip("jsonschema")  # of the extra `test`
+    made = json.loads(json.dumps(schema()))
+    jsonschema.Draft202012Validator.check_schema(made)
+    return jsonschema.Draft202012Validator(made).is_valid
+
+
+def tables(name):
+    return tomllib.loads(load(name).text)
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
+    scene = tables(name)
+    assert valid(scene)
+    assert not valid({**scene, "mediun": {}})
+    for table, value in scene.items():
+        for k, part in enumerate(value if isinstance(value, list) else [value]):
+            assert not both(valid, scene, table, k, {**part, "lenght": 1})
+            for key in part:
+                assert not both(valid, scene, table, k, {**part, key: {"a": 1}})
+                assert not both(valid, scene, table, k, {**part, key: True if key != "reverse" else 1})
+            if kind := {"kind", "law", "name"} & {*part}:
+                assert not both(valid, scene, table, k, {x: v for x, v in part.items() if x not in kind})
+
+
+def both(valid, scene, table, k, part):
+    """Whether a scene with this part in place of its own is valid; the schema and the reader must agree."""
+    changed = copy.deepcopy(scene)
+    if isinstance(changed[table], list):
+        changed[table][k] = part
+    else:
+        changed[table] = part
+    try:
+        from_tables(changed, "scene")
+        read = True
+    except SceneError:
+        read = False
+    assert valid(changed) == read, part
+    return read
+
+
+@pytest.mark.parametrize(
+    ("toml", "good"),
+    [
+        ('[medium]\nlaw = "granular"\nC = 1\ngamma0_deg = 13', True),
+        ('[medium]\nlaw = "granular"\nC = 1\ngamma0 = 0.2\ngamma0_deg = 13', False),
+        ('[medium]\nlaw = "granular"\nC = 1', False),
+        ('[medium]\nlaw = "viscous"\nC = 1', False),
+        ('[medium]\nname = "glass"', False),
+        ('[medium]\nname = "coulomb"\nlaw = "coulomb"', False),
+        ('[medium]\nlaw = "coulomb"\n[[effects]]\nkind = "depth-profile"\ntowards_deg = 3', True),
+        ('[medium]\nlaw = "coulomb"\n[[effects]]\nkind = "depth-profile"\ntowards_deg = 3\ntowards = 1', False),
+        ('[medium]\nname = "glass-0.3mm-loose"\n[[effects]]\nkind = "end-caps"\nhead = 3', False),
+        (
+            '[medium]\nname = "glass-0.3mm-loose"\n[physical]\nradius = 0.1\n[[effects]]\nkind = "end-caps"\nhead = 3',
+            True,
+        ),
+        (
+            '[medium]\nlaw = "coulomb"\n[physical]\nradius = 0.1\n[[effects]]\nkind = "disturbed-ground"\nweakening = 1',
+            False,
+        ),
+        ('[medium]\nlaw = "coulomb"\n[numerics]\nphases = 64\ngrid = 9\nloads = "gauss:8"\ncycles = 2', True),
+        ('[medium]\nlaw = "coulomb"\n[numerics]\ngrid = 9.5', False),
+        ('frame = "link-2"\n[medium]\nlaw = "coulomb"\n[physical]\nlength = 0.3', True),
+        ('[medium]\nlaw = "coulomb"\n[physical]\nheight = 0.3', False),
+        ("", False),
+    ],
+)
+def test_the_schema_agrees_with_the_reader(toml, good, valid):
+    scene = toml + '\n[body]\nkind = "chain"\n[gait]\nkind = "ellipse"\nsemi_axes_deg = [40, 30]\n'
+    assert valid(tomllib.loads(scene)) == good
+    if good:
+        parse(scene)
+    else:
+        with pytest.raises(SceneError):
+            parse(scene)
+
+
+def test_systems_and_sizes_given_once_are_valid(valid):
+    gait = '[gait]\nkind = "circle"\n'
+    inside = '[system.medium]\nlaw = "coulomb"\n[system.body]\nkind = "chain"\n'
+    heavy = '[[effects]]\nkind = "body-inertia"\nfrequency = 2\ndrag = 1\n[physical]\nmass = 1\nlength = 0.3\n'
+    for scene in (
+        f'[system]\nkind = "swimmer"\n{inside}{gait}',
+        f'[system]\nkind = "no-slip-snake"\nlengths = [1, 2, 1]\n{gait}',
+        f'[medium]\nlaw = "coulomb"\n[body]\nkind = "chain"\n{gait}{heavy}',
+    ):
+        assert parse(scene)
+        assert valid(tomllib.loads(scene))
+    assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snake"\nlengths = [1, 2]\n{gait}'))
+    assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snak"\n{gait}'))
+    assert not valid(tomllib.loads('[system]\nkind = "no-slip-snake"\n'))
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_named_media_are_shown_as_a_table_that_makes_them(name, capsys):
+    code, out, err = run(capsys, "scenes", "--show", name)
+    assert (code, err) == (0, "")
+    scene = parse(out + '[body]\nkind = "chain"\n[gait]\nkind = "circle"\n')
+    assert scene.system.medium == CATALOGUE[name].medium
+    said = " ".join(line.lstrip("# ") for line in out.splitlines() if line.startswith("#"))
+    assert CATALOGUE[name].source in said
+    assert run(capsys, "scenes", "--show", name + "x")[0] == 2

@@ -1,0 +1,158 @@
+"""What is reached from `geomech` itself, and what it costs to start."""
+
+import ast
+import importlib.metadata
+import io
+import os
+import pathlib
+import pydoc
+import re
+import rlcompleter
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+import geomech
+import rft
+from geomech import cli
+
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+def python(code, **env):
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, env={**os.environ, **env}, timeout=60
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    return ran.stdout
+
+
+def test_parts_are_reached_from_the_top():
+    from geomech.scene import Numerics, Scene, load, toml
+    from geomech.study.bench import Study
+
+    assert (geomech.load, geomech.toml, geomech.Scene, geomech.Numerics, geomech.Study) == (
+        load,
+        toml,
+        Scene,
+        Numerics,
+        Study,
+    )
+    assert geomech.gaits.Circle in geomech.gaits.KINDS.values()
+    assert geomech.media is rft.media
+    assert set(geomech.tiers.TIERS) == {"area", "adapted", "path", "harmonic", "direct"}
+    study = geomech.Study(geomech.load("three-link-viscous").with_numerics(grid=7))
+    assert study.displacement("path").shape == (3,)
+    axes = geomech.plots.figure(3, 3)[1]
+    geomech.plots.displacement(study.study([0.5], ["path"]), "BL", axes[0, 0])
+    with pytest.raises(AttributeError, match="module 'geomech' has no attribute 'lode'"):
+        geomech.lode  # noqa: B018
+
+
+def test_they_are_listed_found_by_tab_and_told_on_one_screen():
+    names = {name for name in dir(geomech) if not name.startswith("_")}
+    assert {"load", "Scene", "Study", "gaits", "media", "tiers", "plots", "register"} <= names
+    assert all(getattr(geomech, name) for name in names)
+    offered = rlcompleter.Completer({"geomech": geomech})
+    assert {offered.complete("geomech.", k).rstrip("()") for k in range(len(names))} == {f"geomech.{x}" for x in names}
+    told = pydoc.render_doc(geomech, renderer=pydoc.plaintext)
+    assert told.count("\n") < 60
+    assert max(map(len, told.splitlines())) <= 110
+    assert all(re.search(rf"\b{name}\b", geomech.__doc__) for name in names)
+
+
+def test_checkers_are_shown_the_same_names_as_are_found():
+    tree = ast.parse((ROOT / "geomech" / "__init__.py").read_text())
+    (shown,) = (node for node in tree.body if isinstance(node, ast.If))
+    names = {a.asname: (node.module, a.name) for node in shown.body for a in node.names}
+    assert set(names) == {name for name in dir(geomech) if not name.startswith("_")}
+    for name, (module, there) in names.items():
+        exec(f"from {module} import {there} as found", at := {})
+        assert at["found"] is getattr(geomech, name)
+
+
+def test_nothing_heavy_is_loaded_to_start():
+    """Neither by `import geomech` and `dir` nor by `geomech --help`; NumPy alone takes longer than both."""
+    heavy = "{'numpy', 'scipy', 'matplotlib', 'sympy', 'msgspec', 'rft'} & set(sys.modules)"
+    assert python(f"import sys, geomech; dir(geomech); print({heavy})") == "set()\n"
+    assert python(f"import sys; from geomech import cli; print({heavy})") == "set()\n"
+
+
+def run(capsys, *argv):
+    with pytest.raises(SystemExit) as left:
+        cli.main(list(argv))
+    return left.value.code, capsys.readouterr().out
+
+
+def test_the_version_is_told_once_and_the_same_everywhere(capsys):
+    assert run(capsys, "--version") == (0, f"geomech {geomech.__version__}\n")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert project["project"]["dynamic"] == ["version"]
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "geomech.__version__"}
+    assert importlib.metadata.version("geomech") == geomech.__version__
+    assert re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.M)[1] == geomech.__version__
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)[1] in (geomech.__version__, "Unreleased")
+
+
+def test_help_fits_a_screen(capsys):
+    code, out = run(capsys, "--help")
+    assert code == 0
+    assert out.count("\n") < 36
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("geomech disp", {"displacement"}),
+        ("geomech displacement three-link-gl", {"three-link-glass", "three-link-glass-close"}),
+        ("geomech run sandfish-h", {"sandfish-heavy"}),
+        ("geomech sweep --ov", {"--over"}),
+        ("geomech --ver", {"--version"}),
+    ],
+)
+def test_a_shell_completes_commands_options_and_scenes(words, found):
+    completed = python(
+        "from geomech.cli import main; main()",
+        _GEOMECH_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(len(words.split()) - 1),
+    )  # fmt: skip
+    assert set(completed.split()) == found
+
+
+def test_completion_can_be_shown(monkeypatch, capfd):
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    code = "import sys; sys.argv[0] = 'geomech'; from geomech.cli import main; main(['--show-completion', 'bash'])"
+    assert "_GEOMECH_COMPLETE=complete_bash" in python(code, _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1")
+
+
+def test_what_checkers_and_people_look_for_beside_the_code_is_there():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    data = project["tool"]["setuptools"]["package-data"]
+    for package in ("geomech", "rft"):
+        assert (ROOT / package / "py.typed").is_file()
+        assert "py.typed" in data[package]
+    cited = (ROOT / "CITATION.cff").read_text()
+    for field in ("cff-version: 1.2.0", "title: ", "authors:", "license: MIT", "references:", "doi: 10.1063/1.4898629"):
+        assert field in cited
+
+
+def public(tree):
+    """Functions and methods that are seen from outside, with the class they are of."""
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield from ((f"{node.name}.{name}", f) for name, f in public(node))
+        elif isinstance(node, ast.FunctionDef) and (not node.name.startswith("_") or node.name == "__call__"):
+            yield node.name, node
+
+
+def test_public_functions_are_annotated():
+    """One without any annotation is untyped to type checkers, which complain of every call of it in a strict program."""
+    bare = []
+    for package in ("rft", "geomech"):
+        for path in (ROOT / package).rglob("*.py"):
+            for name, f in public(ast.parse(path.read_text())):
+                asked = [*f.args.posonlyargs, *f.args.args, *f.args.kwonlyargs, f.args.vararg, f.args.kwarg]
+                if f.returns is None and not any(a and a.annotation for a in asked):
+                    bare.append(f"{path.relative_to(ROOT)}:{f.lineno} {name}")
+    assert bare == [], "say at least what it returns"
