@@ -1,0 +1,118 @@
+"""A program of a user's, on which `mypy --strict` finds nothing (.ci/run) and which runs (test_top.py)."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import geomech
+import rft
+from geomech import connection, curvature, family, harmonics, reconstruct, symbolic
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
+from geomech.output import plots
+from geomech.scene import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
+from geomech.study import accuracy, cost, undulation
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from geomech.study.sweep import sweep
+from geomech.systems import NoSlipSnake, Plain, Swimmer
+from geomech.tiers.area import area
+from geomech.tiers.direct import direct
+from geomech.tiers.path import path
+from rft import Chain, Granular, body_velocity, time_steps, work_done
+
+Array = npt.NDArray[np.float64]
+sand, swimmer = Granular(C=1.8, gamma0=np.radians(13.8)), Chain(lengths=(1, 1, 1))
+
+
+def velocity(alpha: Array, alphadot: Array) -> Array:
+    return body_velocity(sand, swimmer, alpha, alphadot).checked().xi
+
+
+class Mine:
+    """A law of traction alone."""
+
+    def traction(self, v_t: Any, v_n: Any, eps: float = 0.0) -> tuple[Any, Any]:
+        return v_t, 2 * v_n
+
+
+@geomech.register
+@dataclass(frozen=True)
+class Cart(Plain):
+    """Rolls as its first joint turns."""
+
+    kind = "cart"
+    joints = 2
+
+    def velocity(self, alpha: Array, alphadot: Array) -> Array:
+        return np.stack([alphadot[..., 0], 0 * alphadot[..., 0], 0 * alphadot[..., 0]], -1)
+
+
+def geometry() -> list[Any]:
+    fitted = connection.fit(velocity, connection.grid(joints=2, points=5))
+    ccf = curvature.ccf(fitted)
+    figure, axes = geomech.plots.figure(3.0, 3.0)
+    plots.displacement({"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, "BL", axes[0, 0])
+    plots.ccf_figure(ccf, [Circle()])
+    nets: list[Array] = [area(ccf, Circle(), [0.5]), path(fitted, Circle(), [0.5]), direct(velocity, Circle(), [0.5])]
+    table = family.fit(velocity, Circle(), 1.0, 6)
+    return [
+        *nets,
+        fitted.A,
+        table,
+        figure,
+        reconstruct.displacement(np.zeros((4, 3))),
+        harmonics.fit,
+        symbolic.velocity,
+    ]
+
+
+def scenes() -> list[Any]:
+    scene: Scene = geomech.load("three-link-viscous").with_numerics(grid=7, phases=32)
+    text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
+    study: Study = geomech.Study(scene)
+    net: Array = study.displacement("area", amplitudes=[0.5])
+    told = study.study([0.5, 1.0], ["direct"]), study.cost([0.5], ["direct"]), study.turned(phases=64), study.methods
+    more = (
+        study.fitted,
+        study.curvature,
+        study.tiers,
+        cheapest(scene, [0.5], 1e-3),
+        sweep(scene, {"gait.amplitude": [0.5]}),
+    )
+    asked = accuracy.study, cost.price, undulation.performance, undulation.activation, text, net
+    return [
+        parse(text),
+        tables(scene),
+        from_tables(tables(scene)),
+        inputs(scene),
+        load("no-slip-snake"),
+        told,
+        more,
+        asked,
+    ]
+
+
+def mechanics() -> list[Any]:
+    gaits: list[Gait] = [Butterfly(), Ellipse(semi_axes=(1.0, 0.3)), Sine(elements=8)]
+    gaits += [Points(points=((1, 0), (0, 1), (-1, 0))), Fourier(cos=((1.0,), (0.0,)), sin=((0.0,), (1.0,)))]
+    cycle = Swimmer(sand, swimmer, (rft.EndCaps(radius=0.06),)).run(*Circle().cycle(32, [0.5]))
+    steps = time_steps(sand, swimmer, np.zeros((8, 2)), np.ones((8, 2)), effects=[rft.Transient(0.1)], cycles=1)
+    power: Array = work_done(sand, swimmer, [0.0, 0.1], [1.0, 0.0], [0.0, 0.0, 0.0]).power
+    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Cart().run(*Circle().cycle(8)).net
+    media = (
+        rft.CATALOGUE["coulomb"].medium.traction(1.0, 0.5),
+        rft.Viscous(2.0).derivatives(1.0, 2.0),
+        geomech.media.LAWS,
+    )
+    return [
+        gaits,
+        cycle.net,
+        steps.xi,
+        power,
+        own,
+        media,
+        NoSlipSnake().velocity([0.1, 0.3], [1, 0]),
+        geomech.__version__,
+    ]
