@@ -171,6 +171,15 @@ def offered(group: str) -> dict[str, list[importlib.metadata.EntryPoint]]:
     return found
 
 
+def unloaded(group: str) -> tuple[dict[str, str], dict[str, str]]:
+    """Names that installed packages offer and no scene has asked for yet, with their packages: new ones, and those that are
+    refused because one of that name is built in."""
+    packages = {name: " and ".join(map(_package, entries)) for name, entries in offered(group).items()}
+    known = FAMILIES[group].kinds
+    new = {name: package for name, package in packages.items() if name not in known}
+    return new, {name: package for name, package in packages.items() if name in BUILT_IN[group]}
+
+
 def choose_kind(place: str, word: object, kinds: dict[str, type]) -> str:
     """word if it names one of the kinds, or one that an installed package offers, which is then loaded; else SceneError."""
     group = next((g for g, family in FAMILIES.items() if family.kinds is kinds), None)
@@ -180,7 +189,7 @@ def choose_kind(place: str, word: object, kinds: dict[str, type]) -> str:
     try:
         name = choose(place, word, [*kinds, *packages])
     except SceneError as error:
-        own = ", or --plugin the FILE.py that has it" if isinstance(word, str) else ""
+        own = " (or add --plugin FILE.py, a file that has it)" if isinstance(word, str) else ""
         raise SceneError(f"{error}{own}") from None
     entries = packages[name]
     who = " and ".join(_package(entry) for entry in entries)

@@ -19,6 +19,7 @@ from geomech.gaits import Circle, Gait
 from geomech.kinds import FAMILIES, load_file, register
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene, load, parse, toml
+from geomech.scene.keys import schema, text
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.sweep import question
@@ -393,6 +394,11 @@ def test_two_packages_of_one_name_and_built_in_names(package):
     with pytest.raises(SceneError, match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one"):
         parse(SCENE)
     package("raise RuntimeError", "viscous", dist="clash")
+    told = text("medium")
+    assert 'law = "thick"\nOf the package' in told
+    assert 'law = "viscous"\nNot that of the package clash 1.2, which is refused' in told
+    laws = [x["properties"].get("law") for x in schema()["properties"]["medium"]["oneOf"]]
+    assert laws.count({"const": "thick"}) == laws.count({"const": "viscous"}) == 1
     assert type(load("three-link-viscous").system.medium) is Viscous  # the built-in one stands
 
 

@@ -143,7 +143,7 @@ def test_the_program_that_checkers_look_at_runs():
     from geomech.systems import KINDS
 
     try:
-        assert [len(part()) for part in (typed.geometry, typed.scenes, typed.mechanics)] == [8, 8, 8]
+        assert all(len(part()) > 7 for part in (typed.geometry, typed.scenes, typed.mechanics))
     finally:
         KINDS.pop("cart", None)
 

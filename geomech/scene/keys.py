@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from geomech.errors import choose
-from geomech.kinds import FAMILIES
+from geomech.kinds import FAMILIES, unloaded
 from geomech.scene.model import Numerics
 from geomech.scene.read import NOT_OF_THE_BODY, TABLES, Physical
 from geomech.systems.swimmer import MEDIA, Swimmer
@@ -142,8 +142,19 @@ def _told(section: str, every: dict) -> Iterator[str]:
     for key, name, kind in every[section]:
         head = f"[[{section}]]" if section == "effects" else f"[{section}]"
         yield _table(f'{head} {key} = "{name}"' if key else head, _first(kind), keys_of(kind))
+    if section in GROUPS:
+        yield from _of_packages(f"geomech.{GROUPS[section]}", every[section][0][0])
     if section == "system":
         yield _table('[system] kind = "swimmer"', SWIMMER, [])
+
+
+def _of_packages(group: str, key: str) -> Iterator[str]:
+    new, refused = unloaded(group)
+    for name, package in new.items():
+        yield _table(f'{key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
+    for name, package in refused.items():
+        why = f"Not that of {package}, which is refused: the one that is built in has this name."
+        yield _table(f'{key} = "{name}"', why, [])
 
 
 def _first(kind: type) -> str:
@@ -212,6 +223,8 @@ def _any(section: str, parts: list[tuple[str, str, type]]) -> dict[str, Any]:
     options = [_option(key, name, kind) for key, name, kind in parts]
     if section == "medium":
         options.append(_object("A medium of the catalogue.", {"name": {"enum": [*MEDIA]}}, ["name"]))
+    for other in unloaded(f"geomech.{GROUPS[section]}")[0]:  # its keys are known when it is loaded
+        options.append({"type": "object", "properties": {parts[0][0]: {"const": other}}, "required": [parts[0][0]]})
     one = {"oneOf": options}
     return {"type": "array", "items": one} if section == "effects" else one
 

@@ -273,10 +273,10 @@ class Swimmer(Plain):
         medium, body = (said(name_in(kinds, x), x) for kinds, x in ((LAWS, self.medium), (BODIES, self.body)))
         lines = [f"{medium}, {body}", *self.notes]
         for effect in self.effects:
-            lines.append(
-                f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs "
-                f"{effect.cost}; gone at {effect.limit}, order {effect.order}"
-            )
+            cost = f"; costs {effect.cost}" if effect.cost else ""
+            gone = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
+            premises = not_so(effect.breaks) or "keeps every premise"
+            lines.append(f"on:  {said(effect.kind, effect)}; {premises}{cost}{gone}")
             if assumed := effect.assumes(self.medium):
                 lines.append(f"     assumes {assumed}")
         off = [name for name in EFFECTS if name not in [e.kind for e in self.effects]]
