@@ -89,6 +89,9 @@ def test_the_command_prints_them_all_or_a_section(capsys):
     body = run(capsys, "keys", "body")[1]
     assert "[body]" in body and "[gait]" not in body
     assert 'frame    text             -  "mean" ' in body
+    by_name = "[medium]\nBy name, with no key beside it.\n  name  text  -  required  a medium of the catalogue: glass-0.3mm-loose,"
+    assert [section for section in TABLES if by_name in text(section)] == ["medium"]
+    assert '[system] kind = "swimmer"\nA body in a medium: ' in text("system")
     assert re.search(
         r"C +number +- +required +the extra normal force.*\n +gamma0 +number +rad .*as gamma0_deg", text("medium")
     )

@@ -312,6 +312,17 @@ def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, sa
     assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
 
 
+@pytest.mark.parametrize("future", [False, True])
+def test_a_file_is_run_as_python_would_with_types_as_it_writes_them(future, tmp_path):
+    types = "{'thickness': 'float'}" if future else "{'thickness': float}"
+    head = "from __future__ import annotations\n" * future
+    (tmp_path / "own.py").write_text(f"{head}{LAW}assert Thick.__annotations__ == {types}, Thick.__annotations__\n")
+    assert load_file(tmp_path / "own.py") == ["thick"]
+    assert parse(SCENE).system.medium.thickness == 3.0
+    with pytest.raises(SceneError, match=r"\[medium\] Expected `float`, got `str` - at `.thickness`"):
+        parse(SCENE.replace("3.0", '"3"'))
+
+
 def test_names_of_no_python_file_are_refused(tmp_path):
     for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
         with pytest.raises(SceneError, match=said):

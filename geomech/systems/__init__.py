@@ -2,7 +2,8 @@
 
 from geomech.systems.base import Cycle, Plain, Premise, System, checked_system
 from geomech.systems.no_slip import NoSlipSnake
-from geomech.systems.swimmer import Solver, Swimmer
+from geomech.systems.solver import Solver
+from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
 
 KINDS = {"swimmer": Swimmer, "no-slip-snake": NoSlipSnake, "table": Table}

@@ -12,45 +12,21 @@ import rft
 from geomech.errors import real_array, short
 from geomech.reconstruct import displacement
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
+from geomech.systems.solver import Solver
 from rft.balance import checked_body
 from rft.bodies import KINDS as BODIES
 from rft.bodies.base import halves
-from rft.bodies.pieces import PIECES
 from rft.contact import Model
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
-from rft.effects.base import MOST_PIECES, pieced
-from rft.loads import QUADRATURE, element_load, parse, rule_for
+from rft.effects.base import pieced
+from rft.loads import QUADRATURE, element_load, rule_for
 from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent
-from rft.media.base import check_ranges, in_range, require_law
+from rft.media.base import require_law
 from rft.newton import ELEMENTS_TOGETHER
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
-
-
-@dataclass(frozen=True)
-class Solver:
-    """How the balance of forces is solved; part of [numerics].
-
-    loads (-): "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation (body lengths per rad): speed below which dry
-    friction is rounded off (rft.balance). tolerance (-): normalised residual. cycles (-): of time stepping
-    (`rft.time_steps`); if left out until they are periodic, one where effects break symmetry. pieces (-): to a body length,
-    1 to 10,000, into which effects that vary along an element cut it (`rft.effects`).
-    """
-
-    loads: str = "exact"
-    regularisation: float = 1e-6
-    tolerance: float = 1e-10
-    cycles: int | None = None
-    pieces: int = PIECES
-
-    def __post_init__(self):
-        parse(self.loads)
-        check_ranges(self, regularisation=(1e-12, 1), tolerance=(1e-13, 1))
-        in_range("pieces", self.pieces, 1, MOST_PIECES, whole=True)
-        if self.cycles is not None:
-            in_range("cycles", self.cycles, 1, 10_000, whole=True)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,34 @@
+"""How the balance of forces of a swimmer is solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rft.bodies.pieces import PIECES
+from rft.effects.base import MOST_PIECES
+from rft.loads import parse
+from rft.media.base import check_ranges, in_range
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How the balance of forces is solved; part of [numerics].
+
+    loads (-): "exact", "midpoint:N", "gauss:N" (rft.loads). regularisation (body lengths per rad): speed below which dry
+    friction is rounded off (rft.balance). tolerance (-): normalised residual. cycles (-): of time stepping
+    (`rft.time_steps`); if left out until they are periodic, one where effects break symmetry. pieces (-): to a body length,
+    1 to 10,000, into which effects that vary along an element cut it (`rft.effects`).
+    """
+
+    loads: str = "exact"
+    regularisation: float = 1e-6
+    tolerance: float = 1e-10
+    cycles: int | None = None
+    pieces: int = PIECES
+
+    def __post_init__(self):
+        parse(self.loads)
+        check_ranges(self, regularisation=(1e-12, 1), tolerance=(1e-13, 1))
+        in_range("pieces", self.pieces, 1, MOST_PIECES, whole=True)
+        if self.cycles is not None:
+            in_range("cycles", self.cycles, 1, 10_000, whole=True)
