@@ -138,7 +138,8 @@ def test_the_speed_matters_under_a_law_of_no_one_power():
         swimmer = Swimmer(mud, Chain())
         assert swimmer.lacks == Premise.RATE_INDEPENDENT
         with pytest.raises(
-            ValueError, match="no connection or CCF with the law .*no one power of the speed: use the dir"
+            ValueError,
+            match="no connection or CCF with the law .*no one power of the speed: use the direct tier, or take another law",
         ):
             Study(Scene(swimmer, Circle(), SMALL)).displacement("path")
     for law in (Viscous(), Coulomb(), Bare(Viscous()), Bare(Granular(1.8, 0.24)), Bare(Coulomb())):

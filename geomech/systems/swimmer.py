@@ -225,7 +225,8 @@ class Swimmer(Plain):
         return ""
 
     def refuse(self, what: str, premises: Premise, instead: str) -> None:
-        super().refuse(what, premises, f"{instead}, or drop the effect")
+        lawful = is_rate_independent(self.medium) or Premise.RATE_INDEPENDENT not in premises
+        super().refuse(what, premises, f"{instead}, or {'drop the effect' if lawful else 'take another law'}")
 
     def about(self) -> dict:
         return {
