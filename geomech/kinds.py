@@ -94,6 +94,8 @@ def _put(part: type, group: str, name: object) -> None:
 def load_file(path: str | Path) -> list[str]:
     """Run a Python file and register the classes in it that have a ``law`` or ``kind`` of their own; their names. SceneError,
     one line, if it cannot be run, has none, or one cannot be registered; then none is."""
+    if not isinstance(path, (str, Path)):
+        raise SceneError(f"a file of one's own is named by text, got {short(path)}")
     path = Path(path)
     place = f"--plugin {path}"
     if path.suffix != ".py":

@@ -9,7 +9,7 @@ import pytest
 from registry import GAITS, SYSTEMS
 
 import rft
-from geomech import connection, curvature, family, harmonics, reconstruct
+from geomech import connection, curvature, family, harmonics, kinds, reconstruct
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.field import Field
@@ -170,6 +170,8 @@ def geometries(value):
     yield "shape", lambda: fitted(value)
     yield "xi", lambda: reconstruct.displacement(value)
     yield "times", lambda: reconstruct.trajectory(np.zeros((4, 3)), value)
+    yield "part", lambda: kinds.register(value)
+    yield "plugin", lambda: kinds.load_file(value)
     yield "scene", lambda: scenes.load(value)
     yield "TOML", lambda: scenes.parse(value)
     yield "tables", lambda: scenes.from_tables(value)
