@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from registry import EFFECTS
 
 from geomech import cli, kinds
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
-from geomech.gaits import Circle, Gait
+from geomech.gaits import Circle, Gait, Sine
 from geomech.kinds import FAMILIES, load_file, register
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene, load, parse, toml
@@ -23,7 +24,7 @@ from geomech.scene.keys import schema, text
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.sweep import question
-from geomech.systems import Plain, Premise, Swimmer
+from geomech.systems import Plain, Premise, Solver, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.contact import SIDE
 from rft.effects import Effect
@@ -116,17 +117,29 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     assert exact.tiers == bare.tiers
 
 
-def test_a_law_of_traction_alone_takes_effects_and_backbones():
-    fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4), (EndCaps(0.1),) * 0)
+def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
+    fine = Swimmer(Bare(Coulomb()), Backbone(8, length=0.4))
     exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
     alpha, alphadot = np.full((2, 7), 0.3) * [[1], [-2]], np.cos(np.arange(14.0)).reshape(2, 7)
     np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
     assert fine.evaluations == 24 * exact.evaluations
-    assert "gauss:24" in explain(Scene(fine, load("sandfish-close").gait.__class__(elements=8), SMALL))
+    assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
     assert fine.finer().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"
     told_otherwise = fine.with_solver(loads="midpoint:10")
     assert (told_otherwise.notes, told_otherwise.finer().solver.loads) == ((), "midpoint:20")
+
+
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])
+def test_a_law_of_traction_alone_takes_every_effect_and_does_work(name):
+    """On 16 phases of an uneven chain; end caps alone take the numbers of a granular law."""
+    law, body, cycle = Granular(C=1.8, gamma0=0.24), Chain((1, 1.4, 0.8)), Circle(amplitude=0.9).cycle(16, [0.9])
+    effects, solver = (EFFECTS[name][0](0.3),), Solver(cycles=1)
+    exact, bare = (Swimmer(x, body, effects, solver).run(*cycle, work=True) for x in (law, Bare(law)))
+    np.testing.assert_allclose(bare.net, exact.net, atol=0.03 * np.abs(exact.net[0, :2]).max())
+    np.testing.assert_allclose(bare.work.power, exact.work.power, rtol=0.02)
+    with pytest.raises(ValueError, match="end caps take a granular medium, got Bare"):
+        Swimmer(Bare(law), body, (EndCaps(0.1),))
 
 
 def test_the_speed_matters_under_a_law_of_no_one_power():
