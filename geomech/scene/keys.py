@@ -31,6 +31,9 @@ GROUPS = {
 }  # of FAMILIES
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
 FRAME = "of all velocities and displacements, in place of the body's own key"
+FILE = (
+    "TOML of a medium, as geomech calibrate writes it, with no key beside it; or, beside law = 'table', CSV of a table"
+)
 SWIMMER = "A body in a medium: its tables [medium], [body] and [[effects]] may as well be in it as stand by themselves."
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
 PLURALS = {"number": "numbers", "integer": "whole numbers", "string": "texts", "boolean": "truths"}
@@ -139,6 +142,7 @@ def _told(section: str, every: dict) -> Iterator[str]:
         yield _table(
             "[medium]", "By name, with no key beside it.", [Key("name", words, "-", meaning, True, None, False)]
         )
+        yield _table("[medium]", "From a file.", [Key("file", words, "-", FILE, True, None, False)])
     for key, name, kind in every[section]:
         head = f"[[{section}]]" if section == "effects" else f"[{section}]"
         yield _table(f'{head} {key} = "{name}"' if key else head, _first(kind), keys_of(kind))
@@ -222,7 +226,10 @@ def _any(section: str, parts: list[tuple[str, str, type]]) -> dict[str, Any]:
         return _object("", {k: v for _, _, kind in parts for k, v in _properties(kind).items()}, [])
     options = [_option(key, name, kind) for key, name, kind in parts]
     if section == "medium":
+        file = {"file": {"type": "string", "description": FILE}}
         options.append(_object("A medium of the catalogue.", {"name": {"enum": [*MEDIA]}}, ["name"]))
+        options.append(_object("A medium from a file.", file, ["file"]))
+        options.append(_object("A table from a file.", {**file, "law": {"const": "table"}}, ["file", "law"]))
     for other in unloaded(f"geomech.{GROUPS[section]}")[0]:  # its keys are known when it is loaded
         options.append({"type": "object", "properties": {parts[0][0]: {"const": other}}, "required": [parts[0][0]]})
     one = {"oneOf": options}

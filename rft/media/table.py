@@ -63,7 +63,7 @@ class Table:
         c, s, _ = _parts(v_t, v_n, eps)
         return np.sign(c) * along(np.abs(c)) / unit, np.sign(s) * across(np.abs(s)) / unit  # odd to the last digit
 
-    def derivatives(self, v_t, v_n, eps=0.0):
+    def derivatives(self, v_t, v_n, eps=0.0) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
         """((df_t/dv_t, df_t/dv_n), (df_n/dv_t, df_n/dv_n)); infinite slopes at rest are returned as 0."""
         _, _, along, across, unit = self._curves
         c, s, inverse = _parts(v_t, v_n, eps)
