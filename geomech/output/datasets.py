@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from geomech.study.bench import Study
 from geomech.study.results import Displacements, Swept
 
 
-def xarray():
+def xarray() -> Any:
     """The package, or ImportError that says how to get it."""
     try:
         import xarray

@@ -42,7 +42,7 @@ class Study:
 
         return display.study(self)
 
-    def to_xarray(self):
+    def to_xarray(self) -> Any:
         """A Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
         from geomech.output import datasets
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ class Displacements(dict):
         """Estimates by tier, of a table of all or of the cheapest. key: "estimate" or "estimate_heading"."""
         return self[key] if isinstance(self[key], dict) else {self.tiers[0]: self[key]}
 
-    def to_xarray(self):
+    def to_xarray(self) -> Any:
         """A Dataset over tier, amplitude and component, with units and error estimates."""
         from geomech.output import datasets
 
@@ -52,7 +53,7 @@ class Swept(dict):
         super().__init__(values)
         self.scene = scene
 
-    def to_xarray(self):
+    def to_xarray(self) -> Any:
         """A Dataset over the parameters and component, as the file of `geomech sweep`."""
         from geomech.output import datasets
 

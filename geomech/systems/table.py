@@ -20,12 +20,14 @@ from geomech.systems.base import Plain
 
 @dataclass(frozen=True)
 class Table(Plain):
-    """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout. file: in a scene from a file relative to
-    that file's folder, else to the current one. sign: "+" or "-" for xi = + or - A alphadot in the file, order: "ndgrid"
-    or "meshgrid"; if left out as the file says or shows (`tables.load`). body_length: of the body in the file's unit of
-    length, where the file does not say it: results are then in body lengths. sha256: of the file, filled in if left out;
-    given, the file must have it. The file is read once, when the system is made.
+    """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout.
 
+    file (-): in a scene from a file relative to that file's folder, else to the current one. sign (-): "+" or "-" for
+    xi = + or - A alphadot in the file; order (-): "ndgrid" or "meshgrid"; if left out as the file says or shows
+    (`tables.load`). body_length (the file's unit): of the body, where the file does not say it; results are then
+    in body lengths. sha256 (-): of the file, filled in if left out; given, the file must have it.
+
+    The file is read once, when the system is made.
     Its field has the file's own grid; [numerics] grid, extent, directions, harmonics and interpolation say nothing here.
     """
 
