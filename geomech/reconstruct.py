@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.errors import real_array, short
+from rft import se2
 
 
 def turning(xi) -> np.ndarray:
@@ -21,7 +22,7 @@ def turning(xi) -> np.ndarray:
         raise ValueError(f"xi must be of shape (..., N, 3), got {xi.shape}")
     k, turn = _coefficients(xi[..., 2] + 0j)
     swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
-    return _values(swing, k, np.shape(xi)[-2])
+    return _values(swing, k, np.shape(xi)[-2]).real
 
 
 class _Spectrum(NamedTuple):
@@ -56,6 +57,30 @@ def trajectory(xi, phases) -> np.ndarray:
     return np.stack([z.real, z.imag, s.mean_turn * t + swing], -1)
 
 
+def poses(xi) -> np.ndarray:
+    """Poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N log N."""
+    s, n = _spectrum(xi), np.shape(xi)[-2]
+    span = 2 * np.pi * np.arange(n + 1) / n
+    closed = lambda c: np.take(_values(c, s.k, n), np.arange(n + 1) % n, -1)
+    turns = s.mean_turn + s.k
+    slow = np.abs(turns) < 0.5  # of one term or none the integral is no quotient
+    turning = closed(np.where(slow, 0.0, s.wave / np.where(slow, 1.0, 1j * turns))) * np.exp(1j * s.mean_turn * span)
+    z = turning - turning[..., :1]
+    drift, turn = (np.where(slow, x, 0.0).sum(-1)[..., None] for x in (s.wave, turns))
+    z = z + drift * span * np.exp(0.5j * turn * span) * np.sinc(turn * span / (2 * np.pi))
+    swing = closed(s.swing).real
+    return np.stack([z.real, z.imag, s.mean_turn * span + swing - swing[..., :1]], -1)
+
+
+def repeated(path: np.ndarray, cycles: int) -> np.ndarray:
+    """Poses (cycles N + 1, 3) of so many cycles that are all like one, (N + 1, 3)."""
+    starts, net = np.zeros((1, 3)), path[-1]
+    while len(starts) <= cycles:
+        starts = np.concatenate([starts, se2.compose(se2.compose(starts[-1], net), starts)])
+    rest = se2.compose(starts[:cycles, None], path[:-1]).reshape(-1, 3)
+    return np.concatenate([rest, starts[cycles : cycles + 1]])
+
+
 def _spectrum(xi) -> _Spectrum:
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3 or xi.shape[-2] < 3:
@@ -66,17 +91,17 @@ def _spectrum(xi) -> _Spectrum:
     mean = turn[..., k == 0].real
     swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
     n = xi.shape[-2]
-    periodic = _values(swing, k, n)
+    periodic = _values(swing, k, n).real
     periodic = periodic - periodic[..., :1]
     _, wave = _coefficients(np.exp(1j * periodic) * (xi[..., 0] + 1j * xi[..., 1]))
     return _Spectrum(mean, k, wave, swing)
 
 
 def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
-    """sum_k c_k e^(i k t) at the n phases, real part: the inverse of `_coefficients`."""
+    """sum_k c_k e^(i k t) at the n phases: the inverse of `_coefficients`."""
     folded = np.zeros((*c.shape[:-1], n), complex)
     np.add.at(folded, (..., k % n), c)
-    return np.fft.ifft(folded, axis=-1).real * n
+    return np.fft.ifft(folded, axis=-1) * n
 
 
 def _coefficients(f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

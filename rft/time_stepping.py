@@ -35,7 +35,8 @@ class TimeSteps(NamedTuple):
     N + 1, 3), on the ground, whose origin and x axis are the frame's at the first step. residual: (...), the largest,
     as in `rft.Solution`. status: (...), "periodic", "running" (as many cycles as were asked for, but not periodic),
     "not periodic" or "unconverged". drift: (...), how much displacement, body lengths, and heading, rad, will yet
-    change in all cycles to come. cycles: how many. work: (..., N) each, None unless asked for."""
+    change in all cycles to come. cycles: how many. work: (..., N) each, None unless asked for. path: (..., cycles N + 1, 3),
+    all poses since the first step, None unless asked for."""
 
     xi: np.ndarray
     pose: np.ndarray
@@ -44,6 +45,7 @@ class TimeSteps(NamedTuple):
     drift: np.ndarray
     cycles: int
     work: Work | None
+    path: np.ndarray | None = None
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.status, return_counts=True)))
@@ -84,6 +86,7 @@ def time_steps(
     tolerance: float = 1e-10,
     pieces: int = PIECES,
     with_work: bool = False,
+    with_path: bool = False,
 ) -> TimeSteps:
     """Body velocities through a gait given over one cycle: alpha, alphadot (..., N, joints), rad and per rad of phase, at
     N >= 8 equally spaced phases. Of order 2 in 1/N.
@@ -105,7 +108,7 @@ def time_steps(
     cut = pieced(body, effects, pieces)
     problem = Balance.of(folded(effects, medium, cut, loads), cut, regularisation, tolerance)
     steps = _Steps(problem, cut, halves(body), *shapes, effects)
-    found = _round_and_round(steps, phases, cycles, with_work)
+    found = _round_and_round(steps, phases, cycles, with_work, with_path)
     return _shaped(found, batch, body.length)
 
 
@@ -117,15 +120,17 @@ def _nothing(batch: tuple, phases: int) -> TimeSteps:
     )
 
 
-def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool) -> TimeSteps:
+def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: bool, with_path: bool) -> TimeSteps:
     """Cycles until they repeat, or as many as asked for; samples on the last axis."""
     enough = max([1e-6, *(e.settles for e in steps.effects)])
+    path = []
     approach = (HeavyApproach if steps.heavy else Approach)(steps.pose.shape[1])
     for done in itertools.count(1):
         start = steps.xi[-1] if steps.xi else None
         rows = [steps.next(with_work) for _ in range(phases)]
         xi, pose, residual, work = zip(*rows)
         pose = np.stack([*pose, steps.foreseen()[1]])
+        path += [pose[:-1]] if with_path else []
         moved = _between(pose[0], pose[-1])
         drift = approach.after(start, steps.xi[-1], moved)
         periodic = drift <= enough
@@ -137,7 +142,8 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
     status = np.where(periodic, "periodic", "not periodic" if cycles is None else "running")
     status = np.where(worst <= steps.limit, status, "unconverged")
     work = Work(*(np.stack(x) for x in zip(*work))) if with_work else None
-    return TimeSteps(np.stack(xi), pose, worst, status, drift, done, work)
+    whole = np.concatenate([*path, pose[-1:]]) if with_path else None
+    return TimeSteps(np.stack(xi), pose, worst, status, drift, done, work, whole)
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -156,13 +162,15 @@ def _moved(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
 def _shaped(found: TimeSteps, batch: tuple, length: float) -> TimeSteps:
     """Samples to the leading axes, body lengths to the body's unit."""
     units = np.array([length, length, 1.0])
-    xi, pose = (np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units for x in found[:2])
+    samples_first = lambda x: np.moveaxis(x, -1, 0).reshape(*batch, -1, 3) * units
+    xi, pose = map(samples_first, found[:2])
+    path = None if found.path is None else samples_first(found.path)
     work = found.work
     if work is not None:  # (N, B, ...)
         power, moment, slip = (np.moveaxis(x, 1, 0).reshape((*batch, len(x), *x.shape[2:])) for x in work)
         work = Work(power * length, moment, slip)
     residual, status, drift = (x.reshape(batch) for x in found[2:5])
-    return TimeSteps(xi, pose, residual, status, drift, found.cycles, work)
+    return TimeSteps(xi, pose, residual, status, drift, found.cycles, work, path)
 
 
 class _Steps:

@@ -11,7 +11,7 @@ import numpy as np
 from geomech import summary
 from geomech.connection import evaluate
 from geomech.errors import check_angle, choose, real_array, short
-from geomech.reconstruct import displacement
+from geomech.reconstruct import displacement, poses, repeated
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
 __all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
@@ -48,6 +48,8 @@ class System(Protocol):
     words. mirror: left and right are alike, xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta). linear: xi = A alphadot
     holds exactly. lacks: premises that do not hold; those of SHAPE_ALONE leave no velocity of a single shape, only `run`.
     singularity: None, or a function of shapes (..., joints) that passes through 0 where the velocity does not exist.
+    shape_labels: (name, unit) of each shape variable. points: None, or a function of shapes (..., joints) and poses of the
+    frame (..., 3) that gives the ends of the body's links in the world (..., links + 1, 2), tail to head.
     """
 
     @property
@@ -73,6 +75,12 @@ class System(Protocol):
 
     @property
     def singularity(self) -> Callable | None: ...
+
+    @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]: ...
+
+    @property
+    def points(self) -> Callable | None: ...
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) for alpha, alphadot (..., joints), in the body frame; nan at singular shapes."""
@@ -105,7 +113,7 @@ class Plain:
     mirror = linear = kinks = False
     lacks = NONE
     solver = None
-    singularity = None
+    singularity = points = None
     elements = evaluations = 1
     together = 1 << 12
     held = cut = 0
@@ -118,6 +126,10 @@ class Plain:
     def unit(self) -> str:
         """Of lengths: body lengths, or metres where the body has a size."""
         return "BL" if self.length == 1.0 else "m"
+
+    @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        return tuple((f"alpha_{k + 1}", "rad") for k in range(self.joints))
 
     @property
     def steps(self) -> bool:
@@ -159,6 +171,11 @@ class Plain:
         self.refuse_singular(alpha)
         xi, speed = evaluate(self.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
         return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
+
+    def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
+        """Poses (cycles N + 1, 3) of the frame, seen from where it is at first, through so many cycles of a gait given by
+        alpha, alphadot (N, joints) as in `run`, whose net pose the first of them ends at."""
+        return repeated(poses(self.run(alpha, alphadot).xi), cycles)
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""

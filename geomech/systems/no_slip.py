@@ -43,6 +43,10 @@ class NoSlipSnake(Plain):
     def _chain(self) -> Chain:
         return Chain(self.lengths, self.length, self.frame)
 
+    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """As `rft.Chain.points`."""
+        return self._chain.points(alpha, pose)
+
     def _rolling(self, alpha, alphadot):
         """Rows (..., 3, 3) and sides (..., 3) of: velocity across each link's centre = row . xi + side, body lengths."""
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))

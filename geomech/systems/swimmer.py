@@ -10,7 +10,7 @@ import numpy as np
 
 import rft
 from geomech.errors import real_array, short
-from geomech.reconstruct import displacement
+from geomech.reconstruct import displacement, poses, repeated
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
 from geomech.systems.solver import Solver
 from rft.balance import checked_body
@@ -76,6 +76,8 @@ class Swimmer(Plain):
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
     frame = property(lambda self: getattr(self.body, "frame", "mean"))
+    points = property(lambda self: getattr(self.body, "points", None))
+    shape_labels = property(lambda self: getattr(self.body, "shape_labels", super().shape_labels))
     mirror = property(lambda self: is_mirror(self.medium))
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
@@ -173,11 +175,10 @@ class Swimmer(Plain):
         """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
 
-    def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False) -> rft.TimeSteps:
+    def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
         """The gait phase after phase (`rft.time_steps`), unchecked."""
-        return rft.time_steps(
-            self.medium, self.body, alpha, alphadot, cycles=cycles, with_work=work, **self._settings("tolerance")
-        )
+        asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance")}
+        return rft.time_steps(self.medium, self.body, alpha, alphadot, **asked)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
@@ -190,11 +191,27 @@ class Swimmer(Plain):
             done = each.work(alpha, alphadot, solution.xi) if work else None
             return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
-        # Where cycles repeat the velocity is periodic, and its integral exact for the series through it.
-        repeats = not self.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
-        net = displacement(steps.xi) if repeats else steps.displacement
+        net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
         to_come = steps.drift if self.settles else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
+
+    def _repeats(self, steps: rft.TimeSteps) -> bool:
+        """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series
+        through it."""
+        return not self.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
+
+    def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
+        """Of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
+        if not self.steps:
+            return super().path(alpha, alphadot, cycles)
+        before = (self.solver.cycles or 1) - 1
+        if not self.lacks & Premise.SE2_SYMMETRIC:
+            steps = self.time_steps(alpha, alphadot, self.solver.cycles).checked()
+            if self._repeats(steps):
+                return repeated(poses(steps.xi), cycles)
+        steps = self.time_steps(alpha, alphadot, before + cycles, path=True).checked()
+        own = steps.path[before * len(alpha) :]
+        return rft.se2.compose(rft.se2.inverse(own[:1]), own)
 
     def at_once(self, phases: int) -> int:
         batched = [getattr(e, name) for e in self.effects for name in e.batched]

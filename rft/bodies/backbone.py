@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rft.bodies.base import Kinematics
+from rft.bodies.base import Kinematics, numbered
 from rft.bodies.chain import Chain
 from rft.media.base import in_range, is_number, require, shown
 
@@ -42,6 +42,11 @@ class Backbone:
         return self.elements - 1
 
     @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        """As of `Chain`."""
+        return numbered(self.joints)
+
+    @property
     def bends(self) -> np.ndarray | None:
         """(elements - 1, joints): the bend at each point for a unit of each shape variable; None where they are the
         shape variables themselves."""
@@ -58,6 +63,10 @@ class Backbone:
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
         return self.chain.frame_pose(frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T)
+
+    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Ends of the elements in the world, (..., elements + 1, 2), as `Chain.points`."""
+        return self.chain.points(alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T, pose)
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,10 @@ class Serpenoid(Backbone):
     @property
     def joints(self) -> int:
         return 2
+
+    @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        return ("curvature x length, cosine", "rad"), ("curvature x length, sine", "rad")
 
     @cached_property
     def bends(self) -> np.ndarray:
@@ -105,6 +118,10 @@ class ConstantCurvature(Backbone):
     @property
     def joints(self) -> int:
         return self.sections
+
+    @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        return numbered(self.sections, "bend of section {}")
 
     @cached_property
     def bends(self) -> np.ndarray:

@@ -111,7 +111,8 @@ class Kinematics(NamedTuple):
 
 
 class Body(Protocol):
-    """Any body whose shape is ``joints`` numbers and which is made of straight elements."""
+    """Any body whose shape is ``joints`` numbers and which is made of straight elements. One that is to be drawn gives
+    ``points`` besides, and ``shape_labels`` where its shape variables are no joint angles: see `rft.Chain`."""
 
     @property
     def length(self) -> float: ...
@@ -120,6 +121,11 @@ class Body(Protocol):
     def joints(self) -> int: ...
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics: ...
+
+
+def numbered(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
+    """(name, unit) of each of so many shape variables, numbered from 1."""
+    return tuple((name.format(k + 1), unit) for k in range(joints))
 
 
 @dataclass(frozen=True, eq=False)

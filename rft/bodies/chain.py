@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.bodies.base import Kinematics
+from rft.bodies.base import Kinematics, numbered
 from rft.media.base import in_range, real_array, require, shown
+from rft.se2 import rotated
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,11 @@ class Chain:
     @property
     def joints(self) -> int:
         return len(self.lengths) - 1
+
+    @property
+    def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        """(name, unit) of each shape variable, for the axes of pictures."""
+        return numbered(self.joints)
 
     @property
     def fractions(self) -> np.ndarray:
@@ -91,6 +97,22 @@ class Chain:
         place, velocity = self.length * place, self.length * velocity
         h, hdot = (place.real, place.imag, heading), (velocity.real, velocity.imag, turn)
         return np.stack(h, -1), np.stack(hdot, -1)
+
+    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
+
+        alpha: (..., joints), rad. pose: (..., 3), of the body's own frame in the world, (x, y) in length units, theta in rad.
+        """
+        alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
+        require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last, got {alpha.shape}")
+        require(pose.shape[-1:] == (3,), f"pose must be (x, y, theta), got {pose.shape}")
+        flat = alpha.reshape(-1, self.joints).T
+        heading, _, place, _ = self._links(flat, np.zeros_like(flat))
+        half = (self.fractions / 2)[:, None] * np.exp(1j * heading)
+        ends = self.length * np.concatenate([place - half, (place + half)[-1:]]).T.reshape(*alpha.shape[:-1], -1)
+        x, y, theta = np.moveaxis(pose[..., None], -2, 0)
+        across, up = rotated(theta, ends.real, ends.imag)
+        return np.stack([x + across, y + up], -1)
 
 
 def _centres(half_links: np.ndarray, zero: np.ndarray) -> np.ndarray:
