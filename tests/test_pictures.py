@@ -11,6 +11,8 @@ from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Ellipse
 from geomech.output import plots, sweeps
+from geomech.output.plots.precision import KNOBS as PRECISION
+from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
 from geomech.tiers import TIERS
 from rft import CATALOGUE
@@ -71,14 +73,16 @@ def test_the_map_of_a_field_lies_as_the_field(component):
     inside = lambda points: np.any([p.contains_points(points) for p in hatched.get_paths()], axis=0)
     assert inside([[0.9, 1.6], [-0.7, 1.5]]).all()
     assert not inside([[0.9, 0.9], [-0.7, 0.9]]).any()
-    assert "hatched" in ax.get_title("left")
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == [plots.HATCHED]
+    assert ax.get_title() == f"CCF$_{{{plots.COMPONENTS[component]}}}$: {('forward', 'sideways', 'turning')[component]}"
     curve = gait.shape(np.linspace(0, 2 * np.pi, 400))
     np.testing.assert_allclose(ax.lines[0].get_xydata(), curve)
     np.testing.assert_allclose(ax.lines[1].get_xydata(), curve[:1])
     assert ("(rad/rad$^2$)" if component == 2 else "(m/rad$^2$)") in label_of(ax)
     assert (ax.get_xlim(), ax.get_ylim()) == ((-1.0, 1.5), (-0.5, 2.0))
     assert len(plain.collections) == 2
-    assert plain.get_title("left") == ""
+    assert plain.get_legend() is None
+    assert plain.get_title() == ax.get_title()
 
 
 def test_the_line_of_zeros_leaves_noise_alone():
@@ -99,14 +103,96 @@ def test_the_line_of_zeros_leaves_noise_alone():
 
 
 def test_no_specks_on_the_default_map():
-    """In loose glass the turn's map has closed loops of zeros less than half a radian across, with its error it has none."""
-    glass, found = scenes.load("three-link-glass"), {}
-    for key, error in (("plain", None), ("known", Study(glass).curvature_error)):
-        (path,) = plots.ccf_map(Study(glass).curvature, 2, error=error).collections[-1].get_paths()
-        loops = [p for p in path.to_polygons(closed_only=False) if np.allclose(p[0], p[-1])]
-        found[key] = [np.ptp(p, axis=0).max() for p in loops]
-    assert min(found["plain"]) < 0.5
-    assert min(found["known"], default=1.0) > 0.5
+    """In loose glass the turn's field has loops of zeros less than half a radian across and single points whose error
+    exceeds them; on its map there are neither."""
+    study = Study(scenes.load("three-link-glass"))
+    field, error = study.curvature, study.curvature_error
+    raw = plots.figure(3, 3)[1][0, 0].contour(*field.axes, field.values[2].T, levels=[0.0])
+    assert min(sizes_of_loops(raw)) < 0.5
+    for component in range(3):
+        ax = plots.ccf_map(field, component, error=error)
+        hatched, zeros = (c for c in ax.collections if not isinstance(c, QuadMesh))
+        assert min(sizes_of_loops(zeros), default=1.0) > 0.5
+        patches = [np.ptp(p, axis=0).max() for path in hatched.get_paths() for p in pieces(path)]
+        assert min(patches, default=1.0) > 0.2
+
+
+def pieces(path):
+    """Vertices of each unbroken part of a path, as they are."""
+    return [p for p in np.split(path.vertices, np.flatnonzero(path.codes == path.MOVETO)[1:]) if len(p)]
+
+
+def sizes_of_loops(contours):
+    parts = [p for path in contours.get_paths() if len(path.vertices) for p in pieces(path)]
+    return [np.ptp(p, axis=0).max() for p in parts if np.allclose(p[0], p[-1])]
+
+
+def test_hatching_leaves_out_what_goes_along_with_a_line_of_zeros():
+    """A thin band where the sign changes is left out, one where it does not is kept, as are patches of three by three
+    anywhere; single points are not. Shapes without a value are no change of sign."""
+    values, error = np.ones((16, 14)), np.zeros((16, 14))
+    values[8:] = -1.0
+    values[15] = np.nan
+    along, away, beside, patch, speck = (
+        (8, slice(None)),
+        (2, slice(None)),
+        (14, slice(None)),
+        (slice(6, 9), slice(5, 8)),
+        (4, 11),
+    )
+    hatched = np.zeros((16, 14), bool)
+    for where, kept in ((along, False), (away, True), (beside, True), (patch, True), (speck, False)):
+        error[where] = 2.0
+        hatched[where] = kept
+    np.testing.assert_array_equal(plots.unknown(values, error), hatched)
+    np.testing.assert_array_equal(plots.unknown(-values, error), hatched)
+    np.testing.assert_array_equal(plots.unknown(values.T, error.T), hatched.T)
+
+
+def test_a_gait_is_drawn_as_far_as_the_field_goes():
+    plane = SHAPES[0] + 0.3
+    field = Field(AXES, np.stack([plane] * 3))
+    beyond = Ellipse(centre=(0.2, 0.5), semi_axes=(1.6, 0.4))
+    ax = plots.ccf_map(field, 0, [beyond])
+    drawn, dot = (line.get_xydata() for line in ax.lines)
+    inside = np.isfinite(drawn).all(1)
+    curve = beyond.shape(np.linspace(0, 2 * np.pi, 400))
+    np.testing.assert_allclose(drawn[inside], curve[inside])
+    np.testing.assert_array_equal(inside, (curve[:, 0] >= -1) & (curve[:, 0] <= 1.5))
+    assert 50 < inside.sum() < 350
+    assert np.isnan(dot).all()  # it starts at 1.8
+    (note,) = (t.get_text() for t in ax.texts if t.get_text())
+    assert note == "gait leaves the field"
+    (arrow,) = (t for t in ax.texts if getattr(t, "arrow_patch", None))
+    assert -1 <= arrow.xy[0] <= 1.5
+    within = plots.ccf_map(field, 0, [Ellipse(centre=(0.2, 0.5), semi_axes=(1.2, 0.4))])
+    assert not [t for t in within.texts if t.get_text()]
+    nowhere = plots.ccf_map(field, 0, [Ellipse(centre=(9.0, 0.5), semi_axes=(1.3, 0.4))])
+    assert not [t for t in nowhere.texts if getattr(t, "arrow_patch", None)]
+
+
+def test_modes_are_named_on_the_axes():
+    """Shape variables that are no joint angles, on maps, arrows and in the units of the colours."""
+    system = scenes.load("serpenoid-glass").system
+    names = [f"{name} ({unit})" for name, unit in system.shape_labels]
+    assert "cosine" in names[0] and "sine" in names[1] and "rad" in names[0]
+    field = Field(AXES, np.stack([SHAPES[0]] * 3))
+    labels = (("bend", "deg"), ("roll", "m"))
+    fitted = Connection(AXES, np.ones((3, 2, 11, 9)), SHAPES[0], SHAPES[0])
+    for axes, bar in (
+        (plots.ccf_figure(field, labels=system.shape_labels).axes[:3], None),
+        (plots.ccf_figure(field, labels=labels).axes[:3], "(BL/(deg m))"),
+        (
+            plots.connection_figure(fitted, labels=labels).axes[:3],
+            "(BL/deg)",
+        ),
+    ):
+        expected = names if bar is None else ["bend (deg)", "roll (m)"]
+        for ax in axes:
+            assert [ax.get_xlabel(), ax.get_ylabel()] == expected
+        assert bar is None or bar in axes[0].figure.axes[3].get_ylabel()
+    assert plots.quantity("alpha_12", "rad") == r"$\alpha_{12}$ (rad)"
+    assert plots.quantity("drag_ratio", "-") == "drag_ratio (-)"
 
 
 def test_lines_of_displacement_are_the_net_of_each_tier():
@@ -132,11 +218,63 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
     np.testing.assert_allclose(y[:, 0], over["body.length"])
     np.testing.assert_allclose(values, moved[..., 0].T)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "body.length")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "length (m)")
+    assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.5), (2.0, 5.0))
+    shuffled = {**results, "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]}}
+    x, y, values = mesh(sweeps.draw(scene, shuffled).axes[0])
+    np.testing.assert_allclose(x[0], [0.5, 1.0, 1.5])
+    np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
+    np.testing.assert_allclose(values, np.array([[4, 3], [6, 5], [-2, 1]]).T)
     one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.1, 0.2])}
     ax = sweeps.draw(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
-    np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.9], [2, 1.1]], [[5, -2.2], [5, -1.8]]])
+    np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]])  # m
+    many = {"over": {"medium.C": np.arange(60.0)}, "displacement": np.ones((60, 3)), "estimate": np.ones(60)}
+    drawn = [sweeps.draw(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
+    assert drawn == ["o", "None"]
+
+
+def test_the_work_precision_diagram_says_what_its_lines_are():
+    lines = [
+        {
+            "tier": "direct",
+            "knob": "phases",
+            "value": [16, 64],
+            "error": [1e-3, 1e-5],
+            "seconds": [0.1, 0.3],
+            "slope": 2.26,
+        },
+        {"tier": "area", "knob": "grid", "value": [7, 61], "error": [0.02, 0.01], "seconds": [0.2, 0.4], "slope": 0.04},
+        {"tier": "path", "knob": "directions", "value": [2, 8], "error": [0.1, 0], "seconds": [1, 2], "slope": None},
+    ]
+    for line, against in zip(lines, ("truth", "truth", "limit")):
+        line["against"] = against
+    fig = plots.work_precision_figure({"lines": lines, "amplitudes": [1.0, 2.0, 3.0]})
+    left, right = fig.axes
+    assert [t.get_text() for t in left.get_legend().get_texts()] == [
+        "direct: phases a cycle, 16 to 64, order 2.3", "area: points a joint of the grid, 7 to 61, no gain",
+    ]  # fmt: skip
+    assert [t.get_text() for t in right.get_legend().get_texts()] == ["path: directions of the fit, 2 to 8"]
+    assert [(t.get_text(), t.xy) for t in left.texts[:2]] == [("16", (0.1, 1e-3)), ("64", (0.3, 1e-5))]
+    assert left.get_xlabel() == "time for 3 amplitudes, tables included (s)"
+    assert "finer force balance (BL)" in left.get_ylabel() and "the setting leads (BL)" in right.get_ylabel()
+    np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0.2, 0.02], [0.4, 0.01]])
+    assert set(PRECISION) <= {knob.name for knob in KNOBS}
+    assert left.get_title() and right.get_title()
+    fig.canvas.draw()
+    for ax in (left, right):  # two powers of ten on each axis, though the times span less than one
+        for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+            assert len([x for x in axis.get_majorticklocs() if low <= x <= high]) >= 2
+            assert not any(t.get_text() for t in axis.get_minorticklabels())
+
+
+def test_parameters_have_names_and_units():
+    scene = scenes.load("sandfish-heavy")
+    names = ["medium.C", "effects.frequency", "medium.gamma0_deg", "effects.end-caps.radius", "gait.amplitude"]
+    named = ["C (-)", "frequency (Hz)", r"$\gamma_{0}$ (deg)", "radius (BL)", scene.gait.amplitude_label]
+    assert sweeps.labels(scene, names) == named
+    both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
+    assert sweeps.labels(scene, both) == ["end-caps: radius (BL)", "disturbed-ground: radius (BL)"]
 
 
 def test_fig05c_draws_across_solid_and_along_dashed():
@@ -185,7 +323,7 @@ def test_panels_are_x_y_and_theta():
     error = Field(AXES, np.abs(A[:, 1]))
     for component, ax in enumerate(plots.ccf_figure(field, error=error).axes[:3]):
         np.testing.assert_allclose(mesh(ax)[2], A[component, 0].T)
-        assert ax.get_title("left")
+        assert ("forward", "sideways", "turning")[component] in ax.get_title()
 
 
 def test_a_row_of_rounding_has_no_arrows():

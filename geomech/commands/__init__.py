@@ -2,15 +2,6 @@
 here; `geomech.commands.options` has what they share."""
 
 COMMANDS = (
-    "run",
-    "velocity",
-    "connection",
-    "ccf",
-    "displacement",
-    "accuracy",
-    "sweep",
-    "calibrate",
-    "explain",
-    "scenes",
-    "keys",
-)
+    "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "calibrate",
+    "explain", "scenes", "keys",
+)  # fmt: skip

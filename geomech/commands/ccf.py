@@ -21,5 +21,6 @@ def ccf(
     from geomech.output import plots
 
     study = field(name, grid, extent, plot, plot, True, yes, with_gait=True)
-    gait, unit = study.scene.gait, study.scene.system.unit
-    plots.save(plots.ccf_figure(study.curvature, [gait], unit, study.curvature_error), plot)
+    gait, system = study.scene.gait, study.scene.system
+    maps = plots.ccf_figure(study.curvature, [gait], system.unit, study.curvature_error, system.shape_labels)
+    plots.save(maps, plot)

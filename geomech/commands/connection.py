@@ -42,4 +42,5 @@ def connection(
         if not sign:
             note(f"{out} has {SIGNS['+']}; --sign - gives the other")
     if plot:
-        plots.save(plots.connection_figure(study.fitted, study.scene.system.unit), plot)
+        system = study.scene.system
+        plots.save(plots.connection_figure(study.fitted, system.unit, system.shape_labels), plot)

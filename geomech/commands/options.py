@@ -51,6 +51,7 @@ FolderOption = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON and nothing else")]
+CyclesOption = Annotated[int, typer.Option("--cycles", metavar="N", help="cycles of the gait")]
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 

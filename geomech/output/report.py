@@ -50,9 +50,10 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
     amplitudes = [reachable(scene, gait) for gait in gaits]
     if "path" in study.methods and scene.system.joints == 2:
         study.compute_field(progress)
+        labels = scene.system.shape_labels
         save_connection(folder / "connection.nc", study)
-        _save(plots.connection_figure(study.fitted, unit), folder / "connection")
-        _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error), folder / "ccf")
+        _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
+        _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
     tables = {type(g).__name__.lower(): study.study(a, study.methods, g) for g, a in zip(gaits, amplitudes)}
     fig, axes = plots.figure(3.6 * len(gaits), 3.7, len(gaits))
     for ax, gait, table in zip(axes[0], gaits, tables.values()):

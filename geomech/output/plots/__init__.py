@@ -7,6 +7,7 @@ from geomech.output.plots.drag import drag_figure
 from geomech.output.plots.maps import (
     COMPONENTS,
     FINEST,
+    HATCHED,
     ccf_figure,
     ccf_map,
     certain,
@@ -15,13 +16,16 @@ from geomech.output.plots.maps import (
     drawable,
     largest,
     shape_space,
+    unknown,
     vector_field,
 )
+from geomech.output.plots.motion import LINES, filmstrip, stage
 from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
-from geomech.output.plots.style import STYLE, check_format, figure, save, styled
+from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
 
 __all__ = [
-    "COMPONENTS", "FINEST", "KNOB_MARKER", "STYLE", "ccf_figure", "ccf_map", "certain", "check_format", "connection_figure",
-    "displacement", "drag_figure", "draw_gait", "drawable", "figure", "largest", "net", "save", "shape_space", "styled",
-    "vector_field", "work_precision", "work_precision_figure",
+    "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
+    "check_format", "connection_figure", "displacement", "drag_figure", "draw_gait", "drawable", "figure",
+    "filmstrip", "largest", "net", "quantity", "save", "shape_space", "stage", "styled", "unknown", "vector_field",
+    "work_precision", "work_precision_figure",
 ]  # fmt: skip

@@ -9,27 +9,44 @@ import numpy as np
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Gait
-from geomech.output.plots.style import axes_of, figure, styled
+from geomech.output.plots.style import axes_of, figure, quantity, styled
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
 COMPONENTS = ("x", "y", r"\theta")
+TITLES = ("forward", "sideways", "turning")
+Labels = Sequence[tuple[str, str]]
+ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
+PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
+PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
+HATCHED = "error above value"
+SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
+PATCH = 6  # points of one
+FINER = 4  # points of a line for each of the grid
 FINEST = 400  # grid points along an axis of a map: about the dots of its picture
 
 
-def shape_space(ax, axes: Sequence[np.ndarray]):
-    """Label a plane of two joint angles and set it to the grid."""
+def shape_space(ax, axes: Sequence[np.ndarray], labels: Labels = ANGLES):
+    """Label a plane of two shape variables and set it to the grid. labels: (name, unit) of each."""
     ax.set(
-        xlabel=r"$\alpha_1$ (rad)", ylabel=r"$\alpha_2$ (rad)", aspect="equal",
+        xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), aspect="equal",
         xlim=(axes[0][0], axes[0][-1]), ylim=(axes[1][0], axes[1][-1]),
     )  # fmt: skip
     return ax
 
 
 @styled
-def vector_field(connection: Connection, component: int = 0, unit: str = "BL", ax=None, every: int | None = None):
-    """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length."""
+def vector_field(
+    connection: Connection,
+    component: int = 0,
+    unit: str = "BL",
+    ax=None,
+    every: int | None = None,
+    labels: Labels = ANGLES,
+):
+    """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length. labels: as in
+    `shape_space`."""
     ax = axes_of(ax)
-    step = every or max(1, len(connection.axes[0]) // 12)
+    step = every or max(1, round(len(connection.axes[0]) / 13))
     pick = slice(step // 2, None, step)
     x, y = np.meshgrid(*(a[pick] for a in connection.axes), indexing="ij")
     u, v = (connection.A[component, k][pick, pick] for k in (0, 1))
@@ -42,10 +59,15 @@ def vector_field(connection: Connection, component: int = 0, unit: str = "BL", a
     top = np.nanmax(size, initial=0.0)
     arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, scale=None if top else 1.0)
     arrows.set_clim(0.0, top or 1.0)
-    per = "rad" if component == 2 else unit
+    of = rf"\mathbf{{A}}^{{{COMPONENTS[component]}}}"
+    ax.set_title(f"${of}$: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
-    colorbar.set_label(rf"$|\mathbf{{A}}^{{{COMPONENTS[component]}}}|$ ({per}/rad)")
-    return shape_space(ax, connection.axes)
+    colorbar.set_label(f"$|{of}|$ ({_unit(component, unit)}/{labels[0][1]})")
+    return shape_space(ax, connection.axes, labels)
+
+
+def _unit(component: int, unit: str) -> str:
+    return "rad" if component == 2 else unit
 
 
 def drawable(field: Field) -> Field:
@@ -57,12 +79,15 @@ def drawable(field: Field) -> Field:
 
 @styled
 def ccf_map(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None
-):
-    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)); the colours are centred on zero.
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    labels: Labels = ANGLES, legend: bool = True,
+):  # fmt: skip
+    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)), as far as the field goes; the colours
+    are centred on zero.
 
-    error: of the field (`curvature.error`). Hatched where it exceeds the value, so that not even the sign is known; there
-    the line of zeros keeps only what parts two signs that are known (`certain`)."""
+    error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is
+    known (`unknown`); there no line of zeros is drawn, and beside them only what parts two signs that are known
+    (`certain`). labels: as in `shape_space`. legend: say below the map what hatching means."""
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -70,19 +95,87 @@ def ccf_map(
     values = field.values[component]
     top, smooth = largest(values), "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
+    hidden = None
     if error is not None:
-        unsure = error.values[component] - np.abs(values)
-        upright = "||||||"  # lines of symmetry of chains are diagonal
-        ax.contourf(*field.axes, unsure.T, levels=[0.0, np.inf], colors="none", hatches=[upright])
-        ax.set_title("hatched: error above value", loc="left", fontsize=8)
+        hidden = unknown(values, error.values[component])
         values = certain(values, error.values[component])
-    ax.contour(*field.axes, values.T, levels=[0.0], colors="0.35", linewidths=0.6)
+        _hatch(ax, field, hidden, legend)
+    _zeros(ax, field, values, hidden)
+    shape_space(ax, field.axes, labels)
+
     for gait in gaits:
-        draw_gait(gait, ax)
-    per = "rad" if component == 2 else unit
+        draw_gait(gait, ax, within=field.axes)
+    if not all(_inside(gait.shape(PHASES), field.axes).all() for gait in gaits):
+        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+        ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
+    of = rf"CCF$_{{{COMPONENTS[component]}}}$"
+    ax.set_title(f"{of}: {TITLES[component]}")
     colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85)
-    colorbar.set_label(rf"CCF$_{{{COMPONENTS[component]}}}$ ({per}/rad$^2$)")
-    return shape_space(ax, field.axes)
+    per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
+    colorbar.set_label(f"{of} ({_unit(component, unit)}/{per})")
+    return ax
+
+
+def _hatch(ax, field: Field, hidden: np.ndarray, legend: bool) -> None:
+    """Patches, with rounded edges, and what they mean."""
+    from matplotlib.patches import Patch
+
+    axes, mask = _rounded(field, hidden)
+    upright = "||||||"  # lines of symmetry of chains are diagonal
+    ax.contourf(*axes, mask.T, levels=[0.5, 2.0], colors="none", hatches=[upright])
+    if legend and hidden.any():
+        means = Patch(facecolor="none", edgecolor="black", lw=0.3, hatch=upright, label=HATCHED)
+        ax.legend(handles=[means], loc="upper center", bbox_to_anchor=(0.5, -0.2))
+
+
+def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> None:
+    """The line of zeros, but for hidden patches and for bits too short to be a line."""
+    from matplotlib.path import Path
+
+    axes, fine = _finer(field, values)
+    if hidden is not None:
+        fine = np.where(_rounded(field, hidden)[1] >= 0.5, np.nan, fine)
+    if not np.nanmin(fine, initial=0.0) < 0 < np.nanmax(fine, initial=0.0):
+        return
+    line = ax.contour(*axes, fine.T, levels=[0.0], colors="0.35", linewidths=0.6)
+    short = SHORT * max(np.ptp(a) for a in axes)
+    (path,) = line.get_paths()
+    codes = np.array([] if path.codes is None else path.codes)
+    cuts = np.flatnonzero(codes == Path.MOVETO)[1:]
+    parts = zip(np.split(path.vertices, cuts), np.split(codes, cuts))
+    long = [Path(*p) for p in parts if len(p[0]) and np.ptp(p[0], axis=0).max() >= short]
+    line.set_paths([Path.make_compound_path(*long)] if long else [])
+
+
+def _rounded(field: Field, hidden: np.ndarray):
+    """As `_finer`, a mask's: above one half inside."""
+    from scipy.ndimage import gaussian_filter
+
+    axes, mask = _finer(field, hidden.astype(float), degree=1)
+    return axes, gaussian_filter(mask, 0.7 * FINER, mode="nearest") if len(axes[0]) > len(field.axes[0]) else mask
+
+
+def _finer(field: Field, values: np.ndarray, degree: int = 3):
+    """(axes, values) between the grid's points too, for lines that are smooth; as they are beside singular shapes."""
+    from scipy.interpolate import RectBivariateSpline
+
+    if field.masked or max(values.shape) * FINER > FINEST or min(values.shape) < 4:
+        return field.axes, values
+    axes = [np.interp(np.arange(FINER * (len(a) - 1) + 1) / FINER, np.arange(len(a)), a) for a in field.axes]
+    return axes, RectBivariateSpline(*field.axes, values, kx=degree, ky=degree)(*axes)
+
+
+def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """(N_1, N_2): where error > |value| over a patch of 3 by 3 points or more, or over PATCH points together away from
+    where the value changes sign. What goes along with a line of zeros says nothing that it does not say."""
+    from scipy.ndimage import binary_opening, label, maximum_filter, minimum_filter
+
+    beyond, square = error > np.abs(values), np.ones((3, 3))
+    known = np.where(np.isnan(values), 0.0, values)
+    highest, lowest = (f(known, 3) for f in (maximum_filter, minimum_filter))
+    patches, count = label(beyond & ~((highest > 0) & (lowest < 0)), square)
+    sizes = np.bincount(patches.ravel(), minlength=count + 1)
+    return binary_opening(beyond, square) | ((patches > 0) & (sizes[patches] >= PATCH))
 
 
 def largest(values: np.ndarray) -> float:
@@ -107,32 +200,44 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @styled
-def draw_gait(gait: Gait, ax=None, color: str = "black"):
-    """The gait's curve with a dot at its start and an arrow along it."""
-    t = np.linspace(0, 2 * np.pi, 400)
-    ax, curve = axes_of(ax), gait.shape(t)
+def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None):
+    """The gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid."""
+    ax, curve = axes_of(ax), gait.shape(PHASES)
+    curve[~_inside(curve, within or ())] = np.nan
     ax.plot(*curve.T, color=color, lw=1.2)
     ax.plot(*curve[0], "o", color=color, ms=3)
-    ax.annotate("", curve[58], curve[50], arrowprops={"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0})
+    ahead = np.roll(np.arange(392), -50)  # an eighth of the way, or the next place inside
+    start = next((k for k in ahead if np.isfinite(curve[[k, k + 8]]).all() and (curve[k] != curve[k + 8]).any()), None)
+    if start is not None:
+        style = {"arrowstyle": "-|>", "color": color, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", curve[start + 8], curve[start], arrowprops=style)
     return ax
 
 
+def _inside(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
+    """(P,): which shapes of a curve (P, 2) lie within the axes of a grid, to rounding."""
+    inside = np.ones(len(curve), bool)
+    for x, axis in zip(curve.T, axes):
+        slack = 1e-9 * np.ptp(axis)
+        inside &= (x >= axis[0] - slack) & (x <= axis[-1] + slack)
+    return inside
+
+
 @styled
-def connection_figure(connection: Connection, unit: str = "BL"):
+def connection_figure(connection: Connection, unit: str = "BL", labels: Labels = ANGLES):
     """All three rows of A side by side."""
-    fig, axes = figure(10.8, 3.0, 3)
+    fig, axes = figure(10.8, 3.0, 3, layout="compressed")
     for component, ax in enumerate(axes[0]):
-        vector_field(connection, component, unit, ax)
+        vector_field(connection, component, unit, ax, labels=labels)
     return fig
 
 
 @styled
-def ccf_figure(field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None):
+def ccf_figure(
+    field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None, labels: Labels = ANGLES
+):
     """All three components of the CCF side by side, with gaits drawn on them."""
-    fig, axes = figure(10.8, 3.0, 3)
+    fig, axes = figure(10.8, 3.2, 3, layout="compressed")
     for component, ax in enumerate(axes[0]):
-        ccf_map(field, component, gaits, unit, ax, error)
+        ccf_map(field, component, gaits, unit, ax, error, labels)
     return fig
-
-
-KNOB_MARKER = "osD^v<>Ph*X"

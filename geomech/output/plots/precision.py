@@ -10,33 +10,66 @@ from geomech.output.plots.style import figure, styled
 from geomech.tiers import TIERS
 
 KNOB_MARKER = "osD^v<>Ph*X"
+KNOBS = {  # in words, where an entry of [numerics] is short for them
+    "phases": "phases a cycle",
+    "segments": "midpoints a link for the loads",
+    "nodes": "Gauss points a link for the loads",
+    "pieces": "pieces a body length",
+    "curves": "curves of the family's table",
+    "grid": "points a joint of the grid",
+    "harmonics": "highest harmonic kept",
+    "directions": "directions of the fit",
+    "interpolation": "degree of the splines",
+}
+PANELS = {
+    "truth": ("Error of the answer", "rms distance from a far finer force balance (BL)"),
+    "limit": ("Error of one approximation alone", "rms distance from where the setting leads (BL)"),
+}
+FLAT = 0.3  # order below which finer settings gain nothing to speak of
 
 
 @styled
 def work_precision(results: Mapping, axes=None):
-    """Error against seconds of `accuracy.study`, a line a knob: against the truth on the first of two Axes, against the
-    knob's own limit on the second. Slopes are measured orders in the setting."""
+    """Error against seconds of `accuracy.study`, a line for each setting of a tier, the values it goes from and to beside
+    its ends: how far off the answer is on the first of two Axes, how far off what that setting comes to on the second."""
     axes = figure(10.0, 3.8, 2)[1][0] if axes is None else axes
-    for ax, against in zip(axes, ("truth", "limit")):
+    for ax, (against, (title, error)) in zip(axes, PANELS.items()):
         lines = [line for line in results["lines"] if line["against"] == against]
         for line, marker in zip(lines, KNOB_MARKER):
-            style = {"color": TIERS[line["tier"]].colour, "linestyle": "-", "linewidth": 1.0}
-            if against == "limit":
-                style["color"] = f"C{KNOB_MARKER.index(marker)}"
-            order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
-            error = np.maximum(line["error"], 1e-17)
-            ax.loglog(line["seconds"], error, marker=marker, label=line["label"] + order, **style)
-        ax.set(
-            xlabel="seconds", ylabel=f"error against the {'truth' if against == 'truth' else 'limit of the knob'} (BL)"
-        )
+            colour = TIERS[line["tier"]].colour if against == "truth" else f"C{KNOB_MARKER.index(marker)}"
+            _line(ax, line, marker, colour)
+        ax.set(xlabel=f"time for {len(results['amplitudes'])} amplitudes, tables included (s)", ylabel=error)
+        ax.set_title(title)
+        for axis in (ax.xaxis, ax.yaxis):
+            _decades(axis)
         ax.grid(True, which="major", lw=0.3, color="0.85")
         if lines:
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), title="tier: setting, from coarse to fine")
+            ax.get_legend().get_title().set_fontsize(8)
     return axes
+
+
+def _line(ax, line: Mapping, marker: str, colour: str) -> None:
+    error, values = np.maximum(line["error"], 1e-17), line["value"]
+    slope = line["slope"]
+    gain = "" if slope is None else f", order {slope:.1f}" if slope >= FLAT else ", no gain"
+    label = f"{line['tier']}: {KNOBS.get(line['knob'], line['knob'])}, {values[0]:g} to {values[-1]:g}{gain}"
+    ax.loglog(line["seconds"], error, marker=marker, label=label, color=colour, lw=1.0)
+    for end, offset, how in ((0, (0, 5), {"ha": "center"}), (-1, (5, 0), {"ha": "left", "va": "center"})):
+        at = {"xy": (line["seconds"][end], error[end]), "xytext": offset, "textcoords": "offset points"}
+        ax.annotate(f"{values[end]:g}", **at, **how, fontsize=7, color=colour)
+
+
+def _decades(axis) -> None:
+    """Labels at powers of ten alone, two of them at least."""
+    low, high = axis.get_view_interval()
+    if np.floor(np.log10(high)) - np.ceil(np.log10(low)) < 1:
+        axis.axes.set(**{f"{axis.axis_name}lim": (10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))})
+    axis.set_minor_formatter("")
 
 
 @styled
 def work_precision_figure(results: Mapping):
-    fig, axes = figure(10.0, 3.4, 2)
+    fig, axes = figure(10.0, 5.2, 2)
     work_precision(results, axes[0])
     return fig

@@ -11,6 +11,8 @@ from typing import Any, ParamSpec, TypeVar
 from geomech.errors import SceneError
 from geomech.files import whole_file
 
+GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
+MARKED = 40  # points of a line up to which each has its marker
 STYLE = {
     "font.size": 9,
     "axes.labelsize": 9,
@@ -44,13 +46,33 @@ def styled(draw: Callable[Asked, Drawn]) -> Callable[Asked, Drawn]:
 
 
 @styled
-def figure(width: float, height: float, columns: int = 1, rows: int = 1) -> tuple[Any, Any]:
-    """(Figure, array of Axes (rows, columns)), sizes in inches, laid out without overlap; both show in a notebook."""
-    from geomech.output.plots.shown import ShownAxes, ShownFigure
+def blank(width: float, height: float, layout: str = "constrained") -> Any:
+    """A Figure, sizes in inches, whose Axes are laid out without overlap; "compressed" brings those of a row of maps
+    together."""
+    from geomech.output.plots.shown import ShownFigure
 
-    fig = ShownFigure(figsize=(width, height), layout="constrained")
+    fig = ShownFigure(figsize=(width, height), layout=layout)
     fig.get_layout_engine().set(wspace=0.06)
-    return fig, fig.subplots(rows, columns, squeeze=False, subplot_kw={"axes_class": ShownAxes})
+    return fig
+
+
+@styled
+def figure(
+    width: float, height: float, columns: int = 1, rows: int = 1, layout: str = "constrained", **grid: Any
+) -> tuple[Any, Any]:
+    """(Figure, array of Axes (rows, columns)) as `blank`; both show in a notebook. ``grid`` as for matplotlib's GridSpec."""
+    from geomech.output.plots.shown import ShownAxes
+
+    fig, shown = blank(width, height, layout), {"axes_class": ShownAxes}
+    return fig, fig.subplots(rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=shown)
+
+
+def quantity(name: str, unit: str = "") -> str:
+    """For an axis: the name with its unit in brackets, a Greek letter with an index drawn as one."""
+    letter, _, index = name.partition("_")
+    if letter in GREEK and index.isalnum():
+        name = rf"$\{letter}_{{{index}}}$"
+    return f"{name} ({unit})" if unit else name
 
 
 def axes_of(ax: Any) -> Any:

@@ -1,0 +1,23 @@
+"""The README's strip of pictures: the butterfly gait in loose glass, on the ground and on the CCF map."""
+
+from __future__ import annotations
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from geomech.study.bench import Study
+from geomech.study.motion import motion
+
+
+def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:
+    """The motion (`geomech.study.motion.Motion`), and the CCF with its error."""
+    study = Study(load(scene).with_numerics(**numerics))
+    return {"motion": motion(study.scene, cycles), "ccf": study.curvature, "error": study.curvature_error}
+
+
+def draw(numbers: dict):
+    return plots.filmstrip(numbers["motion"], numbers["ccf"], numbers["error"])
+
+
+if __name__ == "__main__":
+    main("filmstrip", compute, draw)

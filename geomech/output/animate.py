@@ -1,0 +1,132 @@
+"""A motion as a film: GIF by Pillow, MP4 by ffmpeg where that is installed."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from geomech.errors import SceneError
+from geomech.files import whole_file
+from geomech.output import plots
+from geomech.output.plots.style import styled
+from geomech.study.cost import Cost
+from geomech.study.motion import Motion
+
+FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
+FRAMES = 48  # of a cycle, at most
+RATE = 25  # frames a second: a cycle takes some two
+DOTS = 100  # an inch
+DRAWING = 0.012  # s a frame takes, some two times what it took
+FRAME = 4e5  # bytes a frame holds until the film is written
+
+
+def check_format(path: Path) -> None:
+    """SceneError for a name that does not end as a film or a figure, or for a film that nothing here can write."""
+    ending = path.suffix.lower()
+    if ending not in FILMS + STRIPS:
+        raise SceneError(f"cannot draw {path}: end the name in .gif or .mp4 for a film, .png, .pdf or .svg for a strip")
+    if ending == ".mp4" and shutil.which("ffmpeg") is None:
+        raise SceneError(f"cannot write {path}: an .mp4 takes ffmpeg, which is not installed: end the name in .gif")
+
+
+def is_film(path: Path) -> bool:
+    return path.suffix.lower() in FILMS
+
+
+def rows(phases: int, cycles: int) -> np.ndarray:
+    """Of a motion, those that are drawn: the cycle's end is the next one's start, and the last one's is left out."""
+    step = max(1, -(-phases // FRAMES))
+    return np.arange(0, phases * cycles, step)
+
+
+def cost(phases: int, cycles: int) -> Cost:
+    """Of a film."""
+    frames = len(rows(phases, cycles))
+    return Cost(0, DRAWING * frames, FRAME * frames)
+
+
+def save(path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None) -> None:
+    """The film or strip of a motion, beside its shapes on a map of the CCF if there is one; whole or not at all."""
+    if not is_film(path):
+        plots.save(plots.filmstrip(motion, field, error), path)
+        return
+    shown = rows(motion.scene.numerics.phases, motion.cycles)
+    film = _told(_frames(motion, shown, field, error), len(shown), progress)
+    with whole_file(path) as part:
+        (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
+
+
+def _told(frames: Iterator, count: int, progress: Callable | None) -> Iterator:
+    for k, frame in enumerate(frames, 1):
+        yield frame
+        if progress:
+            progress(k / count)
+
+
+def _frames(motion: Motion, shown: np.ndarray, field, error) -> Iterator[np.ndarray]:
+    """Pictures (height, width, 3), bytes. What stands still is drawn once."""
+    canvas, put, still = _set(motion, shown, field, error)
+    for row in shown:
+        canvas.restore_region(still)
+        for artist in put(row):
+            artist.axes.draw_artist(artist)
+        yield np.array(canvas.buffer_rgba())[..., :3]
+
+
+@styled
+def _set(motion: Motion, shown: np.ndarray, field, error):
+    """(canvas, function that moves what moves, what stands still)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    fig, put = plots.stage(motion, shown, field, error)
+    fig.set_dpi(DOTS)
+    canvas = FigureCanvasAgg(fig)
+    moving = put(shown[0])
+    canvas.draw()  # lays out with the longest of what moves in place
+    fig.set_layout_engine("none")
+    for artist in moving:
+        artist.set_animated(True)
+    canvas.draw()
+    return canvas, put, canvas.copy_from_bbox(fig.bbox)
+
+
+def _gif(path: Path, frames: Iterator[np.ndarray]) -> None:
+    """One palette for all, so that nothing flickers."""
+    from PIL import Image
+
+    first = Image.fromarray(next(frames)).quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    rest = (Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
+    with path.open("wb") as file:
+        first.save(file, "GIF", save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
+
+
+def _mp4(path: Path, frames: Iterator[np.ndarray]) -> None:
+    """Pictures handed to ffmpeg one by one; SceneError with its own last words if it fails."""
+    first = next(frames)
+    tall, wide = (2 * (x // 2) for x in first.shape[:2])  # of which its usual colours take even numbers
+    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(RATE), "-i", "-"]
+    made = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
+    command = ["ffmpeg", "-loglevel", "error", *taken, *made]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, **pipes) as ffmpeg:
+        try:
+            _hand(ffmpeg.stdin, first, frames, tall, wide)
+            said = ffmpeg.communicate()[1]
+        except BrokenPipeError:
+            said = ffmpeg.stderr.read()
+        except BaseException:
+            ffmpeg.kill()
+            raise
+    if ffmpeg.returncode or not path.exists():
+        words = said.decode(errors="replace").strip().splitlines()[-1:] or ["it says nothing"]
+        raise SceneError(f"cannot write {path.name}: ffmpeg failed: {words[0]}; end the name in .gif")
+
+
+def _hand(pipe, first: np.ndarray, rest: Iterator[np.ndarray], tall: int, wide: int) -> None:
+    pipe.write(first[:tall, :wide].tobytes())
+    for frame in rest:
+        pipe.write(frame[:tall, :wide].tobytes())

@@ -1,0 +1,184 @@
+"""A body in motion: where it is on its own track, and where its shape is among all shapes; as a film's panels, and as a
+strip of pictures for a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from geomech.field import Field
+from geomech.output.plots.maps import ccf_map, draw_gait, shape_space
+from geomech.output.plots.style import blank, figure, quantity, styled
+from geomech.study.motion import Motion
+
+BODY, HEAD = "#1b4965", "#d1495b"
+LINES = 8  # shape variables beyond which they are a map along the body, not a line each
+JOINTS_SHOWN = 12  # links beyond which their joints are not marked
+STRIP = 6  # pictures of a strip
+MAP = 2.4  # in, height of a map with its labels
+ROOM = 0.06  # of the larger side, left around what moves
+
+
+def reach(motion: Motion, rows) -> tuple[np.ndarray, np.ndarray]:
+    """(lowest, highest) x and y of all that is seen in these rows, with some room."""
+    places = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
+    low, high = np.concatenate(places).min(0), np.concatenate(places).max(0)
+    room = ROOM * max(*(high - low), 1e-9 * motion.scene.system.length)
+    return low - room, high + room
+
+
+def _bodies(motion: Motion, rows) -> np.ndarray:
+    """(rows, points, 2): the links' ends, or an arrow's tail and head where there is no body to show."""
+    points = motion.points(rows)
+    if points is not None:
+        return points
+    x, y, theta = motion.pose[rows].T[..., None]
+    along = motion.scene.system.length * np.array([-0.5, 0.5])
+    return np.stack([x + np.cos(theta) * along, y + np.sin(theta) * along], -1)
+
+
+def world(ax, motion: Motion, rows, limits=None) -> Callable:
+    """The track of the frame's origin on an Axes to the scale of the body; a function of row that puts the body there and
+    gives the artists it has moved."""
+    low, high = reach(motion, rows) if limits is None else limits
+    unit = motion.scene.system.unit
+    ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.plot(*motion.pose[:, :2].T, color="0.6", lw=0.6)
+    (behind,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
+    few = motion.points(slice(0, 1)) is not None and motion.points(slice(0, 1)).shape[-2] <= JOINTS_SHOWN + 1
+    (body,) = ax.plot(
+        [], [], color=BODY, lw=2.5, solid_capstyle="round", marker="o" if few else "", ms=3, mfc="white", mew=0.8
+    )
+    (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
+
+    def put(row: int):
+        bodies = _bodies(motion, slice(row, row + 1))[0]
+        behind.set_data(*motion.pose[: row + 1, :2].T)
+        body.set_data(*bodies.T)
+        head.set_data(*bodies[-1:].T)
+        return behind, body, head
+
+    return put
+
+
+def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = None) -> Callable:
+    """The gait among all shapes: on the map of the CCF along x, or the bare plane of two shape variables; against phase a
+    line each for few, a map along the body for many. A function of row as `world`."""
+    scene, system = motion.scene, motion.scene.system
+    if system.joints == 2:
+        if field is not None:
+            ccf_map(field, 0, [scene.gait], system.unit, ax, error, labels=system.shape_labels)
+        else:
+            draw_gait(scene.gait, ax)
+            low, high = motion.alpha.min(0), motion.alpha.max(0)
+            room = 0.15 * max(high - low) + 1e-9
+            shape_space(ax, [np.array(x) for x in zip(low - room, high + room)], system.shape_labels)
+        (dot,) = ax.plot([], [], "o", color=HEAD, ms=7, mec="white", mew=0.8)
+        return _moving(dot, lambda row: ([motion.alpha[row, 0]], [motion.alpha[row, 1]]))
+    turns = motion.phase / (2 * np.pi)
+    once = turns <= 1 + 1e-9
+    ax.set(xlabel="phase (cycles)", xlim=(0, 1))
+    if system.joints <= LINES:
+        for k, (name, _) in enumerate(system.shape_labels):
+            ax.plot(turns[once], motion.alpha[once, k], label=quantity(name))
+        ax.set_ylabel(quantity("shape variable", system.shape_labels[0][1]))
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
+    else:
+        _bends(ax, motion, turns[once])
+    line = ax.axvline(0.0, color=HEAD, lw=1.5)
+    return _moving(line, lambda row: ([turns[row] % 1] * 2, [0, 1]))
+
+
+def _bends(ax, motion: Motion, turns) -> None:
+    """Curvature over phase and place along the body: angles between elements over the distance of their centres."""
+    from cmcrameri import cm
+
+    values, name, ends = motion.alpha[: len(turns)].T, "angle between elements (rad)", motion.points(slice(0, 1))
+    place = np.arange(1, len(values) + 1) / (len(values) + 1)
+    if ends is not None and ends.shape[-2] == len(values) + 2:
+        parts = np.hypot(*np.diff(ends[0], axis=0).T)
+        values, place = values / ((parts[1:] + parts[:-1]) / 2)[:, None], np.cumsum(parts[:-1]) / parts.sum()
+        name = f"curvature (rad/{motion.scene.system.unit})"
+    top = np.abs(values).max() or 1.0
+    image = ax.pcolormesh(turns, place, values, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
+    ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(name)
+    ax.set(ylabel="place, tail 0 to head 1", ylim=(place[0], place[-1]))
+
+
+def _moving(artist, at: Callable) -> Callable:
+    def put(row: int):
+        artist.set_data(*at(row))
+        return (artist,)
+
+    return put
+
+
+def clock(motion: Motion, row: int) -> str:
+    """What time it is at a row."""
+    if motion.time is not None:
+        return f"t = {motion.time[row]:.3g} s"
+    return f"cycle {motion.phase[row] / (2 * np.pi):.2f}"
+
+
+@styled
+def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None):
+    """(Figure, function of row that moves what moves in it and gives the artists): the world beside the shapes."""
+    fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
+    left, right = axes[0]
+    if motion.scene.system.joints != 2:
+        right.set_box_aspect(0.8)
+    put_body, put_shape = world(left, motion, rows), shape(right, motion, field, error)
+    text = left.set_title("", loc="left")
+
+    def put(row: int):
+        text.set_text(clock(motion, row))
+        return *put_body(row), *put_shape(row), text
+
+    return fig, put
+
+
+@styled
+def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP):
+    """The body at some phases, equally spaced from the start to the end and to one scale, and its shapes in a panel beside
+    them, with the same numbers."""
+    rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)
+    low, high = limits = reach(motion, rows)
+    tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width
+    columns = min(pictures, max(1, round(1.2 * np.sqrt(tall * pictures))))
+    lines = -(-pictures // columns)
+    height = float(np.clip(lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45, MAP, 8.0))
+    fig = blank(7.2, height)
+    left, right = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
+    axes = left.subgridspec(lines, columns).subplots(squeeze=False, sharex=True, sharey=True)
+    for ax in axes.flat[pictures:]:
+        ax.remove()
+    for k, (ax, row) in enumerate(zip(axes.flat, rows)):
+        world(ax, motion, rows, limits)(row)
+        ax.set_title(rf"$\bf{{{k + 1}}}$  {clock(motion, row)}", loc="left", fontsize=8)
+        ax.label_outer()
+    around = max(1e-3, (height - MAP) / 2)
+    panel = fig.add_subplot(right.subgridspec(3, 1, height_ratios=[around, MAP, around])[1])
+    shape(panel, motion, field, error)
+    _numbers(panel, motion, rows)
+    return fig
+
+
+def _numbers(ax, motion: Motion, rows) -> None:
+    """The pictures' numbers where their shapes are; those of one shape side by side."""
+    here: dict[tuple, list[str]] = {}
+    for k, row in enumerate(rows):
+        turn = float(motion.phase[row] / (2 * np.pi) % 1)
+        at = tuple(np.round(motion.alpha[row], 9)) if motion.scene.system.joints == 2 else (round(turn, 9),)
+        here.setdefault(at, []).append(str(k + 1))
+    middle = motion.alpha.mean(0)
+    for at, numbers in here.items():
+        if len(at) == 2:
+            ax.plot(*at, "o", color=HEAD, ms=6, mec="white", mew=0.8)
+            away = np.subtract(at, middle)
+            where = {"xy": at, "xytext": 11 * away / (np.hypot(*away) or 1.0)}
+        else:
+            ax.axvline(at[0], color=HEAD, lw=1.0)
+            where = {"xy": (at[0], 1.0), "xycoords": ("data", "axes fraction"), "xytext": (0, 6)}
+        style = {"textcoords": "offset points", "ha": "center", "va": "center", "weight": "bold"}
+        ax.annotate(",".join(numbers), **where, **style)

@@ -1,0 +1,48 @@
+"""A motion as a table, CSV that pandas and NumPy read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from geomech.errors import SceneError
+from geomech.files import whole_file
+from geomech.study.motion import Motion
+
+
+def check_csv(path: Path) -> None:
+    """SceneError for a name that does not end in .csv."""
+    if path.suffix.lower() != ".csv":
+        raise SceneError(f"cannot write {path}: end the name of a table in .csv")
+
+
+def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:
+    """Names of the columns, what they mean and in which units behind '#', then a row a phase, with every digit."""
+    done = 0
+    with whole_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("\n".join([",".join(motion.columns), *(f"# {line}" for line in about(motion))]) + "\n")
+        for table in motion.tables():
+            for row in table.tolist():
+                file.write(",".join(map(repr, row)) + "\n")
+            done += len(table)
+            if progress:
+                progress(done / len(motion.phase))
+
+
+def about(motion: Motion) -> list[str]:
+    """What the columns are, in lines."""
+    scene, columns = motion.scene, motion.columns
+    system, unit = scene.system, scene.system.unit
+    shapes = ", ".join(f"alpha_{k + 1} {name} ({u})" for k, (name, u) in enumerate(system.shape_labels[:8]))
+    if all(label == (f"alpha_{k + 1}", "rad") for k, label in enumerate(system.shape_labels)):
+        shapes = "alpha_k (rad): joint angle, heading of link k+1 less that of link k"
+    name = " ".join(scene.name.split())
+    lines = [
+        f"motion of {name}, {type(scene.gait).__name__.lower()} of amplitude {scene.gait.amplitude:g}",
+        "phase (rad): of the gait, 2 pi a cycle" + ("; time (s)" if "time" in columns else ""),
+        f"x ({unit}), y ({unit}), theta (rad): pose of the frame {scene.frame}, seen from where it is at phase 0",
+        shapes + (" ..." if len(system.shape_labels) > 8 else ""),
+    ]
+    if "end_0_x" in columns:
+        lines.append(f"end_k_x, end_k_y ({unit}): end of link k in the same axes, 0 the tail, the last the head")
+    return lines

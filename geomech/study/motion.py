@@ -1,0 +1,97 @@
+"""A scene in motion: where its body is at every phase of its gait, cycle after cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.errors import SceneError, is_whole, named, short
+from geomech.scene.model import Scene
+from geomech.study.cost import Cost, direct, price
+
+MOST_CYCLES = 10_000
+WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
+ROWS_TOGETHER = 1 << 20  # numbers of a table that are held at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Rows, phase after phase and the end besides: the last row is where the last cycle has led. phase: (P,), rad, growing
+    from cycle to cycle. alpha: (P, joints). pose: (P, 3), of the body frame, seen from where it is at phase 0, on the
+    ground, in the scene's unit and rad. frequency: of the gait, Hz, or None."""
+
+    scene: Scene
+    phase: np.ndarray
+    alpha: np.ndarray
+    pose: np.ndarray
+    frequency: float | None
+
+    @property
+    def cycles(self) -> int:
+        return round(self.phase[-1] / (2 * np.pi))
+
+    @property
+    def time(self) -> np.ndarray | None:
+        """(P,), s, where the gait has a frequency."""
+        return None if self.frequency is None else self.phase / (2 * np.pi * self.frequency)
+
+    def points(self, rows=slice(None)) -> np.ndarray | None:
+        """Ends of the links in the world, (..., links + 1, 2), tail to head, at some of the rows; None for a system that
+        has no body to show."""
+        draw = self.scene.system.points
+        return None if draw is None else draw(self.alpha[rows], self.pose[rows])
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Of a table of it: what each is, by name, with its unit."""
+        system = self.scene.system
+        unit, ends = system.unit, self.points(slice(0, 1))
+        timed = {} if self.frequency is None else {"time": "s"}
+        place = {"phase": "rad", **timed, "x": unit, "y": unit, "theta": "rad"}
+        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(system.shape_labels)}
+        count = 0 if ends is None else ends.shape[-2]
+        return {**place, **shape, **{f"end_{k}_{axis}": unit for k in range(count) for axis in "xy"}}
+
+    def tables(self) -> Iterator[np.ndarray]:
+        """The rows of a table of it, (some, columns) at a time."""
+        size = max(1, ROWS_TOGETHER // len(self.columns))
+        for start in range(0, len(self.phase), size):
+            rows = slice(start, start + size)
+            timed = [] if self.time is None else [self.time[rows, None]]
+            parts, ends = [self.phase[rows, None], *timed, self.pose[rows], self.alpha[rows]], self.points(rows)
+            yield np.concatenate(parts + ([] if ends is None else [ends.reshape(len(ends), -1)]), 1)
+
+
+def motion(scene: Scene, cycles: int = 1) -> Motion:
+    """So many cycles of the scene's gait at its own phases, by the direct tier: a cycle ends where that says. Where cycles
+    are run until they repeat it is the limit cycle, where place matters each goes on from the one before."""
+    if not isinstance(scene, Scene):
+        raise SceneError(f"a motion is that of a Scene, got {short(scene)}")
+    checked(cycles)
+    gait, phases = scene.gait, scene.numerics.phases
+    with named(scene.name):
+        alpha, alphadot = gait.cycle(phases)
+        pose = scene.system.path(alpha, alphadot, int(cycles))
+    phase = 2 * np.pi * np.arange(len(pose)) / phases
+    return Motion(scene, phase, alpha[np.arange(len(pose)) % phases], pose, getattr(gait, "frequency", None))
+
+
+def checked(cycles: int) -> None:
+    """SceneError unless so many cycles make sense."""
+    if not (is_whole(cycles) and 1 <= cycles <= MOST_CYCLES):
+        raise SceneError(f"--cycles must be a whole number from 1 to {MOST_CYCLES}, got {short(cycles)}")
+
+
+def cost(scene: Scene, cycles: int = 1) -> Cost:
+    """Of `motion` and a table of it."""
+    checked(cycles)
+    system, phases = scene.system, scene.numerics.phases
+    jobs = direct(scene, scene.gait, 1, phases, checked=False)
+    if system.steps and not system.settles:  # each goes on from the one before
+        jobs = [job._replace(count=job.count * cycles) for job in jobs]
+    found, rows = price(jobs), cycles * phases + 1
+    width = 2 * (system.elements + 1) + system.joints + 5
+    memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
+    return Cost(found.balances, found.seconds + WORDS * rows * width, found.memory + memory)
