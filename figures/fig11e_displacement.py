@@ -27,7 +27,7 @@ def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> 
 def draw(numbers: dict):
     fig, axes = plots.figure(7.2, 3.9, len(numbers["tables"]))
     for ax, (name, table) in zip(axes[0], numbers["tables"].items()):
-        plots.displacement(table, numbers["unit"], ax, gait=GAITS[name])
+        plots.displacement(table, numbers["unit"], ax, gait=GAITS[name], errors=False)
     return fig
 
 

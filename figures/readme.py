@@ -16,7 +16,7 @@ def draw(numbers: dict):
     field, study = numbers["map"], numbers["tables"]
     plots.ccf_map(field["ccf"], 0, field["gaits"], field["unit"], axes[0, 0], field["error"])
     for ax, (name, table) in zip(axes[0, 1:], study["tables"].items()):
-        plots.displacement(table, study["unit"], ax, gait=fig11e_displacement.GAITS[name])
+        plots.displacement(table, study["unit"], ax, gait=fig11e_displacement.GAITS[name], errors=False)
     return fig
 
 

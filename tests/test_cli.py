@@ -117,8 +117,13 @@ def test_displacement_to_a_tolerance():
     code, out, err = geomech("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--tol", "1e-3", "--json")
     assert (code, err) == (0, "")
     answer = json.loads(out)
-    assert max(answer["estimate"]) <= 1e-3
-    assert len(answer["estimate"]) == len(answer["estimate_heading"]) == len(answer[answer["tier"]]) == 2
+    assert max(answer["estimate"][answer["tier"]]) <= 1e-3
+    assert {len(answer[key][answer["tier"]]) for key in ("estimate", "estimate_heading", "net_distance")} == {2}
+    plain = ("displacement", "three-link-glass", "--amplitudes", "0.5,1.0", "--methods", "direct", "--json")
+    without = json.loads(geomech(*plain)[1])  # of one form, whether a tolerance is asked for or not
+    assert set(answer) - set(without) == {"tier", "settings"} and set(without) - set(answer) == {"kept"}
+    assert all(type(answer[k]) is type(without[k]) for k in without if k != "kept")
+    assert answer["units"] == without["units"]
     code, out, _ = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--tol", "1e-9")
     assert code == 0
     assert "direct" in out
@@ -167,7 +172,12 @@ def test_run_leaves_everything(tmp_path):
         run = {"circle": glass.gait, "butterfly": scenes.load("butterfly-glass").gait}[gait]
         wanted = Study(glass).displacement("direct", run, np.array(table["amplitude"]))
         np.testing.assert_allclose(table["direct"], wanted, atol=1e-9)
-        assert f"{plots.net(wanted)[-1]:.6f}" in out
+        assert f"{abs(plots.net(wanted)[-1]):.6f}" in out
+        assert f"{wanted[-1, 1]:.6f}" in out
+        assert ("note" in table) == (gait == "butterfly")
+    assert tables["circle"]["amplitude"] == [0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5]
+    assert tables["butterfly"]["amplitude"] == [k / 10 for k in range(1, 14)]
+    assert "butterfly: not in the scene: added because" in out and "circle: not in" not in out
     assert (tmp_path / "deep" / "dir" / "scene.toml").read_text() == glass.text
 
 
@@ -240,7 +250,7 @@ def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
     def fail(*args, **kwargs):
         raise ValueError("half way")
 
-    monkeypatch.setattr(plots, "displacement", fail)
+    monkeypatch.setattr(plots, "displacement_figure", fail)
     small = scenes.load("three-link-viscous").with_numerics(grid=5)
     with pytest.raises(ValueError, match="half way"), files.whole_folder(tmp_path / "out") as folder:
         report.write(Study(small), folder, None)

@@ -195,15 +195,49 @@ def test_modes_are_named_on_the_axes():
     assert plots.quantity("drag_ratio", "-") == "drag_ratio (-)"
 
 
-def test_lines_of_displacement_are_the_net_of_each_tier():
+LINES = {
+    "x": ("x per cycle (m)", [-0.3, 0.6], [0, 2], 0.5),
+    "y": ("y per cycle (m)", [0.4, 0.8], [1, 0], 0.5),
+    "heading": ("heading per cycle (rad)", [0.1, 9], [0, 0], 0.3),
+    "net_distance": ("net distance per cycle (m)", [0.5, 1], [1, 2], 0.5),
+}
+
+
+@pytest.mark.parametrize("quantity", LINES)
+def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
+    """With bars of the errors, in the unit of the quantity, and a band of what the medium leaves open."""
+    label, direct, area, error = LINES[quantity]
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]], "area": [[0.0, 1.0, 0], [2, 0, 0]]}
-    ax = plots.displacement(table, "m", gait=Ellipse())
+    both = lambda x: {"direct": [x, x], "area": [x, x]}
+    table |= {"estimate": both(0.25), "estimate_heading": both(0.3), "medium_error_of": {quantity: [0.2, 0.4]}}
+    ax = plots.displacement(table, "m", gait=Ellipse(), quantity=quantity, length=2.0)
     lines = {line.get_label(): line for line in ax.lines}
-    for tier, net in (("direct", [-0.5, 1.0]), ("area", [1.0, 2.0])):
-        np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], net]))
+    for tier, values in (("direct", direct), ("area", area)):
+        np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], values]))
     assert len(lines) == 3
-    assert ax.get_ylabel() == "displacement per cycle (m)"
-    assert ax.get_xlabel() == Ellipse().amplitude_label
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (Ellipse().amplitude_label, label)
+    bars = [c for c in ax.collections if hasattr(c, "get_segments")]
+    np.testing.assert_allclose([np.ptp(s[:, 1]) / 2 for c in bars for s in c.get_segments()], error)
+    (band,) = [c for c in ax.collections if c not in bars]
+    box = band.get_datalim(ax.transData)
+    np.testing.assert_allclose([box.y0, box.y1], [direct[0] - 0.2, direct[1] + 0.4])
+
+
+def test_four_quantities_and_the_speed():
+    glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
+    table = Study(glass).study([0.5, 1.0], ["direct"])
+    fig = plots.displacement_figure({"ellipse": table}, "BL", [glass.gait])
+    assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
+        ("x", "BL"), ("y", "BL"), ("heading", "rad"), ("net distance", "BL"))]  # fmt: skip
+    (right,) = fig.axes[3].child_axes
+    assert right.get_ylabel() == "speed (BL/s) at 2.5 Hz"
+    fig.draw_without_rendering()
+    np.testing.assert_allclose(right.get_ylim(), np.array(fig.axes[3].get_ylim()) * 2.5)
+
+
+def fig_label(ax):
+    """Of its colours."""
+    return ax.figure.axes[1].get_ylabel()
 
 
 def test_the_map_of_a_sweep_lies_as_its_parameters():
@@ -218,6 +252,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
     np.testing.assert_allclose(y[:, 0], over["body.length"])
     np.testing.assert_allclose(values, moved[..., 0].T)
+    assert fig_label(ax) == "net distance per cycle (m), backwards < 0"
     assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "length (m)")
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.5), (2.0, 5.0))
     shuffled = {**results, "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]}}
@@ -229,6 +264,10 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     ax = sweeps.draw(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
     np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]])  # m
+    timed = {**one, "frequency": np.array([3.0, 4.0]), "speed": np.array([3.0, 8.0])}
+    ax = sweeps.draw(scene, timed).axes[0]
+    np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 3], [5, -8]])
+    assert ax.get_ylabel() == "speed (m/s), backwards < 0"
     many = {"over": {"medium.C": np.arange(60.0)}, "displacement": np.ones((60, 3)), "estimate": np.ones(60)}
     drawn = [sweeps.draw(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
     assert drawn == ["o", "None"]

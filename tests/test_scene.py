@@ -40,14 +40,20 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     loaded = scenes.load(name).with_numerics(grid=11, phases=64)
     study, amplitudes = Study(loaded), [0.1, 0.3]
     table = study.study(amplitudes, study.methods)
-    assert [*table] == ["amplitude", *study.methods, "estimate", "estimate_heading", "seconds"]
+    named = ["x", "y", "heading", "net_distance"]
+    errors = ["estimate", "estimate_heading"]
+    assert [*table] == ["amplitude", *study.methods, *errors, *named, "units", "seconds", "kept"]
     assert table["amplitude"] == amplitudes
     for method in study.methods:
         np.testing.assert_allclose(table[method], study.displacement(method, None, amplitudes), atol=1e-9)
         assert len(table["estimate"][method]) == 2
         assert min(table["estimate"][method]) > 0
-    with_field = {"field"} if any(map(study.needs_field, study.methods)) else set()
-    assert set(table["seconds"]) == {*study.methods} | with_field
+    tables = {"field"} if any(map(study.needs_field, study.methods)) else set()
+    tables |= {"harmonic table"} if name == "three-link-glass" else set()
+    assert set(table["seconds"]) == {*study.methods} | tables
+    again = study.study(amplitudes, study.methods)
+    assert table["kept"] == [] and set(again["kept"]) == tables
+    assert {k: table["seconds"][k] for k in tables} == {k: again["seconds"][k] for k in tables}  # what building took
     assert all(v >= 0 for v in table["seconds"].values())
 
 

@@ -47,6 +47,7 @@ FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fi
 RIGHT = {  # what looks wrong and is not
     ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
     ("covariance", "None"), ("Granular", "covariance", "array"), ("Viscous", "covariance", "deep"),
+    *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
     ("lengths", "list"), ("along", "list"), ("cos", "array"), ("sin", "array"),
     *itertools.product(("name", "text"), ("text", "digits")),
 }  # fmt: skip

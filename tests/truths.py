@@ -15,6 +15,7 @@ import numpy as np
 
 DATA = pathlib.Path(__file__).parent / "data"
 DECIMALS = 13  # below are rounding and the machine
+LATER = {"covariance", "frequency"}  # fields younger than some answers: where they are None the question is the old one
 
 
 def spelled(value) -> str:
@@ -28,6 +29,7 @@ def spelled(value) -> str:
             return spelled(sorted(value.items()))
         case _ if dataclasses.is_dataclass(value):
             fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+            fields = {name: x for name, x in fields.items() if x is not None or name not in LATER}
             return type(value).__name__ + spelled(fields)
         case str() | int() | None:
             return repr(value)

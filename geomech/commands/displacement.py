@@ -56,7 +56,6 @@ def displacement(
             ask = lambda jobs: allow(scene, cost.price(jobs), yes)
             table = cheapest(scene, values, tol, ask=ask)
     if plot:
-        fig, axes = plots.figure(3.6, 3.4)
-        plots.displacement(table, scene.system.unit, axes[0, 0], gait=scene.gait, marker="o")
-        plots.save(fig, plot)
+        system, name = scene.system, type(scene.gait).__name__.lower()
+        plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))

@@ -34,6 +34,7 @@ def sweep(
     from geomech.output import plots, sweeps
     from geomech.study import kept
     from geomech.study import sweep as sweeping
+    from geomech.study.tables import of_pose
 
     axes = {}
     for text in over:
@@ -65,5 +66,8 @@ def sweep(
                 error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
             raise
         partial.unlink(missing_ok=True)
-    net = plots.net(results["displacement"])
-    print(f"{net.size} points, displacement {net.min():.6g} to {net.max():.6g} {scene.system.unit}, in {out}")
+    net = of_pose(results["displacement"])["net_distance"]
+    told = f"{net.size} points, net distance per cycle {net.min():.6g} to {net.max():.6g} {scene.system.unit}"
+    if (speed := results.get("speed")) is not None:
+        told += f", speed {speed.min():.6g} to {speed.max():.6g} {scene.system.unit}/s"
+    print(f"{told}, in {out}")

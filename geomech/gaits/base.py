@@ -10,6 +10,7 @@ import numpy as np
 from geomech.errors import is_whole, number, real_array, short
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
+FASTEST = 1e4  # Hz, as of the effects that have a frequency
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +20,8 @@ class Gait:
     amplitude (-): scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
     reflected through the centre, alpha - centre -> centre - alpha at every phase. All gaits and tiers keep to that.
     centre (rad): shape angles, the origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
-    start.
+    start. frequency (Hz): cycles per second, unknown if left out; it makes displacements speeds, and changes them only
+    through effects that have a frequency.
 
     angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
     """
@@ -27,6 +29,7 @@ class Gait:
     amplitude: float = 1.0
     centre: tuple[float, ...] = ()
     reverse: bool = False
+    frequency: float | None = None
     angles = ("centre",)
     harmonics = 1
 
@@ -41,6 +44,9 @@ class Gait:
         object.__setattr__(self, "centre", tuple(centre.tolist()))
         if not isinstance(self.reverse, (bool, np.bool_)):
             raise ValueError(f"reverse must be True or False, got {short(self.reverse)}")
+        if self.frequency is not None:
+            number("frequency", self.frequency, 0, FASTEST)
+            object.__setattr__(self, "frequency", float(self.frequency))
 
     @property
     def joints(self) -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from geomech.output import plots
 from geomech.output.netcdf import save_connection
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
+from geomech.study import tables
 from geomech.study.bench import Study
 from geomech.study.cost import Cost, price
 from geomech.study.cost import study as jobs
@@ -24,7 +27,9 @@ from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.path import axes as field_axes
 
-AMPLITUDES = 10  # in the study that `run` makes of each gait
+AMPLITUDES = 10  # or so, in the study that `run` makes of each gait
+STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
+ADDED = "not in the scene: added because Fig. 11(e) compares the two gaits of the three-link swimmer"
 SCENE, TABLES = "scene.toml", "displacement.json"
 
 
@@ -54,11 +59,12 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         save_connection(folder / "connection.nc", study)
         _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
         _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
-    tables = {type(g).__name__.lower(): study.study(a, study.methods, g) for g, a in zip(gaits, amplitudes)}
-    fig, axes = plots.figure(3.6 * len(gaits), 3.7, len(gaits))
-    for ax, gait, table in zip(axes[0], gaits, tables.values()):
-        plots.displacement(table, unit, ax, gait=gait, marker="o")
-    _save(fig, folder / "displacement")
+    tables = {}
+    for gait, some in zip(gaits, amplitudes):
+        table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
+        if gait is not scene.gait:
+            table["note"] = ADDED
+    _save(plots.displacement_figure(tables, unit, gaits, scene.system.length), folder / "displacement")
     (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
     return tables
@@ -67,35 +73,43 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
 def cost(scene: Scene) -> Cost:
     """Of `write`; SceneError, before anything is computed, for what it refuses."""
     gaits = _gaits(scene)
-    for gait in gaits:
-        reachable(scene, gait)
-    return price(
-        [job for g in gaits for job in jobs(scene, methods(scene.system), AMPLITUDES, g, tables=g is gaits[0])]
-    )
+    counts, tiers = [len(reachable(scene, gait)) for gait in gaits], methods(scene.system)
+    return price([job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])])
 
 
 def _gaits(scene: Scene) -> list[Gait]:
-    """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it."""
-    more = (Circle(reverse=True), Butterfly()) if isinstance(scene.system, Swimmer) and scene.system.three_link else ()
+    """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it, at the same frequency."""
+    three_link = isinstance(scene.system, Swimmer) and scene.system.three_link
+    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency)) if three_link else ()
     return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes, of the sign of the gait's own, up to the largest that keeps it inside the field; up to its own where
-    there is no field, or one with singular shapes.
+    """Round amplitudes (`steps`), of the sign of the gait's own, up to the largest that keeps it inside the field; where there
+    is no field, or one with singular shapes, up to its own, which is the last.
     SceneError for a gait that does not move or lies outside."""
     own = "path" not in methods(scene.system) or scene.system.singularity is not None
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if own:
-        return [float(f"{a:.3g}") for a in gait.amplitude * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
+        size = abs(gait.amplitude)
+        found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
+        return [float(np.copysign(a, gait.amplitude)) for a in found]
     centre = np.array(gait.centre or (0.0,) * gait.joints)
     room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), centre))
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
-    top = np.copysign(0.999 * room / np.abs(unit).max(), gait.amplitude)
-    return [float(f"{a:.3g}") for a in top * np.arange(1, AMPLITUDES + 1) / AMPLITUDES]
+    return [float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())]
+
+
+def steps(top: float) -> list[float]:
+    """Multiples of a round number, about AMPLITUDES of them, up to ``top``."""
+    wanted = top / AMPLITUDES
+    power = 10.0 ** np.floor(np.log10(wanted))
+    step = min(STEPS, key=lambda s: abs(np.log(s * power / wanted))) * power
+    count = int(top / step * (1 + 1e-12))
+    return [float(f"{k * step:.10g}") for k in range(1, count + 1)]
 
 
 def _save(fig, stem: Path) -> None:
@@ -104,22 +118,47 @@ def _save(fig, stem: Path) -> None:
 
 
 def text_table(title: str, table: dict, scene: Scene) -> str:
-    """Amplitude against net displacement (`plots.net`) and heading with their errors by tier, as plain text."""
+    """x, y, heading and net distance per cycle by tier, each with its error in its own unit, as plain text."""
     tiers = [m for m in table if m in TIERS]
-    lines = []
-    for what, key, shown in (
-        (f"displacement per cycle ({scene.system.unit}) +- estimated error (BL)", "estimate", plots.net),
-        ("heading gained (rad) +- estimated error (rad)", "estimate_heading", _heading),
-    ):
-        lines += [f"{title}: {what}", "amplitude" + "".join(f"{m:>21}" for m in tiers)]
-        errors = table[key] if isinstance(table[key], dict) else {tiers[0]: table[key]}
-        columns = [zip(shown(table[m]), errors[m]) for m in tiers]
-        for amplitude, *row in zip(table["amplitude"], *columns):
-            lines.append(f"{amplitude:9.4g}" + "".join(f"{x:12.6f} +-{e:7.1e}" for x, e in row))
-    seconds = ", ".join(f"{k} {v:.3g}" for k, v in table["seconds"].items())
-    return "\n".join([*lines, f"seconds: {seconds}", ""])
+    length, unit = scene.system.length, scene.system.unit
+    lines = [f"{title}: {table['note']}"] if "note" in table else []
+    for quantity, headline, by, places in _blocks(table, length, unit):
+        lines.append(f"{title}: {headline}")
+        medium = np.array(table["medium_error_of"][quantity]) * by if "medium_error_of" in table else None
+        lines.append("amplitude" + "".join(f"{m:>{places + 15}}" for m in tiers) + "     medium" * (medium is not None))
+        values = [np.round(by * tables.of_pose(table[m])[quantity], places) + 0.0 for m in tiers]  # no -0.000
+        errors = [by * tables.error_of(table, quantity, m, length) for m in tiers]
+        for k, a in enumerate(table["amplitude"]):
+            row = (f"{x[k]:{places + 6}.{places}f} +-{e[k]:7.1e}" for x, e in zip(values, errors))
+            lines.append(f"{a:9.6g}" + "".join(row) + (f"  +-{medium[k]:7.1e}" if medium is not None else ""))
+    if "medium_error_rule" in table:
+        rules = sorted({*table["medium_error_rule"]})
+        lines.append(
+            f"medium: one standard deviation by its covariance, carried on by {' and '.join(rules)} propagation"
+        )
+    amplitude = re.sub(r"[$\\]", "", table["units"]["amplitude"])
+    lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
+    return "\n".join([*lines, _times(table), ""])
 
 
-def _heading(poses) -> np.ndarray:
-    """theta (B,) of poses (B, 3), without the sign of a rounded zero."""
-    return np.round(np.array(poses)[:, 2], 9) + 0.0
+def _blocks(table: dict, length: float, unit: str):
+    """(quantity, headline, factor, decimals) of the parts of a table, each of one unit; the last digit of a length is a
+    millionth of the body's."""
+    decimals = 6 - min(0, math.floor(math.log10(length) + 1e-9))
+    moved = f"displacement per cycle ({unit}) +- estimated error"
+    yield "net_distance", f"{moved}: net distance, sqrt(x^2 + y^2)", 1.0, decimals
+    yield "x", f"{moved}: x", 1.0, decimals
+    yield "y", f"{moved}: y", 1.0, decimals
+    yield "heading", "heading gained (rad) +- estimated error", 1.0, 6
+    if (f := table.get("frequency")) is not None:
+        speed = lambda u: f"speed ({u}/s) at {f:g} Hz +- estimated error: net distance times frequency"
+        if unit != "BL":
+            yield "net_distance", speed(unit), f, decimals
+        yield "net_distance", speed("BL"), f / length, 6
+
+
+def _times(table: dict) -> str:
+    """What tables took to build and tiers to look up, in words."""
+    kept = table.get("kept", ())
+    told = [f"{name} {took:.3g}{' (built before)' * (name in kept)}" for name, took in table["seconds"].items()]
+    return f"seconds: {', '.join(told)}{' with the search for it' * ('tier' in table)}"

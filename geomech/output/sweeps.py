@@ -12,9 +12,8 @@ from geomech.output import plots
 from geomech.output.netcdf import COMPONENTS, UNITS, Variable, attribute
 from geomech.scene import write as written
 from geomech.scene.model import Scene
-from geomech.study.sweep import AMPLITUDE
+from geomech.study.sweep import AMPLITUDE, LENGTHS, at_points
 
-LENGTHS = ("body.length", "system.length", "physical.length")
 PARAMETERS = {  # units of parameters, by the last part of their names; the others have none
     "gamma0": "rad", "length": "m", "frequency": "Hz", "mass": "kg", "drag": "N", "depth": "m", "radius": "BL",
     "distance": "BL", "travel": "BL", "slope": "1/BL", "towards": "rad", "tilt": "rad", "period": "s", "extent": "rad",
@@ -59,53 +58,71 @@ def parameters(results: dict) -> list[tuple[str, str, np.ndarray]]:
 def variables(scene: Scene, results: dict) -> list[Variable]:
     """Of a file of a sweep, without its coordinates."""
     names, unit = tuple(name for name, *_ in parameters(results)), UNITS[scene.system.unit]
-    return [
+    found = [
         Variable("displacement", (*names, "component"), results["displacement"], f"{unit} (x, y), rad (theta)", ""),
         Variable("estimate", names, results["estimate"], "body length", ""),
         Variable("estimate_heading", names, results["estimate_heading"], "rad", ""),
     ]
+    if "speed" in results:
+        found += [
+            Variable("frequency", names, results["frequency"], "Hz", ""),
+            Variable("speed", names, results["speed"], f"{unit} s-1", ""),
+        ]
+    if "medium_error" in results:
+        found += [
+            Variable("medium_error", names, results["medium_error"], "body length", ""),
+            Variable("medium_error_heading", names, results["medium_error_heading"], "rad", ""),
+        ]
+    return found
 
 
 def draw(scene: Scene, results: dict):
-    """Net displacement against one parameter, or a map over two; SceneError for more."""
+    """What is `drawn` against one parameter, or a map over two; SceneError for more."""
     over = results["over"]
     if len(over) > 2:
         raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
+    values, error, medium, label = drawn(scene, results)
     fig, axes = plots.figure(4.0, 3.0)
-    named = dict(zip(over, labels(scene, list(over))))
-    order = np.ix_(*(np.argsort(values, kind="stable") for values in over.values()))
-    rising = {name: np.sort(values) for name, values in over.items()}
-    unit = "m" if {*over} & {*LENGTHS} else scene.system.unit
-    net, label = plots.net(results["displacement"])[order], f"displacement per cycle ({unit})"
-    (_line if len(over) == 1 else _map)(axes[0, 0], rising, net, _errors(scene, results)[order], label)
-    axes[0, 0].set(**{f"{axis}label": named[name] for axis, name in zip("xy", over)})
+    ax, named = axes[0, 0], dict(zip(over, labels(scene, list(over))))
+    order = np.ix_(*(np.argsort(x, kind="stable") for x in over.values()))
+    rising = [np.sort(x) for x in over.values()]
+    if len(over) == 1:
+        _line(ax, *rising, values[order], error[order], None if medium is None else medium[order], label)
+    else:
+        _map(ax, *rising, values[order], label)
+    ax.set(**{f"{axis}label": named[name] for axis, name in zip("xy", over)})
     return fig
 
 
-def _errors(scene: Scene, results: dict) -> np.ndarray:
-    """Those of positions, in the scene's unit, as the displacement is."""
-    errors = np.array(results["estimate"], float)
-    lengths = [k for k, name in enumerate(results["over"]) if name in LENGTHS]
-    if not lengths:
-        return errors * scene.system.length
-    values = np.array(list(results["over"].values())[lengths[0]])
-    return errors * values.reshape([-1 if k == lengths[0] else 1 for k in range(errors.ndim)])
+def drawn(scene: Scene, results: dict):
+    """(values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs from
+    point to point, the speed; negative where it is backwards."""
+    net, frequency = plots.net(results["displacement"]), results.get("frequency")
+    factor = at_points(results["over"], LENGTHS, scene.system.length)
+    unit = "BL" if np.all(factor == 1.0) else "m"
+    timed = frequency is not None and np.ptp(frequency) > 0
+    if timed:
+        net, factor = net * frequency, factor * frequency
+    medium = results["medium_error"] * factor if "medium_error" in results else None
+    label = f"speed ({unit}/s)" if timed else f"net distance per cycle ({unit})"
+    return net, results["estimate"] * factor, medium, label + ", backwards < 0" * bool((net < 0).any())
 
 
 @plots.styled
-def _line(ax, over: dict, net: np.ndarray, errors: np.ndarray, label: str) -> None:
-    (values,) = over.values()
-    marker = "o" if len(values) <= plots.MARKED else ""
-    ax.errorbar(values, net, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1)
+def _line(ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | None, label: str) -> None:
+    marker = "o" if len(x) <= plots.MARKED else ""
+    ax.errorbar(x, values, yerr=errors, fmt=f"{marker}-", color="black", ms=3, lw=1)
+    if medium is not None:
+        plots.medium_band(ax, x, values, medium)
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set_ylabel(label)
 
 
 @plots.styled
-def _map(ax, over: dict, net: np.ndarray, errors: np.ndarray, label: str) -> None:
+def _map(ax, x, y, net: np.ndarray, label: str) -> None:
     """Cells about the points, that end where the values do; colours centred on zero where the sign changes."""
     from cmcrameri import cm
 
-    x, y = over.values()
     top = np.abs(net).max() or 1.0
     signs = {"cmap": cm.vik, "vmin": -top, "vmax": top} if net.min() < 0 < net.max() else {"cmap": "viridis"}
     image = ax.pcolormesh(x, y, net.T, shading="nearest", rasterized=True, **signs)

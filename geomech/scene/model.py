@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from geomech.errors import choose, named, short
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
@@ -37,6 +39,7 @@ class Scene(Told):
                 if not isinstance(getattr(self, what), kind):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
             _check_joints(checked_system(self.system), checked_gait(self.gait))
+            frequency_of(self.system, self.gait)
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:
@@ -44,10 +47,8 @@ class Scene(Told):
         if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
             self.system.note_angles(gait.largest(amplitudes))
 
-    @property
-    def frame(self) -> str:
-        """The body frame of all velocities and displacements; the system's own."""
-        return self.system.frame
+    frame = property(lambda self: self.system.frame, doc="The body frame of all velocities and displacements.")
+    frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed, the system's own among them; None keeps a value."""
@@ -91,3 +92,15 @@ def checked_scene(scene) -> Scene:
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, such as geomech.scene.load gives, got {short(scene)}")
     return scene
+
+
+def frequency_of(system: System, gait: Gait) -> float | None:
+    """Cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None where neither says.
+    ValueError if the two contradict each other."""
+    own, others = getattr(gait, "frequency", None), getattr(system, "frequency", None)
+    if own is None or others is None:
+        return others if own is None else own
+    if np.any(np.asarray(others) != own):
+        told = f"[gait] frequency = {own:g}, but the effects of the {system.kind} have {short(others)}"
+        raise ValueError(f"{told}: it is one swimmer, keep one")
+    return own

@@ -117,7 +117,9 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
         if table not in ("effects", "frame") and not isinstance(value, dict):
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
     tables, files = with_files(tables, name)
-    kind, parts = _system(tables, name)
+    sizes = _Sizes(name, tables)
+    gait = _of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
+    kind, parts = _system(tables, name, sizes)
     own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
     numerics = tables.get("numerics", {})
     for key in numerics:
@@ -129,7 +131,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
     with named(name):
         return Scene(
             system=kind(**parts),
-            gait=_of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS),
+            gait=gait,
             numerics=_build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics),
             name=name,
             text=text,
@@ -137,13 +139,12 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
         )
 
 
-def _system(tables: Mapping, name: str) -> tuple[type, dict]:
+def _system(tables: Mapping, name: str, sizes: _Sizes) -> tuple[type, dict]:
     """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
     they may also be in its own table."""
     table = dict(_located(tables.get("system", {"kind": "swimmer"}), name))
     kind = SYSTEMS[_kind(f"{name}: [system]", table, "kind", SYSTEMS)]
     del table["kind"]
-    sizes = _Sizes(name, tables.get("physical", {}), tables.get("frame"))
     if kind is not Swimmer:
         if strangers := sorted({"medium", "body", "effects"} & {*tables}):
             raise SceneError(f"{name}: a {kind.kind} takes no {strangers[0]!r}: drop it, or the table [system]")
@@ -177,15 +178,31 @@ def _swimmer(parts: dict, name: str, sizes: _Sizes) -> dict:
 
 
 class _Sizes:
-    """What stands once for the whole scene: [physical], and the frame."""
+    """What stands once for the whole scene: [physical], the frame, and the frequency, which may stand in [gait] as well."""
 
-    def __init__(self, name: str, physical: dict, frame):
+    def __init__(self, name: str, tables: Mapping):
+        physical, frame, frequency = tables.get("physical", {}), tables.get("frame"), tables["gait"].get("frequency")
         for key in physical:
             choose(f"{name}: [physical] key", key, Physical.__dataclass_fields__)
         self.name, self.given, self.unused = name, dict(physical), {*physical}
+        self.places = {key: f"[physical] {key}" for key in physical} | {"frame": "the scene's frame"}
         if frame is not None:
             self.given["frame"] = frame
             self.unused.add("frame")
+        if frequency is not None:
+            self._check(f"{name}: [gait]", "frequency", frequency)
+            self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
+
+    def timed(self, place: str, table: dict, kind: type) -> dict:
+        """The table of the gait with the frequency, of all there is."""
+        if "frequency" not in self.given or "frequency" not in [f.name for f in dataclasses.fields(kind)]:
+            return table
+        self.unused.discard("frequency")
+        return {**table, "frequency": self.given["frequency"]}
+
+    def _check(self, place: str, key: str, value) -> None:
+        if key in self.given and self.given[key] != value:
+            raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
         """The table with the sizes that its class has; SceneError if it says otherwise itself."""
@@ -194,9 +211,7 @@ class _Sizes:
             if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
                 continue
             self.unused.discard(key)
-            if table.get(key, value) != value:
-                where = "the scene's frame" if key == "frame" else f"[physical] {key}"
-                raise SceneError(f"{place} {key} = {table[key]!r}, but {where} = {value!r}: keep one")
+            self._check(place, key, table.get(key, value))
             table = {**table, key: value}
         return table
 

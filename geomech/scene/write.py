@@ -14,7 +14,8 @@ from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.swimmer import PARTS, Swimmer, name_in
+from geomech.systems.said import name_in
+from geomech.systems.swimmer import PARTS, Swimmer
 
 
 def toml(scene: Scene) -> str:
@@ -68,6 +69,9 @@ def _anew(scene: Scene) -> dict:
             if scene.frame != "mean":
                 out = {"frame": scene.frame, **out}
     out["gait"] = _of_kind(scene.gait, "kind", GAITS)
+    if "frequency" in out["gait"]:
+        for effect in effects:
+            effect.pop("frequency", None)  # the gait's
     out["numerics"] = _numerics(scene)
     if effects:
         out["effects"] = effects

@@ -15,8 +15,8 @@ from geomech.errors import SceneError, choose, named, real_array, short
 from geomech.field import Field, inside
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
-from geomech.scene.model import Scene
-from geomech.study import cost, estimate
+from geomech.scene.model import Scene, frequency_of
+from geomech.study import cost, estimate, tables, uncertainty
 from geomech.study.offer import METHODS, lookups, methods, tiers
 from geomech.study.results import Displacements
 from geomech.tiers import TIERS
@@ -62,14 +62,19 @@ class Study:
     lookups = property(lambda self: lookups(self.scene.system))
 
     def _kept(self, what: str, depends_on: Sequence[str], reach: tuple, make: Callable):
+        """(what was made, the seconds that took, whether it was there before)."""
         s = self.scene
         key = what, s.system, *(getattr(s.numerics, name) for name in depends_on), *reach
-        if key not in self._tables:
-            self._tables[key] = make()
-        return self._tables[key]
+        there = key in self._tables
+        if not there:
+            self._tables[key] = timed(make)
+        return *self._tables[key], there
 
     def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
         """What a tier looks up, computed once: a Connection, Harmonics or a Family; SceneError if it has none."""
+        return self._table(tier, gait, amplitudes, progress)[0]
+
+    def _table(self, tier: str, gait: Gait | None, amplitudes, progress: Callable | None = None):
         with named(self.scene.name):
             how = TIERS[choose("methods", tier, METHODS)]
             how.refuse(self.scene.system)
@@ -98,17 +103,17 @@ class Study:
         if system.stored("connection"):
             return system.stored("even part")
         make = lambda: even_part(system.velocity, self.fitted.axes, system.singularity)
-        return self._kept("even part", ("grid", "extent"), (), make)
+        return self._kept("even part", ("grid", "extent"), (), make)[0]
 
     @property
     def curvature(self) -> Field:
         """The CCF of `fitted`, for joints 1 and 2."""
-        return self._kept("ccf", TIERS["path"].depends_on, (), lambda: ccf(self.fitted))
+        return self._kept("ccf", TIERS["path"].depends_on, (), lambda: ccf(self.fitted))[0]
 
     @property
     def curvature_error(self) -> Field:
         """The estimated error of `curvature`."""
-        return self._kept("error of the ccf", TIERS["path"].depends_on, (), lambda: ccf_error(self.fitted))
+        return self._kept("error of the ccf", TIERS["path"].depends_on, (), lambda: ccf_error(self.fitted))[0]
 
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
@@ -140,33 +145,50 @@ class Study:
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
     ) -> dict:
-        """{"amplitude": [...], method: [[x, y, theta], ...], ..., "estimate": {method: [...]}, "estimate_heading":
-        {method: [...]}, "seconds": {...}}.
+        """A table (`geomech.study.tables.table`) of the net poses by tiers of METHODS, with their errors, and besides
+        {"seconds": {...}, "kept": [...]}.
 
-        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.study.estimate`). Fields
-        are timed on their own.
+        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.study.estimate`).
+        seconds: what building each table took, by its name ("field", "harmonic table" ...), whenever that was, and
+        what each tier took from there, the direct one with its errors; "errors" of the others, where it is not asked for;
+        "medium" of the errors of an uncertain one.
+        kept: the tables that were there before, whose seconds are not of this call.
         """
-        scene = self.scene
         gait, amplitudes, chosen = self._asked(gait, amplitudes, methods)
-        seconds, errors, found, reference = {}, {}, {}, None
-        if any(map(self.needs_field, methods)):
-            seconds["field"] = timed(lambda: self.compute_field(progress))[1]
+        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # refuses, before the rest
+        seconds, kept = self._built(chosen, gait, amplitudes, progress)
+        if medium:
+            seconds["medium"] = took
+        poses, errors, reference = {}, {}, None
         for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
-            if chosen[method].is_direct(scene.system):
-                (poses, errors[method]), seconds[method] = timed(
-                    lambda: estimate.direct(scene, gait, amplitudes, scene.numerics.phases)
-                )
-                reference = poses, errors[method]
+            if chosen[method].is_direct(self.scene.system):
+                direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
+                reference, seconds[method] = timed(direct)
+                poses[method], errors[method] = reference
             else:
-                poses, seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
-                errors[method] = estimate.against_direct(scene, poses, gait, amplitudes, reference)
-            found[method] = poses.tolist()
-        estimates = {
-            key: {m: errors[m][:, k].tolist() for m in methods}
-            for k, key in enumerate(("estimate", "estimate_heading"))
-        }
-        table = {"amplitude": amplitudes.tolist(), **{m: found[m] for m in methods}, **estimates, "seconds": seconds}
-        return Displacements(table, scene, gait)
+                poses[method], seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
+                check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
+                errors[method], took = timed(check)
+                if reference is None:
+                    seconds["errors"] = seconds.get("errors", 0.0) + took
+        poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
+        table = tables.table(self.scene, gait, amplitudes, poses, errors, medium, seconds=seconds, kept=kept)
+        return Displacements(table, self.scene, gait)
+
+    def _built(self, chosen: dict, gait: Gait, amplitudes, progress) -> tuple[dict[str, float], list[str]]:
+        """The tables of tiers, built: seconds that each took, whenever that was, and the names of those that were there."""
+        seconds, kept = {}, []
+        looked_up = [m for m in chosen if not chosen[m].is_direct(self.scene.system)]
+        if looked_up:
+            import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
+        for method in sorted(
+            looked_up, key=lambda m: chosen[m].looks_up != "connection"
+        ):  # the field is the picture, too
+            name = "field" if self.needs_field(method) else f"{method} table"
+            if name not in seconds:
+                _, seconds[name], there = self._table(method, gait, amplitudes, progress)
+                kept += [name] * there
+        return seconds, kept
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> cost.Cost:
         """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""
@@ -183,6 +205,7 @@ class Study:
         if isinstance(methods, str) or not isinstance(methods, Sequence):
             raise SceneError(f"{scene.name}: methods must be a list of {', '.join(METHODS)}, got {short(methods)}")
         with named(scene.name):
+            frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
             chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
             for tier in chosen.values():

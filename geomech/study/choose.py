@@ -11,7 +11,7 @@ from geomech.errors import SceneError, is_number, real_array, short
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.scene.model import Scene
-from geomech.study import cost
+from geomech.study import cost, tables, uncertainty
 from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
@@ -24,8 +24,8 @@ FINEST_PIECES = 640  # that a tolerance asks for
 def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
 ) -> dict:
-    """{"amplitude", tier: [[x, y, theta], ...], "estimate": [...], "estimate_heading": [...], "tier", "settings",
-    "seconds"}: the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
+    """A table as `Study.study` gives it, of one tier, and besides {"tier", "settings"}; its seconds are of all, the search
+    included. It is the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
     most ``tol`` body lengths.
 
     Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
@@ -41,6 +41,14 @@ def cheapest(
     scene.note_turns(gait, amplitudes)
     if tol <= system.settling:
         raise SceneError(f"{scene.name}: cycles with these effects repeat to {system.settling:g} only: raise --tol")
+    ask(cost.of_medium(scene, gait, len(amplitudes)))
+    medium = uncertainty.of_medium(scene, gait, amplitudes)
+
+    def answer(method: str, poses, error, settings: dict) -> dict:
+        more = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
+        table = tables.table(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more)
+        return Displacements(table, scene, gait)
+
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.steps else 32, 8 * gait.harmonics)
     if study.lookups:
@@ -59,7 +67,7 @@ def cheapest(
             poses = study.displacement(method, gait, amplitudes)
             error = against_direct(scene, poses, gait, amplitudes)
             if error[:, 0].max() <= tol:
-                return _answer(scene, gait, method, amplitudes, poses, error, {"grid": scene.numerics.grid}, start)
+                return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         found = " and ".join(f"{n} {name}" for name, n in settings.items())
@@ -67,7 +75,7 @@ def cheapest(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             "raise --tol, or lower [numerics] regularisation and tolerance"
         )
-    return _answer(scene, gait, "direct", amplitudes, poses, error, settings, start)
+    return answer("direct", poses, error, settings)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
@@ -90,16 +98,3 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
         if stalled:
             break
     return (poses, error), {"phases": phases, **({"pieces": pieces} if scene.system.cut else {})}
-
-
-def _answer(scene, gait, method, amplitudes, poses, error, settings, start) -> Displacements:
-    table = {
-        "amplitude": amplitudes.tolist(),
-        method: poses.tolist(),
-        "estimate": error[:, 0].tolist(),
-        "estimate_heading": error[:, 1].tolist(),
-        "tier": method,
-        "settings": settings,
-        "seconds": {method: time.perf_counter() - start},
-    }
-    return Displacements(table, scene, gait)

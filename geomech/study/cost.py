@@ -18,7 +18,7 @@ import numpy as np
 from geomech.errors import SceneError
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
-from geomech.study import estimate
+from geomech.study import estimate, uncertainty
 from geomech.study.offer import lookups as looked_up
 from geomech.tiers import TIERS
 from geomech.tiers.path import axes
@@ -112,10 +112,19 @@ def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = 
     shared = {TIERS[m].looks_up: m for m in reversed(lookups)}
     jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
     jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups]
+    jobs += of_medium(scene, gait, count)
     if len(lookups) < len(methods):
         return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
     return jobs + len(lookups) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+
+
+def of_medium(scene: Scene, gait: Gait, count: int) -> list[Job]:
+    """What an uncertain medium does to ``count`` amplitudes (`uncertainty.of_medium`)."""
+    if not uncertainty.uncertain(scene.system):
+        return []
+    phases = max(uncertainty.PHASES, 8 * gait.harmonics)
+    return uncertainty.points(scene.system) * direct(scene, gait, count, phases, checked=False)
 
 
 def direct(

@@ -17,15 +17,18 @@ from geomech.kinds import code
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
-from geomech.study import estimate, kept
+from geomech.study import estimate, kept, uncertainty
 from geomech.study.batch import beside, kind
-from geomech.study.cost import Cost, direct, price
+from geomech.study.cost import Cost, direct, of_medium, price
 from geomech.study.results import Swept
+from geomech.study.tables import of_pose
 from rft import SOLVER
 
 LARGEST = 1_000_000  # points
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
+FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
+LENGTHS = "body", "physical", "system", "length"
 SAVE_EVERY = 2.0  # seconds between savings of what there is, and more where saving takes long:
 PATIENCE = 20  # times as long
 
@@ -63,7 +66,9 @@ def sweep(
     scene: Scene, over: Mapping[str, list[float]], partial: Path | None = None, progress: Callable | None = None
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}
-    by the direct tier; estimates as in `estimate.direct`.
+    by the direct tier; estimates as in `estimate.direct`. Where the swimmer has a frequency also {"frequency": (N_1, ...),
+    Hz, "speed": (N_1, ...)}, the net distance times it; where the medium is uncertain {"medium_error": (N_1, ...), of the
+    position, body lengths, "medium_error_heading": (N_1, ...), rad} (`geomech.study.uncertainty`).
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
     solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
@@ -74,6 +79,7 @@ def sweep(
     if not (partial is None or (isinstance(partial, (str, Path)) and str(partial))):
         raise SceneError(f"partial must be the path of a file, got {short(partial)}")
     partial = partial and Path(partial)
+    told, doubtful = progress or (lambda fraction: None), uncertainty.uncertain(scene.system)
     with _Rows(partial, question(scene, values), int(np.prod(shape))) as rows:
         while len(rows) < rows.total:
             k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
@@ -82,14 +88,37 @@ def sweep(
             beyond = points[k + 1 : k + max(1, most // len(amplitudes or [0]))] if done == 0 else []
             batch = [first, *(_scene_at(tables, scene, names, p) for p in beyond)]
             rows.add(_rows(batch, amplitudes[done : done + most] if amplitudes else None))
-            if progress:
-                progress(len(rows) / rows.total)
-    flat = np.array(list(rows)).reshape(*shape, kept.WIDTH)
+            told(len(rows) / rows.total * (0.4 if doubtful else 1.0))
+    flat = np.array(list(rows))
+    if doubtful:
+        at = lambda point: _scene_at(tables, scene, names, point)
+        flat = np.column_stack([flat, _doubts(at, points, amplitudes, lambda done: told(0.4 + 0.6 * done))])
+    flat = flat.reshape(*shape, -1)
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
     errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
-    found = {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
-    return Swept(found, scene)
+    if doubtful:
+        errors |= {"medium_error": flat[..., 5], "medium_error_heading": flat[..., 6]}
+    results = {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
+    return Swept({**results, **_speeds(scene, results)}, scene)
+
+
+def _speeds(scene: Scene, results: dict) -> dict:
+    """Frequency and speed at every point, if there is a frequency."""
+    frequency = at_points(results["over"], FREQUENCIES, scene.frequency)
+    if frequency is None:
+        return {}
+    return {"frequency": frequency, "speed": of_pose(results["displacement"])["net_distance"] * frequency}
+
+
+def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
+    """The number (N_1, ...) that the points of a sweep have for what goes by one of these names: that parameter's where it
+    is swept, else ``value``, None for nothing."""
+    for axis, (name, values) in enumerate(over.items()):
+        if name.partition(".")[0] in names and name.rpartition(".")[2] == names[-1]:
+            values = np.reshape(values, [-1 if k == axis else 1 for k in range(len(over))])
+            return np.broadcast_to(values, [len(v) for v in over.values()]).copy()
+    return None if value is None else np.full([len(v) for v in over.values()], float(value))
 
 
 def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
@@ -97,7 +126,8 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     tables, names, values, points = _grid(scene, over)
     total = len(points) * len(values.get(AMPLITUDE, [0]))
     some = [_scene_at(tables, scene, names, points[k]) for k in {0, len(points) // 2, len(points) - 1}]
-    each = [price(direct(s, s.gait, total, s.numerics.phases, SAMPLES_TOGETHER)) for s in some]
+    jobs = [direct(s, s.gait, total, s.numerics.phases, SAMPLES_TOGETHER) + of_medium(s, s.gait, total) for s in some]
+    each = list(map(price, jobs))
     balances, seconds, memory = np.array(each).T
     return Cost(round(balances.mean()), float(seconds.mean()), float(memory.max()))
 
@@ -118,7 +148,9 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     outer = [values[k] for k in names if k != AMPLITUDE]
     tables = written.tables(scene)
     for corner in _corners(outer):
-        _scene_at(tables, scene, names, corner)  # refuse before computing
+        at = _scene_at(tables, scene, names, corner)  # refuse before computing
+        if uncertainty.uncertain(at.system):
+            uncertainty.sigma_points(at)
     return tables, names, values, list(itertools.product(*outer))
 
 
@@ -198,13 +230,35 @@ def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
 def _rows(scenes: list[Scene], amplitudes) -> list:
     """[[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, those that fit into one batch
     together."""
+    solve = lambda joined: np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
+    return _together(scenes, amplitudes, solve)
+
+
+def _together(scenes: list[Scene], amplitudes, solve: Callable) -> list:
+    """Rows of solve(scenes side by side), as many as there are amplitudes, of every scene."""
     groups: dict = {}
     for k, scene in enumerate(scenes):
         groups.setdefault(kind(scene), []).append(k)
     rows: list = [None] * len(scenes)
     for members in groups.values():
-        joined = beside([scenes[k] for k in members], amplitudes)
-        found = np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
+        found = solve(beside([scenes[k] for k in members], amplitudes))
         for k, part in zip(members, np.split(found, len(members))):
             rows[k] = part.tolist()
     return list(itertools.chain(*rows))
+
+
+def _doubts(at: Callable, points, amplitudes: list[float] | None, progress: Callable) -> np.ndarray:
+    """What the medium's uncertainty does to the positions, body lengths, and headings, rad, of every point: (N, 2). at: gives
+    the scene at a point. These are not kept: they are soon computed anew, beside the rest."""
+    size, rows = max(1, SAMPLES_TOGETHER // len(amplitudes or [0])), []
+    for k in range(0, len(points), size):
+        scenes = [at(p) for p in points[k : k + size]]
+        for j in range(0, len(amplitudes or [0]), SAMPLES_TOGETHER):  # one point alone where there are so many
+            rows += _together(scenes, amplitudes and amplitudes[j : j + SAMPLES_TOGETHER], _doubt)
+        progress(min(1.0, (k + size) / len(points)))
+    return np.array(rows)
+
+
+def _doubt(joined: Scene) -> np.ndarray:
+    found = uncertainty.of_medium(joined, joined.gait, None)
+    return np.column_stack([found["position"] / joined.system.length, found["heading"]])

@@ -24,7 +24,9 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     progress over the arc length of a wave, lambda_s, which has one. wavelength: body lengths. relative_curvature: mean
     |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole body's axial drag x distance), the
     drag being the plain medium's, without skin or ends. slip: mean angle between body and velocity, rad. velocity:
-    (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per rad.
+    (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per rad. Where the swimmer has a
+    frequency, in the scene's own unit, body lengths or m, besides: distance, net, per cycle; speed, a second;
+    speed_body_lengths, body lengths a second; velocity_per_second: (B, N, 3), unit/s and rad/s.
     ValueError if the gait is no sine.
 
     The elements are chords of the wave: 40 of them a wave leave errors of 2 % at A / lambda = 0.2, but above 0.4 enough
@@ -39,6 +41,11 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
     wavelength = gait.wavelength(amplitudes)
     energy = 2 * np.pi * spent.power.mean(-1) / length
+    timed = {}
+    if (frequency := scene.frequency) is not None:
+        timed["distance"] = progress * length
+        timed["speed"], timed["speed_body_lengths"] = timed["distance"] * frequency, progress * frequency
+        timed["velocity_per_second"] = run.xi * (2 * np.pi * frequency)
     return {
         "amplitude": amplitudes,
         "progress": progress,
@@ -49,6 +56,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
         "cost_of_transport": energy / np.maximum(progress, 1e-300),
         "slip": spent.slip.mean(-1),
         "velocity": run.xi / np.array([length, length, 1.0]),
+        **timed,
     }
 
 

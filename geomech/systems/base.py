@@ -104,11 +104,13 @@ class Plain:
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
     joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed: forces
     on an element have an exact form, which finer loads come near to. notes: lines on what its user may not expect of how
-    it is computed.
+    it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n), of parameters of its own
+    that are not known for certain, which `varied` changes; None where all are.
     """
 
     kind = "system"
     length = 1.0
+    frequency = covariance = None
     frame = "mean"
     mirror = linear = kinks = False
     lacks = NONE

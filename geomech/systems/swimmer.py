@@ -12,6 +12,7 @@ import rft
 from geomech.errors import real_array, short
 from geomech.reconstruct import displacement, poses, repeated
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
+from geomech.systems.said import name_in, told
 from geomech.systems.solver import Solver
 from rft.balance import checked_body
 from rft.bodies import KINDS as BODIES
@@ -82,6 +83,23 @@ class Swimmer(Plain):
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
     held = property(lambda self: sum(e.held for e in self.effects))
+    frequency = property(lambda self: next((e.frequency for e in self.effects if hasattr(e, "frequency")), None))
+
+    @property
+    def covariance(self) -> tuple | None:
+        """Of the medium's parameters, as measured."""
+        return getattr(self.medium, "covariance", None) if hasattr(self.medium, "uncertain") else None
+
+    def varied(self, step) -> Swimmer:
+        """The same in a medium whose uncertain parameters are off by ``step`` (n,); ValueError if that is no medium."""
+        changed = {name: getattr(self.medium, name) + float(d) for name, d in zip(self.medium.uncertain, step)}
+        try:
+            return dataclasses.replace(self, medium=dataclasses.replace(self.medium, covariance=None, **changed))
+        except ValueError as error:
+            raise ValueError(
+                f"[medium] covariance: a standard deviation away there is no medium ({error}): measure more drag, or "
+                "leave the covariance out"
+            ) from None
 
     @property
     def lacks(self) -> Premise:
@@ -264,33 +282,10 @@ class Swimmer(Plain):
         )
 
     def told(self) -> list[str]:
-        medium, body = (said(name_in(kinds, x), x) for kinds, x in ((LAWS, self.medium), (BODIES, self.body)))
-        lines = [f"{medium}, {body}", *self.notes]
-        for effect in self.effects:
-            cost = f"; costs {effect.cost}" if effect.cost else ""
-            gone = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
-            premises = not_so(effect.breaks) or "keeps every premise"
-            lines.append(f"on:  {said(effect.kind, effect)}; {premises}{cost}{gone}")
-            if assumed := effect.assumes(self.medium):
-                lines.append(f"     assumes {assumed}")
-        off = [name for name in EFFECTS if name not in [e.kind for e in self.effects]]
-        return [*lines, "off, not evaluated: " + (", ".join(off) or "none")]
+        return told(self)
 
     @property
     def because(self) -> str:
         broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in self.effects if e.breaks & SHAPE_ALONE]
         reasons = [f"with {kind} the scene is {not_so(lost)}" for kind, lost in broken]
         return f"({ENGINES[self.engine]}): " + ("; ".join(reasons) or "nothing remembers, places are alike, no mass")
-
-
-def said(kind: str, thing) -> str:
-    """What a part of a scene is and its numbers, as a scene has them; a covariance only where there is one."""
-    names = [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
-    given = [name for name in names if name != "covariance" or thing.covariance is not None]
-    values = [f"{name} = {short(getattr(thing, name))}" for name in given]
-    return f"{kind} ({', '.join(values)})" if values else kind
-
-
-def name_in(kinds: dict, thing) -> str:
-    """Its name in ``kinds``, or that of its class."""
-    return next((name for name, kind in kinds.items() if type(thing) is kind), type(thing).__name__)

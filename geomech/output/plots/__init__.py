@@ -2,7 +2,7 @@
 you have a figure of pyplot open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
 """
 
-from geomech.output.plots.displacements import displacement, net
+from geomech.output.plots.displacements import displacement, displacement_figure, medium_band, net
 from geomech.output.plots.drag import drag_figure
 from geomech.output.plots.maps import (
     COMPONENTS,
@@ -25,7 +25,7 @@ from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quan
 
 __all__ = [
     "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
-    "check_format", "connection_figure", "displacement", "drag_figure", "draw_gait", "drawable", "figure",
-    "filmstrip", "largest", "net", "quantity", "save", "shape_space", "stage", "styled", "unknown", "vector_field",
-    "work_precision", "work_precision_figure",
+    "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure", "draw_gait", "drawable",
+    "figure", "filmstrip", "largest", "medium_band", "net", "quantity", "save", "shape_space", "stage", "styled",
+    "unknown", "vector_field", "work_precision", "work_precision_figure",
 ]  # fmt: skip

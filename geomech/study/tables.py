@@ -1,0 +1,78 @@
+"""The table of a study: net poses by tier with their errors, every number under a name and with a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from geomech.gaits import Gait
+from geomech.scene.model import Scene, frequency_of
+
+ERRORS = ("estimate", "estimate_heading")
+QUANTITIES = ("x", "y", "heading", "net_distance")  # of a pose
+
+
+def of_pose(poses) -> dict[str, np.ndarray]:
+    """QUANTITIES (...,) of net poses (..., 3); the net distance is the length of (x, y)."""
+    x, y, heading = np.moveaxis(np.asarray(poses, float), -1, 0)
+    return {"x": x, "y": y, "heading": heading, "net_distance": np.hypot(x, y)}
+
+
+def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping, medium=None, **more) -> dict:
+    """{"amplitude": [...], tier: [[x, y, theta], ...], "estimate": {tier: [...]}, "estimate_heading": {tier: [...]}, "x",
+    "y", "heading" and "net_distance": {tier: [...]}, "units": {key: unit}, and ``more``}.
+
+    poses: (B, 3) by tier. errors: (B, 2) by tier, of the position in body lengths, which bounds those of x, y and the net
+    distance, and of the heading in rad. Where the swimmer has a frequency (Hz), also "frequency", and by tier "speed", the
+    net distance times it, "speed_body_lengths", the same in body lengths a second, and "turning_rate" (rad/s).
+
+    medium: None, or what the uncertainty of the medium does to the true displacement, and so to every tier's
+    (`geomech.study.uncertainty.of_medium`): "medium_error" {tier: [...]}, of the position, body lengths,
+    "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit, and
+    "medium_error_rule" [...].
+    """
+    unit, frequency = scene.system.unit, frequency_of(scene.system, gait)
+    found = {m: of_pose(p) for m, p in poses.items()}
+    units = {"amplitude": gait.amplitude_label, **dict.fromkeys(("x", "y", "net_distance"), unit), "heading": "rad"}
+    units |= {"estimate": "BL", "estimate_heading": "rad", "seconds": "s"}
+    if frequency is not None:
+        units |= {"frequency": "Hz", "speed": f"{unit}/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s"}
+        more = {"frequency": frequency, **_speeds(found, frequency, scene.system.length), **more}
+    if medium is not None:
+        units |= {"medium_error": "BL", "medium_error_heading": "rad", "medium_error_of": "that of the quantity"}
+        more = {**_of_medium(medium, tuple(poses), scene.system.length), **more}
+    return {
+        "amplitude": np.asarray(amplitudes, float).tolist(),
+        **{m: np.asarray(p).tolist() for m, p in poses.items()},
+        **{key: {m: e[:, k].tolist() for m, e in errors.items()} for k, key in enumerate(ERRORS)},
+        **{key: {m: x[key].tolist() for m, x in found.items()} for key in QUANTITIES},
+        "units": units,
+        **more,
+    }
+
+
+def _speeds(found: Mapping, frequency: float, length: float) -> dict:
+    times = lambda key, by: {m: (x[key] * by).tolist() for m, x in found.items()}
+    return {
+        "speed": times("net_distance", frequency),
+        "speed_body_lengths": times("net_distance", frequency / length),
+        "turning_rate": times("heading", frequency),
+    }
+
+
+def _of_medium(medium: Mapping, methods: tuple[str, ...], length: float) -> dict:
+    position = (medium["position"] / length).tolist()
+    return {
+        "medium_error": dict.fromkeys(methods, position),
+        "medium_error_heading": dict.fromkeys(methods, medium["heading"].tolist()),
+        "medium_error_of": {q: medium[q].tolist() for q in QUANTITIES},
+        "medium_error_rule": medium["rule"],
+    }
+
+
+def error_of(table: Mapping, quantity: str, tier: str, length: float) -> np.ndarray:
+    """The estimated error (B,) of one of QUANTITIES, in its own unit."""
+    if quantity == "heading":
+        return np.array(table["estimate_heading"][tier], float)
+    return np.array(table["estimate"][tier], float) * length

@@ -1,0 +1,187 @@
+"""A swimmer's frequency: said once, of the gait, and every displacement is a speed."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import xarray
+from registry import GAITS
+from test_cli import geomech
+
+from geomech import scene as scenes
+from geomech.errors import SceneError
+from geomech.gaits import Circle
+from geomech.output import report
+from geomech.study import sweep, undulation
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from rft import BodyInertia, GrainInertia
+
+CHAIN = """[medium]
+name = "glass-0.3mm-loose"
+[body]
+kind = "chain"
+lengths = [1, 1.4, 0.8]
+length = 0.3
+frame = "link-1"
+[gait]
+kind = "ellipse"
+centre = [0.3, -0.2]
+frequency = 2.5
+[numerics]
+phases = 32
+grid = 6
+"""
+GRAINS = '[[effects]]\nkind = "grain-inertia"\nlength = 0.3\ndepth = 0.05\n'
+MASS = '[[effects]]\nkind = "body-inertia"\nlength = 0.3\nmass = 0.02\ndrag = 1.0\n'
+
+
+@pytest.mark.parametrize("kind", GAITS)
+def test_every_gait_may_have_one_and_moves_as_without(kind):
+    gait = GAITS[kind]
+    timed = dataclasses.replace(gait, frequency=3)
+    assert gait.frequency is None and timed.frequency == 3.0 and timed != gait
+    for a, b in zip(gait.cycle(64), timed.cycle(64)):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_the_gaits_frequency_is_that_of_effects_which_need_one():
+    scene = scenes.parse(CHAIN + GRAINS + MASS)
+    assert scene.frequency == 2.5 == scene.gait.frequency
+    assert scene.system.effects == (GrainInertia(2.5, 0.3, 0.05), BodyInertia(0.02, 2.5, 0.3, 1.0))
+    shared = CHAIN.replace("frequency = 2.5", "") + "[physical]\nfrequency = 2.5\n"
+    assert scenes.parse(shared + GRAINS + MASS) == scene
+    assert scenes.parse(shared).frequency == 2.5  # of a swimmer whose forces do not know it
+    assert scenes.parse(CHAIN + "[physical]\nfrequency = 2.5\n" + GRAINS.replace("depth", "frequency = 2.5\ndepth"))
+    own = scenes.parse(CHAIN.replace("frequency = 2.5", "") + GRAINS.replace("depth", "frequency = 2.5\ndepth"))
+    assert (own.frequency, own.gait.frequency) == (2.5, None)
+    anew = scenes.tables(scene.changed(text=""))
+    assert anew["gait"]["frequency"] == 2.5 and not any("frequency" in e for e in anew["effects"])
+    assert scenes.from_tables(anew, scene.name) == scene.changed(text="")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (CHAIN + "[physical]\nfrequency = 2", r"\[gait\] frequency = 2.5, but \[physical\] frequency = 2: keep one"),
+        (CHAIN + GRAINS + "frequency = 3", r"\[\[effects\]\] frequency = 3, but \[gait\] frequency = 2.5: keep one"),
+        (CHAIN.replace("2.5", "-1"), r"\[gait\] frequency must be a number from 0 to 10000, got -1"),
+        (CHAIN.replace("2.5", '"fast"'), r"\[gait\] Expected `float \| null`, got `str`"),
+        (CHAIN.replace("2.5", "nan"), r"\[gait\] frequency must be a number"),
+    ],
+)
+def test_contradictions_are_named(text, said):
+    with pytest.raises(SceneError, match=said) as caught:
+        scenes.parse(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_from_python_too():
+    scene = scenes.parse(CHAIN + GRAINS)
+    for contradict in (
+        lambda: scene.changed(gait=Circle(frequency=2.0)),
+        lambda: Study(scene).study([0.5], ["direct"], Circle(frequency=2.0)),
+    ):
+        with pytest.raises(SceneError, match=r"\[gait\] frequency = 2, but the effects of the swimmer have 2.5"):
+            contradict()
+    assert Study(scene).study([0.5], ["direct"], Circle())["frequency"] == 2.5
+    assert [g.frequency for g in report._gaits(scene)] == [2.5] * 3  # those that `run` adds, too
+
+
+def test_every_displacement_is_a_speed():
+    scene = scenes.parse(CHAIN)
+    table, amplitudes = Study(scene).study([0.5, 1.0], ["area", "direct"]), [0.5, 1.0]
+    for tier in ("area", "direct"):
+        poses = np.array(table[tier])
+        assert (np.abs(poses) > 1e-4).any(0).all()  # it moves along, sideways and turns
+        np.testing.assert_allclose(table["speed"][tier], 2.5 * np.hypot(poses[:, 0], poses[:, 1]))
+        np.testing.assert_allclose(table["speed_body_lengths"][tier], np.array(table["speed"][tier]) / 0.3)
+        np.testing.assert_allclose(table["turning_rate"][tier], 2.5 * poses[:, 2])
+    assert table["units"] == {
+        "amplitude": "amplitude of the ellipse (scale)", "x": "m", "y": "m", "net_distance": "m", "heading": "rad",
+        "estimate": "BL", "estimate_heading": "rad", "seconds": "s",
+        "frequency": "Hz", "speed": "m/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s",
+    }  # fmt: skip
+    plain = Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).study(amplitudes, ["area", "direct"])
+    assert {k: plain[k] for k in ("area", "direct", "estimate")} == {
+        k: table[k] for k in ("area", "direct", "estimate")
+    }
+    assert set(table) - set(plain) == {"frequency", "speed", "speed_body_lengths", "turning_rate"}
+    answer = cheapest(scene, amplitudes, 1e-2)
+    np.testing.assert_allclose(answer["speed"][answer["tier"]], 2.5 * np.array(answer["net_distance"][answer["tier"]]))
+    lines = report.text_table("s", table, scene).splitlines()
+    for unit, length in (("m", 1.0), ("BL", 0.3)):
+        (at,) = [k for k, x in enumerate(lines) if x.startswith(f"s: speed ({unit}/s) at 2.5 Hz")]
+        a, *_, direct, error = lines[at + 3].split()
+        assert (float(a), float(direct)) == (1.0, pytest.approx(table["speed"]["direct"][1] / length, abs=1e-6))
+        assert error == f"+-{table['estimate']['direct'][1] * 0.3 * 2.5 / length:.1e}"
+
+
+def test_tables_have_one_unit_a_row():
+    scene = scenes.parse(CHAIN)
+    table = Study(scene).study([1.0], ["direct"])
+    lines = report.text_table("s", table, scene).splitlines()
+    found = {}
+    for head, _, row in zip(lines[::3], lines[1::3], lines[2::3]):
+        if head.startswith("s: "):
+            found[head] = [float(x.removeprefix("+-")) for x in row.split()[1:]]
+    x, y, heading = table["direct"][0]
+    estimate, turned = table["estimate"]["direct"][0], table["estimate_heading"]["direct"][0]
+    wanted = [(v, 0.3 * estimate) for v in (np.hypot(x, y), x, y)] + [(heading, turned)]
+    for (head, row), (value, error), unit in zip(found.items(), wanted, ["(m)", "(m)", "(m)", "(rad)"]):
+        assert row == [pytest.approx(value, abs=1e-6), pytest.approx(error, rel=0.05)]
+        assert unit in head
+    assert [head.rpartition(": ")[2] for head in found][:3] == ["net distance, sqrt(x^2 + y^2)", "x", "y"]
+
+
+def test_sweeps_give_it(tmp_path):
+    scene = scenes.parse(CHAIN + GRAINS)
+    found = sweep.sweep(scene, {"gait.amplitude": [0.5, 1.0], "gait.frequency": [1.0, 2.5, 4.0]})
+    assert (np.diff(found["displacement"][..., 0]) != 0).all()  # grains that are pushed aside notice
+    np.testing.assert_allclose(found["frequency"], [[1.0, 2.5, 4.0]] * 2)
+    np.testing.assert_allclose(
+        found["speed"], np.hypot(*np.moveaxis(found["displacement"], -1, 0)[:2]) * [1.0, 2.5, 4.0]
+    )
+    alone = Study(scene.changed(gait=dataclasses.replace(scene.gait, amplitude=1.0))).study([1.0], ["direct"])
+    np.testing.assert_allclose(found["speed"][1, 1], alone["speed"]["direct"][0], rtol=1e-6)
+    (tmp_path / "s.toml").write_text(CHAIN)
+    over = ("--over", "body.length=0.1,0.2", "-o", "s.nc", "--plot", "s.png")
+    code, out, err = geomech("sweep", "s.toml", *over, cwd=tmp_path)
+    assert (code, err) == (0, "") and "speed" in out
+    with xarray.open_dataset(tmp_path / "s.nc") as data:
+        assert data.speed.attrs["units"] == "m s-1" and data.frequency.attrs["units"] == "Hz"
+        np.testing.assert_allclose(data.speed, np.hypot(data.displacement[:, 0], data.displacement[:, 1]) * 2.5)
+    timeless = sweep.sweep(scenes.parse(CHAIN.replace("frequency = 2.5", "")), {"gait.amplitude": [0.5]})
+    assert "speed" not in timeless
+
+
+def test_performance_speaks_the_scenes_own_unit():
+    fish = scenes.load("sandfish-loose").with_numerics(phases=32)
+    small = fish.changed(body=dataclasses.replace(fish.system.body, length=0.1))
+    plain = undulation.performance(small, [0.1, 0.22])
+    timed = undulation.performance(small.changed(gait=dataclasses.replace(fish.gait, frequency=3)), [0.1, 0.22])
+    assert set(timed) - set(plain) == {"distance", "speed", "speed_body_lengths", "velocity_per_second"}
+    for key in plain:
+        np.testing.assert_array_equal(plain[key], timed[key])
+    net = small.cycle(amplitudes=[0.1, 0.22]).net
+    np.testing.assert_allclose(timed["distance"], np.hypot(net[:, 0], net[:, 1]))
+    np.testing.assert_allclose(timed["speed"], 3 * timed["distance"])
+    np.testing.assert_allclose(timed["speed_body_lengths"], 30 * timed["distance"])
+    np.testing.assert_allclose(timed["velocity_per_second"], plain["velocity"] * [0.1, 0.1, 1.0] * 6 * np.pi)
+
+
+def test_the_command_gives_it(tmp_path):
+    (tmp_path / "s.toml").write_text(CHAIN)
+    args = ("--amplitudes", "1", "--methods", "direct", "--json")
+    table = json.loads(geomech("displacement", "s.toml", *args, cwd=tmp_path)[1])
+    assert table["speed"]["direct"][0] == pytest.approx(2.5 * table["net_distance"]["direct"][0])
+
+
+@pytest.mark.parametrize("top", [0.03, 0.22, 1.0, 1.3247, 2.5, 7.0, 999.0, 1e-5, 4e5])
+def test_amplitudes_of_tables_are_round(top):
+    steps = report.steps(top)
+    assert 6 <= len(steps) <= 15 and steps[-1] <= top * (1 + 1e-9) < steps[-1] + 1.01 * steps[0]
+    assert all(len(f"{a:e}".split("e")[0].rstrip("0")) <= 5 for a in steps)
+    np.testing.assert_allclose(np.diff(steps), steps[0], rtol=1e-9)
+    assert f"{steps[0]:e}".rstrip("0123456789").rstrip("e+-").rstrip("0") in ("1.", "2.", "2.5", "5.")

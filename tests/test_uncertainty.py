@@ -1,0 +1,211 @@
+"""What an uncertain medium does to a displacement, against many media drawn from its covariance."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import xarray
+from test_cli import geomech
+
+from geomech import scene as scenes
+from geomech.errors import SceneError
+from geomech.gaits import Ellipse
+from geomech.output import report, sweeps
+from geomech.scene import Scene
+from geomech.study import sweep, uncertainty
+from geomech.study.bench import Study
+from geomech.study.choose import cheapest
+from geomech.study.tables import QUANTITIES, of_pose
+from geomech.systems import Swimmer
+from rft import Chain, Granular, SkinFriction, Transient, Viscous
+
+GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))  # moves along, sideways and turns
+BODY = Chain((1, 1.4, 0.8), length=0.3, frame="link-1")
+COVARIANCE = ((0.012, -0.0012), (-0.0012, 0.0004))  # correlated
+
+
+def scene(medium, **changes):
+    return Scene(Swimmer(medium, BODY), GAIT, name="sand", **changes)
+
+
+def granular(scale=1.0):
+    return Granular(1.49, 0.22, covariance=scale**2 * np.array(COVARIANCE))
+
+
+def drawn(sand, draws, amplitudes, phases=16):
+    """QUANTITIES (draws, B, 4) in media of a scene with parameters off by the rows of ``draws``."""
+    systems = [sand.system.varied(d) for d in draws]
+    nets = [s.run(*sand.gait.cycle(phases, np.array(amplitudes))).net for s in systems]
+    return np.stack([np.stack(list(of_pose(n).values()), -1) for n in nets])
+
+
+def whitened(count, size, seed):
+    """Normal draws (count, size) whose own mean and covariance are exactly 0 and 1, so that few are many."""
+    z = np.random.default_rng(seed).normal(size=(count, size))
+    z -= z.mean(0)
+    return z @ np.linalg.inv(np.linalg.cholesky(np.cov(z.T, bias=True).reshape(size, size))).T
+
+
+def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
+    monkeypatch.setattr(uncertainty, "PHASES", 16)
+    sand, amplitudes = scene(granular()), [0.7, 1.2]
+    told = uncertainty.of_medium(sand, GAIT, np.array(amplitudes))
+    scatter = drawn(sand, whitened(80, 2, seed=1) @ uncertainty.root(COVARIANCE).T, amplitudes).std(0)
+    assert told["rule"] == ["linear", "linear"]
+    for k, quantity in enumerate(QUANTITIES):
+        np.testing.assert_allclose(told[quantity], scatter[:, k], rtol=0.03)
+    np.testing.assert_allclose(told["position"], np.hypot(told["x"], told["y"]))
+    assert (scatter > 1e-4).all()  # of every quantity there is something to see
+
+
+def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
+    """For a displacement quadratic in the parameters, y = a + b z + z C z / 2: variance |b|^2 + tr(C^2) / 2 over normal z."""
+    bend, slope = np.array([[3.0, 1.0], [1.0, -2.0]]), np.array([0.4, -0.3])
+    root = uncertainty.root(COVARIANCE)
+
+    class Quadratic:
+        length, covariance = 2.0, COVARIANCE
+
+        def __init__(self, step=(0.0, 0.0)):
+            self.step = np.array(step)
+
+        varied = staticmethod(lambda step: Quadratic(step))
+
+    def moved(system, gait, amplitudes):
+        z = np.linalg.solve(root, system.step)
+        return np.outer(amplitudes, [slope @ z, slope @ z + z @ bend @ z / 2, 0.0])
+
+    monkeypatch.setattr(uncertainty, "_moved", moved)
+    sand = type("Sand", (), {"system": Quadratic(), "name": "sand"})()
+    told = uncertainty.of_medium(sand, GAIT, np.array([1.0, 3.0]))
+    assert told["rule"] == ["second order"] * 2
+    np.testing.assert_allclose(told["x"], 0.5 * np.array([1, 3]))
+    np.testing.assert_allclose(told["y"], np.sqrt(0.25 + np.trace(bend @ bend) / 2) * np.array([1, 3]))
+    assert (told["heading"] == 0).all()
+    bend *= 0.01
+    told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
+    assert told["rule"] == ["linear"]
+    np.testing.assert_allclose(told["y"], 0.5)
+
+
+def test_a_wide_covariance_is_carried_on_to_second_order(monkeypatch):
+    """Where the drag is almost the same in all directions, the turn of a viscous swimmer is far from linear in its ratio."""
+    monkeypatch.setattr(uncertainty, "PHASES", 16)
+    wide = scene(Viscous(1.15, ((0.3**2,),)))
+    told = uncertainty.of_medium(wide, GAIT, np.array([0.7]))
+    near = uncertainty.of_medium(scene(Viscous(1.15, ((0.03**2,),))), GAIT, np.array([0.7]))
+    assert (told["rule"], near["rule"]) == (["second order"], ["linear"])
+    scatter = drawn(wide, 0.3 * whitened(100, 1, seed=3), [0.7]).std(0)[0]
+    linear = [10 * near[q][0] for q in ("x", "y", "heading")]
+    np.testing.assert_allclose([told["x"][0], told["y"][0]], scatter[:2], rtol=0.02)
+    assert linear[2] < 0.9 * told["heading"][0] < told["heading"][0] < scatter[2]
+
+
+def test_roots():
+    for matrix, rank in (
+        (COVARIANCE, 2), (((4.0, 6.0), (6.0, 9.0)), 1), (((1e-12, 0.0), (0.0, 1e6)), 2), (((0.0, 0.0), (0.0, 2.0)), 1)
+    ):  # fmt: skip
+        root = uncertainty.root(matrix)
+        np.testing.assert_allclose(root @ root.T, matrix, rtol=1e-12, atol=1e-30)
+        assert root.shape == (2, rank)
+    assert uncertainty.root(((0.0, 0.0), (0.0, 0.0))).shape == (2, 0)
+    certain = uncertainty.of_medium(scene(Granular(1.49, 0.22, covariance=np.zeros((2, 2)))), GAIT, np.array([1.0]))
+    assert certain["position"] == [0.0] and certain["rule"] == ["linear"]
+
+
+def test_every_tier_has_it_beside_its_own_error():
+    sand = scene(granular()).with_numerics(grid=7, phases=64)
+    table = Study(sand).study([0.5, 1.0], ["area", "direct"])
+    told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
+    for tier in ("area", "direct"):
+        np.testing.assert_allclose(table["medium_error"][tier], told["position"] / 0.3)
+        np.testing.assert_allclose(table["medium_error_heading"][tier], told["heading"])
+    assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {q: told[q].tolist() for q in QUANTITIES}
+    plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study([0.5, 1.0], ["area", "direct"])
+    assert {k: plain[k] for k in ("area", "direct", "x")} == {k: table[k] for k in ("area", "direct", "x")}
+    assert not [key for key in plain if key.startswith("medium")]
+    answer = cheapest(sand, [0.5, 1.0], 1e-2)
+    np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"] / 0.3)
+    text = report.text_table("sand", table, sand).splitlines()
+    row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
+    assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
+    assert [x for x in text if x.startswith("medium: one standard deviation")] and "linear" in text[-3]
+
+
+def test_effects_and_time_stepping_feel_it(monkeypatch):
+    """By central differences of the whole cycle in the ratio, the one parameter of a viscous medium."""
+    monkeypatch.setattr(uncertainty, "PHASES", 16)
+    for effects in ((SkinFriction(0.1, 0.15),), (Transient(0.1),)):
+        sand = scene(Viscous(2.5, ((0.04**2,),))).changed(effects=effects).with_numerics(cycles=1)
+        told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
+        nets = [sand.changed(medium=Viscous(2.5 + h)).cycle(phases=16).net for h in (0.01, -0.01)]
+        np.testing.assert_allclose(
+            [told[q][0] for q in QUANTITIES[:3]], np.abs(nets[0] - nets[1]) * 2, rtol=0.01, atol=1e-7
+        )
+
+
+def test_it_costs_what_is_told():
+    sand = scene(granular()).with_numerics(phases=64)
+    certain = sand.changed(medium=Granular(1.49, 0.22))
+    more = Study(sand).cost([1.0, 1.5], ["direct"]).balances - Study(certain).cost([1.0, 1.5], ["direct"]).balances
+    assert more == 6 * 2 * uncertainty.PHASES == uncertainty.points(sand.system) * 2 * uncertainty.PHASES
+
+
+def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(monkeypatch, tmp_path):
+    wide = scene(Granular(1.49, 0.22, covariance=((4.0, 0.0), (0.0, 1e-4))))
+    monkeypatch.setattr(Swimmer, "run", lambda *args: pytest.fail("computed"))
+    with pytest.raises(
+        SceneError, match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C "
+    ):
+        Study(wide).study([1.0], ["direct"])
+    with pytest.raises(SceneError, match="there is no medium"):
+        cheapest(wide, [1.0], 1e-2)
+    with pytest.raises(SceneError, match="there is no medium"):
+        sweep.sweep(wide, {"gait.amplitude": [1.0]})
+    with pytest.raises(SceneError, match="there is no medium"):  # at one end only
+        sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]})
+
+
+def test_the_command_gives_it(tmp_path):
+    (tmp_path / "s.toml").write_text(
+        '[medium]\nlaw = "granular"\nC = 1.49\ngamma0_deg = 12.6\ncovariance = [[0.012, -0.0012], [-0.0012, 0.0004]]\n'
+        '[body]\nkind = "chain"\n[gait]\nkind = "circle"\n[numerics]\nphases = 64\n'
+    )
+    args = ("displacement", "s.toml", "--amplitudes", "1.0", "--methods", "direct", "--json", "--plot", "d.svg")
+    code, out, err = geomech(*args, cwd=tmp_path)
+    assert (code, err) == (0, "")
+    table, loaded = json.loads(out), scenes.load(tmp_path / "s.toml")
+    told = uncertainty.of_medium(loaded, loaded.gait, np.array([1.0]))
+    assert table["medium_error"]["direct"] == pytest.approx(told["position"])
+    assert table["units"]["medium_error"] == "BL"
+    assert "medium, one standard deviation" in (tmp_path / "d.svg").read_text()
+
+
+def test_sweeps_have_it(tmp_path):
+    sand = scene(granular()).with_numerics(phases=32).changed(gait=dataclasses.replace(GAIT, frequency=2.0))
+    over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
+    found = sweep.sweep(sand, over)
+    told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
+    np.testing.assert_allclose(found["medium_error"], [told["position"] / 0.3] * 2, rtol=1e-6)
+    np.testing.assert_allclose(found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6)
+    again = sweep.sweep(sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]})  # two gaits in one batch
+    np.testing.assert_allclose(again["medium_error"][0, 0], told["position"][1] / 0.3, rtol=1e-6)
+    turned = dataclasses.replace(GAIT, tilt=0.5)
+    told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"] / 0.3
+    np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
+    many = sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})  # more than go together
+    np.testing.assert_allclose(many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6)
+    sweeps.save(tmp_path / "s.nc", sand, found)
+    with xarray.open_dataset(tmp_path / "s.nc") as data:
+        np.testing.assert_allclose(data.medium_error, found["medium_error"])
+        assert data.medium_error.attrs["units"] == "body length"
+    one = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
+    (_, band) = sweeps.draw(sand, one).axes[0].collections
+    net, _, medium, _ = sweeps.drawn(sand, one)
+    np.testing.assert_allclose(medium, 0.3 * one["frequency"] * one["medium_error"])
+    box = band.get_datalim(band.axes.transData)
+    assert (box.y0, box.y1) == (pytest.approx((net - medium).min()), pytest.approx((net + medium).max()))
+    assert "medium_error" not in sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
+    more = sweep.cost(sand, over).balances - sweep.cost(sand.changed(medium=Granular(1.49, 0.22)), over).balances
+    assert more == 6 * 4 * uncertainty.PHASES
