@@ -13,28 +13,17 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import typer
 
 from geomech.errors import Note
+from geomech.progress import progress
+
+__all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
-
-
-@contextlib.contextmanager
-def progress(title: str) -> Iterator[Callable[[float], None]]:
-    """A function that takes the fraction done: a bar on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
 
 
 class Stopped(BaseException):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Body, Kinematics
+from rft.bodies.base import Body, Kinematics, pace
 from rft.bodies.pieces import PIECES
 from rft.effects.base import Effect, broken, engine, folded, pieced
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
@@ -77,7 +77,7 @@ def body_velocity(
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
-    speed = np.sqrt((alphadot * alphadot).sum(0))
+    speed = pace(body, alphadot)
     moving = speed > 0
     body = pieced(body, effects, pieces)
     problem = Balance.of(folded(effects, medium, body, loads), body, regularisation, tolerance)

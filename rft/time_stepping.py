@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Kinematics, halves
+from rft.bodies.base import Body, Kinematics, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.contact import Model
 from rft.effects.base import Effect, Site, broken, folded, pieced, under_way
@@ -183,7 +183,7 @@ class _Steps:
         self.phases, samples = len(alpha), alpha.shape[-1]
         self.dt = 2 * np.pi / self.phases
         self.heavy = bool(broken(effects) & Premise.QUASI_STATIC)
-        speed = np.sqrt((alphadot**2).sum(1))
+        speed = np.stack([pace(body, rates) for rates in alphadot])
         usual = np.sqrt((speed**2).mean(0))
         usual = np.where(usual > 0, usual, 1.0)
         self.scales = np.where(speed > PAUSE * usual, speed, usual)

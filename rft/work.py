@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Kinematics, halves
+from rft.bodies.base import Body, Kinematics, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.contact import SIDE, Model
 from rft.effects.base import Effect, broken, folded, pieced
@@ -54,7 +54,7 @@ def work_done(
     model = folded(effects, medium, pieces_of, loads)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    eps = regularisation * np.sqrt((alphadot**2).sum(0))
+    eps = regularisation * pace(body, alphadot)
     done = done_by(model, halves(body), model.motions(pieces_of.motion(alpha, alphadot)), xi, eps)
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 

@@ -3,7 +3,7 @@
 import math
 import pathlib
 
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points
+from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Wave
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from rft import (
     Backbone,
@@ -42,6 +42,7 @@ BODIES = {
     "three-middle": Chain((1, 1, 1), frame="link-2"),
     "uneven": Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
     "five": Chain((1,) * 5),
+    "modes": Chain((0.8, 1.3, 1.0, 0.7), 0.3, "link-2", modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))),
     "serpenoid": Serpenoid(elements=24, waves=1.5),
     "arcs": ConstantCurvature(elements=12, sections=3, frame="link-4"),
     "backbone": Backbone(elements=9, length=0.1),
@@ -54,6 +55,7 @@ GAITS = {
     "backwards": Butterfly(reverse=True),
     "fourier": Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0))),
     "points": Points(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9))),
+    "wave": Wave(amplitude=0.8, waves=0.6, offset=0.2, joints=2),
 }
 
 SYSTEMS = {

@@ -19,6 +19,8 @@ PINNED = {
     "sandfish-loose": (0.354014795, -0.0870573091, 0.0),
     "sandfish-transient": (0.3150914477, -0.08373435809, 0.0),
     "serpenoid-glass": (0.359597894, 0.0, 0.0),
+    "seven-link-modes": (0.249123776, 0.0, 0.0),
+    "seven-link-wave": (0.249123776, 0.0, 0.0),
     "shovel-nosed-snake": (0.178712041, -3.32132635e-05, 0.0),
     "three-link-coulomb": (-0.00628353877, -0.000775375048, 0.0),
     "three-link-glass": (0.0634476015, 0.00687549129, 0.0),
@@ -86,7 +88,7 @@ def granular(C, gamma0_deg):
     return law
 
 
-LOOSE, CLOSE = granular(1.8, 13.8), granular(0.77 / 0.59, 12.21)
+LOOSE, CLOSE, GRAINS = granular(1.8, 13.8), granular(0.77 / 0.59, 12.21), granular(1.49, 12.6)
 VISCOUS, COULOMB = lambda a, u, eps: (a, 2 * u), granular(0.0, 10.0)
 
 
@@ -151,6 +153,8 @@ INDEPENDENT = {
     "serpenoid-glass": (LOOSE, serpenoid(6.0, 40), None, None),
     "sandfish-loose": (LOOSE, sine(0.22, 1.0, 100), head(0.06, 1.8, 13.8), None),
     "sandfish-close": (CLOSE, sine(0.22, 1.0, 100), head(0.06, 0.77 / 0.59, 12.21), None),
+    "seven-link-modes": (GRAINS, serpenoid(7 * 0.87, 7), None, None),
+    "seven-link-wave": (GRAINS, serpenoid(7 * 0.87, 7), None, None),
     "shovel-nosed-snake": (snake_skin, sine(0.2, 3.5, 140), head(0.014, 1.8, 13.8), None),
 }
 

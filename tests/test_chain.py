@@ -10,6 +10,7 @@ from rft import Chain
 def by_hand(body, alpha):
     """Headings (n,) and centres (n, 2) of the links in the body's frame, one link after the other; unit body."""
     lengths = np.array(body.lengths) / sum(body.lengths)
+    alpha = alpha if body.modes is None else sum(m * np.array(row) for m, row in zip(alpha, body.modes))
     headings, centres, tip = [], [], np.zeros(2)
     heading = 0.0
     for k, length in enumerate(lengths):

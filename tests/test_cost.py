@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.io import netcdf_file
 from test_cli import geomech as run
 
 from geomech import connection, harmonics, terminal
@@ -27,6 +28,11 @@ SLOPING = scenes.parse(
     scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 10")
     + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
 )
+FIVE_LINKS = (
+    GLASS.text.partition("[gait]")[0].replace("[1, 1, 1]", "[1, 1.2, 1, 0.8, 1]")
+    + '[gait]\nkind = "wave"\njoints = 4\namplitude = 0.4\n'
+)
+FIVE = scenes.parse(FIVE_LINKS)
 
 
 @pytest.fixture
@@ -49,6 +55,8 @@ def solved(monkeypatch):
         (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
         (GLASS.with_numerics(grid=9, phases=40), ("path",)),
         (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
+        (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
+        (FIVE.with_numerics(grid=4, directions=16), ("path",)),
         (VISCOUS, ("area", "path", "harmonic", "direct")),
         (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
         (SLOPING.with_numerics(phases=64, cycles=2), ("direct",)),
@@ -91,6 +99,8 @@ LARGE = {
     "amplitudes": ["displacement", "three-link-glass", "--amplitudes", "0.1:2:99999"],
     "amplitudes of a sweep": ["sweep", "three-link-glass", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
+    "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
+    "a tier that looks it up": ["displacement", "five.toml", "--amplitudes", "0.5", "--methods", "path"],
     "a map": ["ccf", "three-link-glass", "--grid", "1414", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
@@ -107,6 +117,7 @@ def large(tmp_path, monkeypatch):
     """A folder with scenes that ask for much."""
     for name, value in (("directions", 4096), ("harmonics", 999), ("phases", 1_000_000)):
         (tmp_path / f"{name}.toml").write_text(f"{GLASS.text}\n[numerics]\n{name} = {value}\n")
+    (tmp_path / "five.toml").write_text(FIVE_LINKS)
     fish = scenes.load("sandfish-loose").text
     (tmp_path / "elements.toml").write_text(fish.replace("elements = 100", "elements = 2000"))
     monkeypatch.chdir(tmp_path)
@@ -135,6 +146,21 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
     assert np.hypot(*json.loads(out)["direct"][0][:2]) == pytest.approx(0.0512808, abs=1e-6)
     for args in (["run", "three-link-viscous", "-o", "d"], ["accuracy", "three-link-viscous", "-o", "d"]):
         assert "say --yes" in run(*args)[2]
+
+
+def test_a_field_of_four_joints_is_written(large, monkeypatch):
+    """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
+    monkeypatch.setattr("geomech.commands.options.WORTH_SAYING", 0.0)
+    code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
+    assert (code, out) == (0, "")
+    assert err.startswith("five.toml: 8,192 force balances, about 1 s of computing and 16")
+    with netcdf_file(large / "out.nc", mmap=False) as file:
+        A, axes = file.variables["A"][:].copy(), [file.variables[f"alpha_{k}"][:].copy() for k in (1, 2, 3, 4)]
+        assert file.variables["A"].dimensions == ("component", "joint", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
+        assert file.variables["fit_residual"].shape == (3, 4, 4, 4, 4) and "ccf" not in file.variables
+    unit, alpha = connection.directions(4, 64), np.array([axis[k] for axis, k in zip(axes, (3, 0, 2, 1))])
+    wanted = np.linalg.lstsq(unit, FIVE.system.velocity(alpha, unit), rcond=None)[0].T
+    np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
 
 def test_a_cost_reads_well():
@@ -249,7 +275,7 @@ def test_a_signal_stops_a_sweep_and_keeps_what_is_done(number, large, monkeypatc
     assert {p.name for p in large.iterdir()} - {kept.name} == {"v.toml", *(f"{n}.toml" for n in SCENES)}
 
 
-SCENES = ("directions", "harmonics", "phases", "elements")
+SCENES = ("directions", "harmonics", "phases", "elements", "five")
 
 
 def test_a_signal_stops_the_solvers_threads(large):

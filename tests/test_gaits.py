@@ -22,8 +22,7 @@ def test_amplitudes_are_a_batch_axis(name):
     gait = GAITS[name]
     alpha, alphadot = gait.cycle(16, [0.5, 2.0])
     assert alpha.shape == alphadot.shape == (2, 16, gait.joints)
-    centre = np.array(gait.centre or (0.0,) * gait.joints)
-    np.testing.assert_allclose((alpha[1] - centre) / 4, alpha[0] - centre, atol=1e-15)
+    np.testing.assert_allclose((alpha[1] - gait.middle) / 4, alpha[0] - gait.middle, atol=1e-15)
     np.testing.assert_allclose(gait.cycle(16)[0], gait.shape(2 * np.pi * np.arange(16) / 16), atol=1e-12)
 
 

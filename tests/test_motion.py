@@ -54,6 +54,8 @@ def drawn(lengths, bends, length, frame, pose):
 
 def bends_of(body, alpha):
     """Angles between elements, from what each body's docstring says."""
+    if getattr(body, "modes", None) is not None:
+        return np.asarray(alpha) @ body.modes
     if isinstance(body, Serpenoid):
         at = 2 * np.pi * body.waves * np.arange(1, body.elements) / body.elements
         return (alpha[0] * np.cos(at) + alpha[1] * np.sin(at)) / body.elements

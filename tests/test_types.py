@@ -48,7 +48,8 @@ RIGHT = {  # what looks wrong and is not
     ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
     ("covariance", "None"), ("Granular", "covariance", "array"), ("Viscous", "covariance", "deep"),
     *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
-    ("lengths", "list"), ("along", "list"), ("cos", "array"), ("sin", "array"),
+    ("lengths", "list"), ("along", "list"), ("cos", "array"), ("sin", "array"), ("modes", "None"), ("modes", "array"),
+    ("Chain", "waves", "None"),
     *itertools.product(("name", "text"), ("text", "digits")),
 }  # fmt: skip
 

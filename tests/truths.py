@@ -15,7 +15,8 @@ import numpy as np
 
 DATA = pathlib.Path(__file__).parent / "data"
 DECIMALS = 13  # below are rounding and the machine
-LATER = {"covariance", "frequency"}  # fields younger than some answers: where they are None the question is the old one
+# Fields younger than some answers: where they are None the question is the old one.
+LATER = {"covariance", "frequency", "modes", "waves"}
 
 
 def spelled(value) -> str:

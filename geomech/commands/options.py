@@ -39,6 +39,8 @@ MediumOption = Annotated[
     ),
 ]
 
+WORTH_SAYING = 1.0  # s that a field takes
+
 
 def folder(text: str | Path) -> Path:
     """The folder of that name; an empty one is refused."""
@@ -203,13 +205,13 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
     return values
 
 
-def allow(scene, cost, yes: bool) -> None:
-    """Say what is to come if it takes long, or otherwise than expected; SceneError if it takes too long to be begun
-    without --yes."""
+def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
+    """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError if it takes too
+    long to be begun without --yes."""
     cost.check(scene.name, yes)
     for line in scene.system.notes:
         note(f"{scene.name}: {line}")
-    if not cost.small:
+    if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
         terminal.tell(f"{scene.name}: {cost}")
 
 
@@ -243,12 +245,13 @@ def field(
     with named(scene.name):
         TIERS["path"].refuse(scene.system)
         if maps and joints != 2:
-            raise SceneError(f"{scene.name}: maps of shape space take a body of two joints, this one has {joints}")
+            two = f"maps of shape space take a body of two joints, or modes, this one has {joints}"
+            raise SceneError(f"{scene.name}: {two}: give a chain two [body] modes")
         if with_gait:
             study.refuse_outside()
         check_outputs(scene, output, plot)
         tiers = ["path", *(["harmonic"] if harmonics and "harmonic" in study.lookups else [])]
-        allow(scene, price([built(scene, tier) for tier in tiers]), yes)
+        allow(scene, price([built(scene, tier) for tier in tiers]), yes, WORTH_SAYING)
     with terminal.progress(f"field of {scene.name}") as bar:
         for k, tier in enumerate(tiers):
             study.table(tier, progress=lambda done: bar((k + done) / len(tiers)))

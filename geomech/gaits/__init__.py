@@ -4,7 +4,7 @@ from geomech.gaits.base import Gait
 from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
-from geomech.gaits.waves import Sine
+from geomech.gaits.waves import Sine, Wave
 
 KINDS = {
     "circle": Circle,
@@ -13,7 +13,8 @@ KINDS = {
     "fourier": Fourier,
     "points": Points,
     "sine": Sine,
+    "wave": Wave,
     "centreline": Centreline,
 }
 
-__all__ = ["KINDS", "Butterfly", "Centreline", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine"]
+__all__ = ["KINDS", "Butterfly", "Centreline", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine", "Wave"]

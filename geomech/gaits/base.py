@@ -53,6 +53,11 @@ class Gait:
         return 2
 
     @property
+    def middle(self) -> np.ndarray:
+        """(joints,): the shape about which the gait moves, which it keeps at amplitude 0."""
+        return np.array(self.centre or (0.0,) * self.joints)
+
+    @property
     def amplitude_label(self) -> str:
         """For an axis of amplitudes."""
         return f"amplitude of the {type(self).__name__.lower()} (scale)"
@@ -65,8 +70,7 @@ class Gait:
 
     def shape(self, t, amplitudes=None) -> np.ndarray:
         """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
-        centre = np.array(self.centre or (0.0,) * self.joints)
-        return centre + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
+        return self.middle + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
 
     def largest(self, amplitudes=None) -> float:
         """The largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""

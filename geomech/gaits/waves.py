@@ -1,4 +1,4 @@
-"""Travelling waves of an inextensible body: the sandfish's gait (paper Sec. III B)."""
+"""Travelling waves: of the joint angles of a chain, and of an inextensible body, the sandfish's gait (paper Sec. III B)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,48 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.errors import number, real_array
-from geomech.gaits.base import Gait
+from geomech.gaits.base import LARGEST, Gait
+from geomech.gaits.fourier import Series
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wave(Series):
+    """A travelling wave of joint angles: alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)), k = 1, 2 ... from
+    the tail. It runs from head to tail, which drives the body head first where drag across exceeds that along; with
+    waves < 0, or reverse, from tail to head; with waves = 0 all joints move alike.
+
+    amplitude (rad): of each joint. waves (-): on the body, at most half as many as links. offset (rad): of all joints, which
+    turns the body. joints (-): of the body, one fewer than links.
+
+    In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
+    reverse.
+    """
+
+    amplitude: float = 0.5
+    waves: float = 1.0
+    offset: float = 0.0
+    joints: int = 6
+    angles = ("centre", "amplitude", "offset")
+
+    def __post_init__(self):
+        number("joints", self.joints, 1, 10_000, whole=True)
+        object.__setattr__(self, "joints", int(self.joints))
+        half = (self.joints + 1) / 2  # more look like fewer that run the other way
+        number("waves", self.waves, -half, half)
+        number("offset", self.offset, -LARGEST, LARGEST)
+        super().__post_init__()
+
+    @property
+    def middle(self) -> np.ndarray:
+        return super().middle + self.offset
+
+    @property
+    def amplitude_label(self) -> str:
+        return "amplitude of the joint angles (rad)"
+
+    def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
+        phase = 2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
+        return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ def save_connection(path: str | Path, study: Study) -> None:
         for key, value in attributes(study).items():
             text = isinstance(value, str)  # SciPy keeps but seven digits of a float of Python's
             setattr(file, key, attribute(value) if text else np.float64(value) if isinstance(value, float) else value)
-        _coordinates(file, study.fitted)
+        _coordinates(file, study.fitted, study.scene.system.shape_labels)
         for name, dimensions, values, units, long_name in found:
             for dimension, size in zip(dimensions, values.shape):
                 if dimension not in file.dimensions:
@@ -144,7 +144,7 @@ def attribute(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
 
 
-def _coordinates(file, fitted) -> None:
+def _coordinates(file, fitted, labels) -> None:
     width = max(map(len, COMPONENTS))
     file.createDimension("component", len(COMPONENTS))
     file.createDimension("component_length", width)
@@ -155,7 +155,8 @@ def _coordinates(file, fitted) -> None:
     file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
     for k, (name, axis) in enumerate(zip(angles_of(fitted.axes), fitted.axes)):
         file.createDimension(name, len(axis))
-        _variable(file, name, axis, (name,), "rad", angle_of(k))
+        label, unit = labels[k]
+        _variable(file, name, axis, (name,), unit, angle_of(k) if label == name else f"shape variable {label}")
 
 
 def _variable(file, name, values, dimensions, units, long_name) -> None:

@@ -96,8 +96,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         size = abs(gait.amplitude)
         found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in found]
-    centre = np.array(gait.centre or (0.0,) * gait.joints)
-    room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), centre))
+    room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle))
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
     return [float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())]

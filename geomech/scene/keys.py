@@ -180,6 +180,8 @@ def _table(title: str, about: str, keys: list[Key]) -> str:
 
 
 def _words(schema: dict, several: bool = False) -> str:
+    if "anyOf" in schema:
+        return " or ".join(_words(x, several) for x in schema["anyOf"] if x.get("type") != "null")
     if schema.get("type") == "array":
         inner = schema.get("items") or schema["prefixItems"][0]
         count = f"{schema['minItems']} " if "minItems" in schema else ""

@@ -83,7 +83,7 @@ def _check_joints(system: System, gait: Gait) -> None:
     if gait.joints != system.joints:
         raise ValueError(
             f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but [body] has {system.joints}: give the body "
-            "one link more than the gait has joints, or another gait"
+            "one link more than the gait has joints, or as many modes, or another gait"
         )
 
 

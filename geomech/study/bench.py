@@ -15,6 +15,7 @@ from geomech.errors import SceneError, choose, named, real_array, short
 from geomech.field import Field, inside
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
+from geomech.progress import progress as shown
 from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, estimate, tables, uncertainty
 from geomech.study.offer import METHODS, lookups, methods, tiers
@@ -79,8 +80,17 @@ class Study:
             how = TIERS[choose("methods", tier, METHODS)]
             how.refuse(self.scene.system)
             reach = how.reach(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
-            make = lambda: how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
+            make = lambda: self._made(how, reach, progress)
             return self._kept(how.looks_up, how.depends_on, reach, make)
+
+    def _made(self, how, reach: tuple, progress: Callable | None):
+        """The table of a tier; how far it is, if nobody wants to be told, is shown where it takes long."""
+        if progress:
+            return how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
+        s = self.scene
+        solves = how.solves(s.system, s.numerics, 1, s.numerics.phases)
+        with shown(f"{how.looks_up} of {s.name}, {solves:,} force balances", bar=False) as bar:
+            return how.table(s.system, s.numerics, *reach, progress=bar)
 
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""

@@ -19,7 +19,6 @@ from geomech.errors import SceneError
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study import estimate, uncertainty
-from geomech.study.offer import lookups as looked_up
 from geomech.tiers import TIERS
 from geomech.tiers.path import axes
 
@@ -108,7 +107,7 @@ def _size(memory: float) -> str:
 def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = None, tables: bool = True) -> list[Job]:
     """`Study.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
     gait, phases = gait or scene.gait, scene.numerics.phases
-    lookups = [m for m in methods if m in looked_up(scene.system)]
+    lookups = [m for m in methods if not TIERS[m].is_direct(scene.system)]
     shared = {TIERS[m].looks_up: m for m in reversed(lookups)}
     jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
     jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups]
@@ -199,7 +198,8 @@ def _per_step(job: Job, count: float) -> tuple[float, int]:
         found = system.time_steps(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or time_steps(1, None)[0]
+    cycles = time_steps(1, system.solver.cycles and 1)[0]  # also loads what the first steps load
+    return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or cycles
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:

@@ -131,6 +131,7 @@ class Plain:
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
+        """(name, unit) of each shape variable, for axes."""
         return tuple((f"alpha_{k + 1}", "rad") for k in range(self.joints))
 
     @property

@@ -16,7 +16,7 @@ from geomech.systems.said import name_in, told
 from geomech.systems.solver import Solver
 from rft.balance import checked_body
 from rft.bodies import KINDS as BODIES
-from rft.bodies.base import halves
+from rft.bodies.base import halves, pace
 from rft.contact import Model
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
@@ -111,7 +111,7 @@ class Swimmer(Plain):
     @property
     def three_link(self) -> bool:
         """Whether the body is the three-link swimmer, for which the published gaits were made."""
-        return isinstance(self.body, rft.Chain) and self.joints == 2
+        return isinstance(self.body, rft.Chain) and len(self.body.lengths) == 3 and self.body.modes is None
 
     @property
     def joint_angles(self) -> bool:
@@ -201,7 +201,8 @@ class Swimmer(Plain):
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
         right. RuntimeError if a force balance did not converge or cycles did not become periodic."""
-        speed = np.sqrt((alphadot**2).sum(-1)).mean(-1)
+        rates = alphadot.reshape(-1, self.joints).T
+        speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.steps:
             samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
             each = dataclasses.replace(self, effects=tuple(e.take(samples) for e in self.effects))

@@ -142,6 +142,20 @@ class Wrapped:
     def joints(self) -> int:
         return self.inner.joints
 
+    def joint_angles(self, shape: np.ndarray) -> np.ndarray:
+        return _joint_angles(self.inner, shape)
+
+
+def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
+    """Angles of the joints where the shape variables are modes of them; else the shape variables."""
+    return body.joint_angles(shape) if hasattr(body, "joint_angles") else shape
+
+
+def pace(body: Body, alphadot: np.ndarray) -> np.ndarray:
+    """(B,): the size of rates (joints, B), by which velocities are scaled; of the joints' own where a body has modes."""
+    rates = _joint_angles(body, alphadot)
+    return np.sqrt((rates * rates).sum(0))
+
 
 def halves(body: Body) -> np.ndarray:
     """(n,): half lengths of a body's elements in body lengths."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from rft.bodies.base import Kinematics, numbered
+from rft.bodies.modes import checked, rows
 from rft.media.base import in_range, real_array, require, shown
 from rft.se2 import rotated
 
@@ -20,11 +22,18 @@ class Chain:
     lengths (-): relative link lengths, all > 0, at least two. length (m): the whole body, in the unit wanted for
     displacement; 1 for body lengths. frame (-): "mean", centre of mass of a uniform body and length-weighted mean heading
     (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
+
+    modes (-): rows of joint angles; then the shape variables are the modes' amplitudes m_1, m_2 ... in place of the joint
+    angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on the body
+    (`rft.bodies.modes`), of which a circle is a travelling wave. Speeds, and with them the regularisation, stay those of
+    the joints. waves (-): on the body, of serpenoid modes, 1 if left out.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
     length: float = 1.0
     frame: str = "mean"
+    modes: tuple[tuple[float, ...], ...] | str | None = None
+    waves: float | None = None
 
     def __post_init__(self):
         lengths = real_array("lengths", self.lengths)
@@ -37,15 +46,25 @@ class Chain:
         require(short >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {short:.3g}")
         in_range("length", self.length, 1e-15, 1e15)
         self._link_of(self.frame)
+        object.__setattr__(self, "modes", checked(self.modes, self.waves, len(self.lengths)))
 
     @property
     def joints(self) -> int:
-        return len(self.lengths) - 1
+        """Shape variables: joints between links, or modes of them."""
+        return len(self.lengths) - 1 if self.modes is None else len(self._rows)
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        return rows(self.modes, self.waves, len(self.lengths))
+
+    def joint_angles(self, shape: np.ndarray) -> np.ndarray:
+        """Joint angles (n - 1, B) of shapes (joints, B), or of rates alike."""
+        return shape if self.modes is None else self._rows.T @ shape
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
         """(name, unit) of each shape variable, for the axes of pictures."""
-        return numbered(self.joints)
+        return numbered(self.joints, "alpha_{}" if self.modes is None else "m_{}")
 
     @property
     def fractions(self) -> np.ndarray:
@@ -73,6 +92,7 @@ class Chain:
 
     def _links(self, alpha, alphadot):
         """Headings (n, B), their rates, and complex places and velocities of the link centres in the body frame."""
+        alpha, alphadot = self.joint_angles(alpha), self.joint_angles(alphadot)
         zero = np.zeros_like(alpha[:1])
         heading = np.concatenate([zero, np.cumsum(alpha, 0)])
         turn = np.concatenate([zero, np.cumsum(alphadot, 0)])
