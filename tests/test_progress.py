@@ -9,7 +9,7 @@ import pytest
 
 from geomech import progress, terminal
 from geomech import scene as scenes
-from geomech.progress import Course
+from geomech.progress import EVERY, Course
 from geomech.study.bench import Study
 from geomech.systems import Swimmer
 
@@ -17,7 +17,7 @@ VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)
 
 
 def test_lines_in_a_pipe(monkeypatch, capsys):
-    assert progress.EVERY == 10.0
+    assert EVERY == 10.0
     monkeypatch.setattr(progress, "EVERY", 0.02)
     said = ""
     with terminal.progress("field of <x>") as reached:
