@@ -21,10 +21,11 @@ import sys
 import tempfile
 
 import numpy as np
-from registry import BODIES, EFFECTS, MEDIA
+from registry import BODIES, EFFECTS, MEDIA, OUTLINES, STRESSES
 from scipy.io import netcdf_file
 
 import rft
+import rft.vertical
 from geomech import cli
 from geomech import scene as scenes
 from geomech.gaits import Ellipse
@@ -125,12 +126,22 @@ def commands():
             yield f"command, displacement, {tier}, estimate", errors
 
 
+def intrusions():
+    """Every stress map and outline: out of the ground, across the surface, deep and turning about itself, and at an angle."""
+    pose = [(0.0, 0.1, 0.3), (0.1, -0.01, 0.7), (0.0, -0.2, -1.2), (-0.3, -0.04, 2.5)]
+    twist = [(1.0, 0.0, 0.0), (0.02, -0.03, 1.1), (0.0, 0.0, -2.0), (-0.1, 0.04, 0.3)]
+    for (medium, stress), (name, shape) in itertools.product(STRESSES.items(), OUTLINES.items()):
+        found = rft.vertical.loads(stress, shape.outline(30), pose, twist)
+        yield f"intrusion, {medium}, {name}", np.column_stack([found.force, found.moment])
+
+
 # The quick ones first, each with what the names of its entries begin with.
 PARTS = {
     velocities: ("velocity", "work"),
     commands: ("connection", "sweep", "command"),
     tiers: ("tier",),
     marches: ("march",),
+    intrusions: ("intrusion",),
 }
 
 

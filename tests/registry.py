@@ -3,6 +3,8 @@
 import math
 import pathlib
 
+import numpy as np
+
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Wave
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from rft import (
@@ -23,6 +25,20 @@ from rft import (
     Viscous,
 )
 from rft.media import CATALOGUE
+from rft.vertical import (
+    VERTICAL,
+    CLeg,
+    FlatLeg,
+    HalfCylinder,
+    Plate,
+    PlateDrags,
+    Polygon,
+    RoundRod,
+    Spline,
+    SquareRod,
+    StressMap,
+    Wheel,
+)
 
 MEDIA = {
     **{name: entry.medium for name, entry in CATALOGUE.items()},
@@ -64,6 +80,31 @@ SYSTEMS = {
     "table": Table(
         pathlib.Path(__file__).parent / "data" / "uneven.nc"
     ),  # of the swimmer above; the file has its scene
+}
+
+# Stress maps and outlines of the vertical plane.
+PLATES = np.radians(np.meshgrid(np.arange(-60, 91, 30), np.arange(-90, 91, 30))).reshape(2, -1)
+STRESSES = {
+    **{name: entry.stress for name, entry in VERTICAL.items()},
+    "jumping": StressMap(zeta=0.7, grazing=0.0),
+    "no-tension": StressMap(zeta=1.3, tension="cut"),
+    "measured": PlateDrags(*PLATES, *StressMap(zeta=0.5, D10=0.1)(*PLATES)),
+}
+OUTLINES = {
+    "plate": Plate(length=0.04, width=0.02, tilt=0.3),
+    "round-rod": RoundRod(radius=0.02, width=0.03),
+    "half-cylinder": HalfCylinder(radius=0.02, width=0.03),
+    "half-cylinder, flat up": HalfCylinder(radius=0.02, width=0.03, flat="up"),
+    "square-rod": SquareRod(side=0.03, width=0.02),
+    "c-leg": CLeg(radius=0.038, width=0.025),
+    "c-leg, reversed": CLeg(radius=0.03, width=0.025, relative_curvature=-0.6),
+    "flat-leg": FlatLeg(radius=0.038, width=0.025),
+    "wheel": Wheel(radius=0.03, width=0.02),
+    "wheel, lugs": Wheel(radius=0.03, width=0.02, lugs=5, lug_height=0.006, lug_width=0.004),
+    "polygon": Polygon(points=((0.0, 0.0), (0.05, 0.01), (0.02, 0.02), (0.01, 0.05)), width=0.01),
+    "polygon, open": Polygon(points=((0.0, 0.0), (0.05, 0.01), (0.02, 0.02)), width=0.01, closed=False),
+    "spline": Spline(points=((0.0, 0.0), (0.0, 0.04), (0.03, 0.05), (0.04, 0.0)), width=0.01),
+    "spline, open": Spline(points=((0.0, 0.0), (0.02, -0.01), (0.04, 0.01)), width=0.01, closed=False),
 }
 
 # name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)

@@ -1,5 +1,6 @@
 """Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock time."""
 
+import math
 import time
 
 import numpy as np
@@ -10,6 +11,7 @@ from geomech import connection
 from geomech.gaits import Circle
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, body_velocity
+from rft.vertical import CLeg, Rotate, StressMap, loads
 
 pytestmark = pytest.mark.benchmark
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -94,3 +96,42 @@ def test_direct_tier_of_a_circle_to_four_digits():
             times.append(time.perf_counter() - start)
         print(f"\ncircle of {radius} rad to 1e-4: {n} phases, {1e3 * np.median(times):.1f} ms", end="")
         assert n <= 128
+
+
+def one_leg_pose(leg, coefficients, pose, twist):
+    """Force on a leg the usual way: a loop over midpoints, each with its angles."""
+    A00, A10, B11, B01, Bm11, C11, C01, Cm11, D10 = coefficients
+    total, cos, sin = np.zeros(2), math.cos(pose[2]), math.sin(pose[2])
+    for (x, z), (n_x, n_z), length in zip(leg.midpoints, leg.normals, leg.lengths):
+        x, z, n_x, n_z = cos * x + sin * z, cos * z - sin * x, cos * n_x + sin * n_z, cos * n_z - sin * n_x
+        depth = -(pose[1] + z)
+        if depth <= 0:
+            continue
+        b, g = math.atan2(n_x, -n_z), math.atan2(-twist[1] + twist[2] * x, twist[0] + twist[2] * z)
+        b, back = b - math.pi * round(b / math.pi), abs(g) > math.pi / 2
+        if back:
+            b, g = -b, math.copysign(math.pi, g) - g
+        a_z = A00 + A10 * math.cos(2 * b) + B11 * math.sin(2 * b + g) + B01 * math.sin(g) + Bm11 * math.sin(g - 2 * b)
+        a_x = C11 * math.cos(2 * b + g) + C01 * math.cos(g) + Cm11 * math.cos(g - 2 * b) + D10 * math.sin(2 * b)
+        total += 1e6 * depth * length * leg.width * np.array([a_x if back else -a_x, a_z])
+    return total
+
+
+def test_a_leg_at_360_angles():
+    """100 elements, against a loop over them."""
+    leg, numbers = CLeg(0.038, 0.025).outline(100), (0.206, 0.169, 0.212, 0.358, 0.055, -0.124, 0.253, 0.007, 0.088)
+    _, pose, twist = Rotate(hub_height=0.02, samples=360).course(leg)
+    ours, theirs = [], []
+    for _ in range(5):
+        start = time.perf_counter()
+        found = loads(StressMap(), leg, pose, twist)
+        ours.append(time.perf_counter() - start)
+        start = time.perf_counter()
+        force = [one_leg_pose(leg, numbers, *at) for at in zip(pose, twist)]
+        theirs.append(time.perf_counter() - start)
+    off = np.abs(force - found.force).max() / np.abs(found.force).max()
+    print(
+        f"\nleg of 100 elements at 360 angles: {1e3 * min(ours):.1f} ms, a loop {min(theirs) / min(ours):.0f} times as long"
+    )
+    assert off < 2e-3
+    assert min(theirs) > 15 * min(ours)

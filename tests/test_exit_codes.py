@@ -12,6 +12,9 @@ from geomech import cli
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
 
+INTRUDER = """[medium]\nname = "poppy-seeds-close"\nzeta = 1.1\n[intruder]\nkind = "half-cylinder"\nradius = 0.02\nwidth = 0.03
+[motion]\nkind = "drag"\ndepth = 0.01\ndirection_deg = 20\n[numerics]\nelements = 30\n"""
+
 # What each command takes beside its scene. A new one needs its row.
 COMMANDS = {
     "run": ["-o", "out"],
@@ -25,10 +28,15 @@ COMMANDS = {
     "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
     "calibrate": ["-o", "out.toml", "--plot", "out.svg"],
     "explain": [],
+    "stress": ["--beta", "30", "--gamma", "-50", "--plot", "out.svg"],
+    "intrude": ["-o", "out.csv", "--plot", "out.svg"],
     "scenes": [],
     "keys": [],
 }
-SUBJECT = {"scenes": [], "keys": [], "calibrate": ["dem-rod-drag"]}  # where it is no scene
+# Where it is no scene with a gait.
+SUBJECT = {
+    "scenes": [], "keys": [], "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"],
+}  # fmt: skip
 SOLVING = [name for name in COMMANDS if name not in ("explain", *SUBJECT)]
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
 
@@ -42,6 +50,7 @@ def ended(tmp_path, monkeypatch, capsys):
     """Runs a command in a folder with a small scene: (exit code, standard output, standard error, files left)."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "intruder.toml").write_text(INTRUDER)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def run(*args):
@@ -49,7 +58,12 @@ def ended(tmp_path, monkeypatch, capsys):
         with pytest.raises(SystemExit) as left:
             cli.main()
         said = capsys.readouterr()
-        return left.value.code, said.out, said.err, {p.name for p in tmp_path.iterdir()} - {"small.toml"}
+        return (
+            left.value.code,
+            said.out,
+            said.err,
+            {p.name for p in tmp_path.iterdir()} - {"small.toml", "intruder.toml"},
+        )
 
     yield run
     for number, handler in before.items():
@@ -93,11 +107,12 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
         refused(ended("scenes", "--show", "three-link-glas"), "did you mean 'three-link-glass'")
         refused(ended("keys", "gaits"), "did you mean 'gait'")
         return
-    what = "drag" if name == "calibrate" else "scene"
+    what = {"calibrate": "drag", "stress": "medium"}.get(name, "scene")
     refused(ended(name, "nothing", *COMMANDS[name]), f"{what}: 'nothing' is unknown")
+    may_do_without = ("run", "accuracy", "connection", "displacement", "calibrate", "stress", "intrude")
     for k in range(0, len(COMMANDS[name]), 2):
         option = COMMANDS[name][k]
-        if option in ("-o", "--plot") and name in ("run", "accuracy", "connection", "displacement", "calibrate"):
+        if option in ("-o", "--plot") and name in may_do_without:
             continue  # may be left out, or has a second option beside it
         if option == "--cycles":
             refused(
@@ -108,7 +123,10 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
             refused(ended(name, "small.toml", "-o", "out.nc"), "Missing option '--over'")
             continue
         rest = COMMANDS[name][:k] + COMMANDS[name][k + 2 :]
-        refused(ended(name, "small.toml", *rest), "Missing option '-o' / '--output'" if option == "-o" else option)
+        refused(
+            ended(name, *SUBJECT.get(name, ["small.toml"]), *rest),
+            "Missing option '-o' / '--output'" if option == "-o" else option,
+        )
 
 
 def failing(monkeypatch, how):

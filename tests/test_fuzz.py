@@ -36,7 +36,7 @@ def with_effects(text, rng):
     return "\n[[effects]]\n".join([text, *more])
 
 
-def mutated(text, rng):
+def mutated(text, rng, keys=KEYS, values=VALUES):
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
     for _ in range(rng.integers(1, 3)):
         k = rng.integers(len(lines))
@@ -46,11 +46,11 @@ def mutated(text, rng):
             case 1:
                 lines.insert(k, lines[rng.integers(len(lines))])
             case 2 if "=" in lines[k]:
-                lines[k] = lines[k].split("=")[0] + "= " + VALUES[rng.integers(len(VALUES))]
+                lines[k] = lines[k].split("=")[0] + "= " + values[rng.integers(len(values))]
             case 3 if "=" in lines[k]:
-                lines[k] = KEYS[rng.integers(len(KEYS))] + " =" + lines[k].split("=", 1)[1]
+                lines[k] = keys[rng.integers(len(keys))] + " =" + lines[k].split("=", 1)[1]
             case 4:
-                lines.insert(k, KEYS[rng.integers(len(KEYS))] + " = " + VALUES[rng.integers(len(VALUES))])
+                lines.insert(k, keys[rng.integers(len(keys))] + " = " + values[rng.integers(len(values))])
             case 5 | 6 if "=" in lines[k]:
                 lines[k] = re.sub(r"\d+(\.\d+)?", lambda _: f"{10 ** rng.uniform(-2, 1):.3g}", lines[k])
             case 7:

@@ -8,7 +8,13 @@ import pytest
 
 @pytest.mark.parametrize(
     ("part", "least"),
-    [(golden.velocities, 150), (golden.commands, 15), (golden.tiers, 30), (golden.marches, 50)],
+    [
+        (golden.velocities, 150),
+        (golden.commands, 15),
+        (golden.tiers, 30),
+        (golden.marches, 50),
+        (golden.intrusions, 100),
+    ],
     ids=lambda x: getattr(x, "__name__", ""),
 )
 def test_nothing_changed_that_nobody_meant_to_change(part, least):

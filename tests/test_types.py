@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from registry import GAITS, SYSTEMS
+from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 
 import rft
 from geomech import connection, curvature, family, harmonics, kinds, reconstruct
@@ -15,7 +15,7 @@ from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.output.explain import explain
-from geomech.scene import Numerics, Scene
+from geomech.scene import IntruderScene, Numerics, Scene
 from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
@@ -24,6 +24,7 @@ from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2
+from rft.vertical import SHAPES, Drag, Path, Penetrate, Rotate
 
 WRONG = {
     "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
@@ -42,6 +43,10 @@ PARTS = {
     "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
     "table, system": SYSTEMS["table"],
     "Sine": Sine(elements=8), **{type(gait).__name__: gait for gait in GAITS.values()},
+    **{name: OUTLINES[name] for name in SHAPES}, **{name: STRESSES[name] for name in ("generic", "measured")},
+    "Outline": OUTLINES["c-leg"].outline(3), "Drag": Drag(0.1), "Penetrate": Penetrate(0.1), "Rotate": Rotate(0.1),
+    "Path": Path((0, 1, 2), (0, 1, 2), (0, 1, 0)),
+    "IntruderScene": IntruderScene(STRESSES["generic"], OUTLINES["plate"], Drag(0.1)),
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
@@ -50,6 +55,8 @@ RIGHT = {  # what looks wrong and is not
     *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
     ("lengths", "list"), ("along", "list"), ("cos", "array"), ("sin", "array"), ("modes", "None"), ("modes", "array"),
     ("Chain", "waves", "None"),
+    ("closed", "true"), ("angle", "empty"),
+    ("bends", "None"),
     *itertools.product(("name", "text"), ("text", "digits")),
 }  # fmt: skip
 

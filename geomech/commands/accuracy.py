@@ -16,19 +16,25 @@ def accuracy(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings."""
+    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
+    scene, for the number of elements."""
     from geomech.output import plots
-    from geomech.scene import inputs
+    from geomech.scene import IntruderScene, inputs, load
     from geomech.study import accuracy as study
+    from geomech.study import intrusion
 
-    scene = loaded(name)
+    scene = load(name)
+    if isinstance(scene, IntruderScene):
+        study, draw = intrusion, plots.elements_figure
+    else:
+        scene, draw = loaded(name), plots.work_precision_figure
     with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"accuracy of {scene.name}") as bar:
         allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)
         text = "\n".join([study.table(results), "", *study.sentences(results)])
         (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
         (folder / "accuracy.txt").write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
-        fig = plots.work_precision_figure(results)
+        fig = draw(results)
         for ending in ("png", "pdf"):
             plots.save(fig, folder / f"accuracy.{ending}")
     print(json.dumps(results) if as_json else f"{text}\nfiles in {out}: accuracy.json, .txt, .png, .pdf")

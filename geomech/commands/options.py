@@ -209,17 +209,27 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
     """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError if it takes too
     long to be begun without --yes."""
     cost.check(scene.name, yes)
-    for line in scene.system.notes:
+    for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
         note(f"{scene.name}: {line}")
     if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
         terminal.tell(f"{scene.name}: {cost}")
 
 
-def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
-    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
-    from geomech.scene import in_medium, load
+def scene_with_gait(name: str):
+    """The scene of that name; SceneError for one without a gait."""
+    from geomech.scene import Scene, load
 
     scene = load(name)
+    if not isinstance(scene, Scene):
+        raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
+    return scene
+
+
+def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
+    from geomech.scene import in_medium
+
+    scene = scene_with_gait(name)
     own = scene.system.stored("connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
@@ -227,6 +237,16 @@ def loaded(name: str, grid: int | None = None, extent: float | None = None, medi
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene
+
+
+def loaded_intruder(name: str):
+    """The intruder scene of that name; SceneError for one with a gait."""
+    from geomech.scene import Scene, load
+
+    scene = load(name)
+    if isinstance(scene, Scene):
+        raise SceneError(f"{name}: a scene with a gait has no [intruder]: see 'geomech scenes' for those that have")
+    return scene
 
 
 def field(

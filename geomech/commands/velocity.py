@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.options import JsonOption, SceneArgument, numbers
+from geomech.commands.options import JsonOption, SceneArgument, numbers, scene_with_gait
 from geomech.errors import named
 from geomech.files import note
 
@@ -19,9 +19,7 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
-    from geomech.scene import load
-
-    scene, asked = load(name), (("--alpha", alpha), ("--alphadot", alphadot))
+    scene, asked = scene_with_gait(name), (("--alpha", alpha), ("--alphadot", alphadot))
     for line in scene.system.notes:
         note(f"{scene.name}: {line}")
     with named(scene.name):

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -22,9 +23,13 @@ from geomech.scene.model import Numerics, Scene, checked_scene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
+if TYPE_CHECKING:
+    from geomech.scene.intruder import IntruderScene
+
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 LARGEST = 10_000_000  # bytes of a scene file
+INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,25 +46,37 @@ class Physical:
 
 
 def builtin_names() -> list[str]:
-    """Names of the scenes that ship with the package."""
-    return sorted(p.name.removesuffix(".toml") for p in _folder().iterdir() if p.name.endswith(".toml"))
+    """Names of the scenes with a gait that ship with the package."""
+    return _names(_folder())
+
+
+def intruder_names() -> list[str]:
+    """Names of the intruder scenes that ship with the package."""
+    return _names(_folder() / INTRUDERS)
+
+
+def _names(folder) -> list[str]:
+    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
 
 
 def _folder():
     return resources.files("geomech.scene") / "builtin"
 
 
-def load(scene: str | Path) -> Scene:
-    """The scene of a built-in name or a TOML file; SceneError, one line, if it is not one."""
+def load(scene: str | Path) -> Scene | IntruderScene:
+    """The scene of a built-in name or a TOML file, an `IntruderScene` if it has an [intruder]; SceneError, one line, if it is
+    not one."""
     if not isinstance(scene, (str, Path)):
         raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
     names = builtin_names()
     if str(scene) in names:
         return parse((_folder() / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
+    if str(scene) in intruder_names():
+        return parse((_folder() / INTRUDERS / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
     path = Path(scene)
     try:
         if path.suffix != ".toml" and not path.exists():
-            choose("scene", str(scene), names)
+            choose("scene", str(scene), names + intruder_names())
         text = read_text(path, LARGEST)
     except SceneError:
         raise
@@ -69,7 +86,7 @@ def load(scene: str | Path) -> Scene:
             f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
         ) from None
     made = parse(text, str(scene))
-    for line in getattr(made.system, "assumed", ()):
+    for line in getattr(getattr(made, "system", None), "assumed", ()):
         note(line)
     return made
 
@@ -86,14 +103,15 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     return scene.changed(medium=_medium(f"{scene.name}: [medium]", tables["medium"]), files=files)
 
 
-def inputs(scene: Scene) -> list[Path]:
-    """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system."""
-    own = [] if checked_scene(scene).name in builtin_names() else [scene.name]
-    named_in = (getattr(part, "file", None) for part in (scene.gait, scene.system))
-    return [Path(x) for x in (*own, *scene.files, *named_in) if x]
+def inputs(scene: Scene | IntruderScene) -> list[Path]:
+    """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system, or
+    of an intruder scene's parts."""
+    parts = () if hasattr(scene, "intruder") else (checked_scene(scene).gait, scene.system)
+    own = [] if scene.name in builtin_names() + intruder_names() else [scene.name]
+    return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
-def parse(text: str, name: str = "scene") -> Scene:
+def parse(text: str, name: str = "scene") -> Scene | IntruderScene:
     """The scene of a TOML text; SceneError if it is not one."""
     if not isinstance(text, str):
         raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
@@ -104,10 +122,14 @@ def parse(text: str, name: str = "scene") -> Scene:
     return from_tables(tables, name, text)
 
 
-def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene:
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | IntruderScene:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
+    if {"intruder", "motion"} & {*tables}:
+        from geomech.scene import intruder  # which reads tables with what is here
+
+        return intruder.from_tables(tables, name, text)
     for table in tables:
         choose(f"{name}: table", table, TABLES)
     for table in ("gait",) if "system" in tables else ("medium", "body", "gait"):

@@ -22,10 +22,12 @@ from geomech.output.plots.maps import (
 from geomech.output.plots.motion import LINES, filmstrip, stage
 from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
 from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
+from geomech.output.plots.terradynamics import elements_figure, intrusion_figure, stress_figure
 
 __all__ = [
     "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
     "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure", "draw_gait", "drawable",
-    "figure", "filmstrip", "largest", "medium_band", "net", "quantity", "save", "shape_space", "stage", "styled",
-    "unknown", "vector_field", "work_precision", "work_precision_figure",
+    "elements_figure", "figure", "filmstrip", "intrusion_figure", "largest", "medium_band", "net", "quantity", "save",
+    "shape_space", "stage", "stress_figure", "styled", "unknown", "vector_field", "work_precision",
+    "work_precision_figure",
 ]  # fmt: skip

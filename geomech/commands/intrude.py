@@ -1,0 +1,41 @@
+"""geomech intrude."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from geomech.commands.options import JsonOption, PlotOption, SceneArgument, allow, check_outputs, loaded_intruder
+from geomech.errors import SceneError
+
+
+def intrude(
+    name: SceneArgument,
+    as_json: JsonOption = False,
+    out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
+    plot: PlotOption = None,
+):
+    """Force and moment of the grains on a body that moves through the vertical plane, along its motion. SI units."""
+    from geomech.files import whole_file
+    from geomech.output import intrusions, plots
+    from geomech.scene.intruder import table
+    from geomech.study.intrusion import price
+
+    scene = loaded_intruder(name)
+    if out and out.suffix.lower() != ".csv":
+        raise SceneError(f"cannot write {out}: end the name of a table in .csv")
+    check_outputs(scene, out, plot)
+    allow(scene, price(scene), yes=True)
+    found = scene.run()
+    columns = table(scene, found)
+    if out:
+        with whole_file(out) as part:
+            part.write_text(intrusions.csv(columns), encoding="utf-8")
+    if plot:
+        plots.save(plots.intrusion_figure(columns, scene.outline.points, found.pose), plot)
+    print(
+        json.dumps({k: v.tolist() for k, v in columns.items()}) if as_json else intrusions.told(scene, columns, found)
+    )

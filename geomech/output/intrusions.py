@@ -1,0 +1,32 @@
+"""Forces along a motion as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+UNITS = {"t": "s", "angle": "degrees", "x": "m", "z": "m", "force_x": "N", "force_z": "N", "moment": "N m"}
+
+
+def csv(columns: Mapping[str, np.ndarray]) -> str:
+    """The columns under their names, SI units and radians, all digits."""
+    rows = np.stack(list(columns.values()), -1).tolist()
+    return "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+
+
+def told(scene, columns: Mapping[str, np.ndarray], found) -> str:
+    """Extremes of force and moment, and where they are; work."""
+    kinds = type(scene.intruder).__name__, type(scene.motion).__name__
+    lines = [f"{scene.name}: {kinds[0]} of {scene.outline.elements} elements, {kinds[1]} in {len(found.t)} steps"]
+    place = next(name for name in (*columns, "t") if name not in ("t", "force_x"))
+    if place == "x" and np.ptp(columns["x"]) < np.ptp(columns["z"]):
+        place = "z"
+    for name in ("force_x", "force_z", "moment"):
+        ends = [(columns[name][k], np.degrees(columns[place][k]) if place == "angle" else columns[place][k])
+                for k in (columns[name].argmin(), columns[name].argmax())]  # fmt: skip
+        low, high = (f"{value + 0.0:.4g} at {place} = {where + 0.0:.4g} {UNITS[place]}" for value, where in ends)
+        lines.append(f"{name:8} {low}, to {high} ({UNITS[name]})")
+    work = float(np.sum((found.power[1:] + found.power[:-1]) / 2 * np.diff(found.t)))
+    lines.append(f"work     {work:.4g} J of the grains on the body; power at most {found.power.max():.4g} W")
+    return "\n".join(lines)
