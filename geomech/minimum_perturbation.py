@@ -55,11 +55,15 @@ class Frame:
         h = self.pose(alpha)
         return se2.compose(se2.inverse(h), se2.compose(real_array("g", g), h))
 
+    @property
+    def grid_slopes(self) -> np.ndarray:
+        """dh / d alpha (N_1, ..., N_d, 3, d) on the grid."""
+        return np.stack([np.moveaxis(self.field.derivative(k), 0, -1) for k in range(self.field.joints)], -1)
+
     def connection(self, first: Connection) -> np.ndarray:
         """A (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
         h, A = np.moveaxis(self.field.values, 0, -1), np.moveaxis(first.A, (0, 1), (-2, -1))
-        dh = np.stack([np.moveaxis(self.field.derivative(k), 0, -1) for k in range(self.field.joints)], -1)
-        return np.moveaxis(change_connection(A, h, dh), (-2, -1), (0, 1))
+        return np.moveaxis(change_connection(A, h, self.grid_slopes), (-2, -1), (0, 1))
 
 
 def minimum_perturbation(connection: Connection) -> Frame:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from geomech import connection, coordinates, curvature
+from geomech import scene as scenes
+from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.gaits import Circle, Ellipse
 from geomech.minimum_perturbation import Basis, minimum_perturbation
+from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -144,3 +147,46 @@ def test_singular_shapes_are_refused():
     first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, singularity=snake.singularity)
     with pytest.raises(ValueError, match="singular shapes"):
         minimum_perturbation(first)
+
+
+SCENE = """frame = "minimum-perturbation"
+[medium]\nlaw = "{law}"\n{numbers}
+[body]\nkind = "chain"\nlengths = [0.7, 1.4, 0.9]\nlength = 0.3
+[gait]\nkind = "ellipse"\nsemi_axes = [0.9, 0.5]\ntilt = 0.4\ncentre = [0.2, -0.1]
+[numerics]\ngrid = 15\nphases = 64\nextent = 1.6\n"""
+LAWS = {"viscous": "ratio = 2.0", "granular": "C = 1.8\ngamma0 = 0.24"}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_scene_in_it(law):
+    """All tiers agree with the frame of the body by carrying over; its text is read back; one solve makes frame and field."""
+    scene = scenes.parse(SCENE.format(law=law, numbers=LAWS[law]))
+    own = scene.changed(system=scene.system.inner)
+    study, plain = Study(scene), Study(own)
+    assert (scene.frame, own.frame) == ("minimum-perturbation", "mean")
+    start = scene.gait.shape(np.zeros(1))[0]
+    carried = lambda g: scene.system.field.net(g, start)
+    assert study.displacement("direct") == pytest.approx(carried(plain.displacement("direct")), abs=1e-14)
+    for tier in ("path", "harmonic", "adapted"):
+        there, here = carried(plain.displacement(tier)), study.displacement(tier)
+        assert np.abs(here - there)[:2].max() < 3e-3 * 0.3, tier
+    assert np.abs(study.displacement("direct") - plain.displacement("direct")).max() > 3e-4
+    found, first = study.fitted, plain.fitted
+    assert found.A == pytest.approx(scene.system.field.connection(first), abs=1e-12)
+    turned = np.abs(found.residual[2] - first.residual[2]).max()  # the heading's rate does not hang on the frame
+    assert turned < 1e-12 and size(found) < size(first)
+    assert scenes.parse(scenes.toml(scene)) == scene
+    assert scene.with_numerics(grid=9).system.axes != scene.system.axes
+    assert scene.with_numerics(phases=32).system is scene.system
+
+
+def test_no_such_frame_where_there_is_none():
+    for extra, said in (
+        ('[[effects]]\nkind = "transient"\ntravel = 0.1\n', "transient"),
+        ("", "singular shapes"),
+    ):
+        text = SCENE.format(law="granular", numbers=LAWS["granular"]) + extra
+        if not extra:
+            text = text[: text.index("[medium]")] + '[system]\nkind = "no-slip-snake"\n' + text[text.index("[gait]") :]
+        with pytest.raises(SceneError, match=said):
+            scenes.parse(text)

@@ -30,7 +30,10 @@ GROUPS = {
     "system": "systems",
 }  # of FAMILIES
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
-FRAME = "of all velocities and displacements, in place of the body's own key"
+FRAME = (
+    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation': the one in which the "
+    "connection is smallest"
+)
 FILE = (
     "TOML of a medium, as geomech calibrate writes it, with no key beside it; or, beside law = 'table', CSV of a table"
 )

@@ -10,6 +10,7 @@ import numpy as np
 from geomech.errors import choose, named, short
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
+from geomech.scene.frames import reframed
 from geomech.systems.base import Cycle, System, checked_system
 from geomech.tiers.base import Numerics
 
@@ -40,6 +41,7 @@ class Scene(Told):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
             _check_joints(checked_system(self.system), checked_gait(self.gait))
             frequency_of(self.system, self.gait)
+            object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:

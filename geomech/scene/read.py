@@ -18,9 +18,11 @@ from geomech.files import note, read_text
 from geomech.gaits import KINDS as GAITS
 from geomech.kinds import choose_kind
 from geomech.scene import slips
+from geomech.scene.frames import framed
 from geomech.scene.medium import with_files
 from geomech.scene.model import Numerics, Scene, checked_scene
 from geomech.systems import KINDS as SYSTEMS
+from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
 if TYPE_CHECKING:
@@ -138,7 +140,8 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | In
     for table, value in tables.items():
         if table not in ("effects", "frame") and not isinstance(value, dict):
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
-    tables, files = with_files(tables, name)
+    seen = tables.get("frame")
+    tables, files = with_files({k: v for k, v in tables.items() if (k, v) != ("frame", FITTED)}, name)
     sizes = _Sizes(name, tables)
     gait = _of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
     kind, parts = _system(tables, name, sizes)
@@ -150,11 +153,13 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | In
     if own:
         solver = {k: v for k, v in numerics.items() if k in own}
         parts["solver"] = _build(f"{name}: [numerics]", solver, type(kind.solver))
+    finely = _build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics)
     with named(name):
+        system = kind(**parts)
         return Scene(
-            system=kind(**parts),
+            system=framed(system, finely) if seen == FITTED else system,
             gait=gait,
-            numerics=_build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics),
+            numerics=finely,
             name=name,
             text=text,
             files=files,

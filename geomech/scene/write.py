@@ -57,7 +57,7 @@ def tables(scene: Scene) -> dict:
 
 
 def _anew(scene: Scene) -> dict:
-    system, out = scene.system, {}
+    system, out = getattr(scene.system, "inner", scene.system), {}
     if isinstance(system, Swimmer):
         out["medium"] = _of_kind(system.medium, *PARTS["medium"])
         out["body"] = _of_kind(system.body, *PARTS["body"])

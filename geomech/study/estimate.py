@@ -61,7 +61,8 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
     if stepping:  # a step rests on the one before: fewer phases are other steps
         eighth, coarse, half, full = *(system.run(*fewer).net for fewer in every[:3]), run.net
     else:
-        eighth, coarse, half, full = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2, 1))
+        eighth, coarse, half = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2))
+        full = run.net
     error = _left(
         *(apart(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
         stepping or system.kinks,

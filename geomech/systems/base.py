@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from geomech import summary
-from geomech.connection import evaluate
+from geomech.connection import Connection, evaluate, fit
 from geomech.errors import check_angle, choose, real_array, short
 from geomech.reconstruct import displacement, poses, repeated
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
@@ -102,10 +102,11 @@ class Plain:
     one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that
     time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
-    joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed: forces
-    on an element have an exact form, which finer loads come near to. notes: lines on what its user may not expect of how
-    it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n), of parameters of its own
-    that are not known for certain, which `varied` changes; None where all are.
+    carried: its displacements are those of another frame, carried over. joint_angles: its shape variables are such, so
+    that one beyond a full turn is likely a slip of unit. closed: forces on an element have an exact form, which finer
+    loads come near to. notes: lines on what its user may not expect of how it is computed. frequency: cycles per
+    second, where its forces depend on it. covariance: (n, n), of parameters of its own that are not known for certain,
+    which `varied` changes; None where all are.
     """
 
     kind = "system"
@@ -119,7 +120,7 @@ class Plain:
     elements = evaluations = 1
     together = 1 << 12
     held = cut = 0
-    closed = joint_angles = False
+    closed = joint_angles = carried = False
     notes: tuple[str, ...] = ()
     settling = 0.0
     engine = "algebraic"
@@ -179,6 +180,12 @@ class Plain:
         """Poses (cycles N + 1, 3) of the frame, seen from where it is at first, through so many cycles of a gait given by
         alpha, alphadot (N, joints) as in `run`, whose net pose the first of them ends at."""
         return repeated(poses(self.run(alpha, alphadot).xi), cycles)
+
+    def fitted(self, axes, count: int, degree: int, progress: Callable | None = None) -> Connection:
+        """The least-squares connection on a grid, from so many directions; other arguments as in `connection.fit`."""
+        return fit(
+            self.velocity, axes, count, degree, progress, self.mirror, singularity=self.singularity, trusted=True
+        )
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""

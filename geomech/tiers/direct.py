@@ -41,7 +41,7 @@ class Direct(Tier):
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         phases = numerics.phases
-        if not system.steps:
+        if not (system.steps or system.carried):
             return direct(system.velocity, gait, amplitudes, phases)
         run = lambda some: system.run(*gait.cycle(phases, some)).net
         return run(None) if amplitudes is None else in_groups(run, amplitudes, system.at_once(phases))

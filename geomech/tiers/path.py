@@ -66,10 +66,9 @@ class Path(Tier):
     def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
             return own
-        return connection.fit(
-            system.velocity, axes(system, numerics), self.directions(system, numerics), numerics.interpolation,
-            progress, system.mirror, singularity=system.singularity, trusted=True,
-        )  # fmt: skip
+        return system.fitted(
+            axes(system, numerics), self.directions(system, numerics), numerics.interpolation, progress
+        )
 
     def solves(self, system, numerics, count, phases) -> int:
         return shapes(system, numerics) * self.directions(system, numerics)

@@ -1,0 +1,28 @@
+"""Frames that are made for a scene: one that depends on how finely its tiers compute."""
+
+from __future__ import annotations
+
+from geomech import connection
+from geomech.systems.base import System
+from geomech.systems.framed import Framed
+from geomech.tiers import TIERS
+from geomech.tiers.base import Numerics
+from geomech.tiers.path import LARGEST_GRID
+
+
+def framed(system: System, numerics: Numerics) -> Framed:
+    """A system in its minimum-perturbation frame, on the grid of the numerics; the same one where these change nothing."""
+    inner = system.inner if isinstance(system, Framed) else system
+    if numerics.grid**inner.joints > LARGEST_GRID:
+        raise ValueError(
+            f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large: lower [numerics] grid"
+        )
+    axes = connection.grid(inner.joints, numerics.grid, numerics.extent)
+    grid = tuple(tuple(a.tolist()) for a in axes)
+    new = Framed(inner, grid, TIERS["path"].directions(inner, numerics), numerics.interpolation)
+    return system if new == system else new
+
+
+def reframed(system: System, numerics: Numerics) -> System:
+    """A system whose frame depends on the numerics, on those; any other as it is."""
+    return framed(system, numerics) if isinstance(system, Framed) else system
