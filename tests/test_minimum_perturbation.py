@@ -190,3 +190,20 @@ def test_no_such_frame_where_there_is_none():
             text = text[: text.index("[medium]")] + '[system]\nkind = "no-slip-snake"\n' + text[text.index("[gait]") :]
         with pytest.raises(SceneError, match=said):
             scenes.parse(text)
+
+
+def test_its_file_and_pictures(tmp_path):
+    from scipy.io import netcdf_file
+
+    from geomech.output import netcdf, plots
+
+    scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
+    netcdf.save_connection(tmp_path / "c.nc", Study(scene))
+    with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
+        pose = file.variables["frame_pose"]
+        assert pose[:] == pytest.approx(scene.system.field.field.values)
+        assert (pose.units, file.frame) == (b"m (x, y), rad (theta)", b"minimum-perturbation")
+    fig = plots.frame_figure(scene.system.field.field, "m")
+    assert [ax.get_ylabel() for ax in fig.axes[3:]] == ["x (m)", "y (m)", "heading (rad)"]
+    for k, ax in enumerate(fig.axes[:3]):
+        assert ax.collections[0].get_array().T == pytest.approx(scene.system.field.field.values[k])

@@ -69,6 +69,8 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature, unit))
         name = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
         found.append(of_ccf(study.curvature_error, unit, "ccf_error", name))
+    if study.scene.system.carried:
+        found.append(of_frame(study.scene.system.field.field, unit))
     if "harmonic" in lookups:
         found += of_harmonics(study.table("harmonic"), unit)
     if (even := study.even_part) is not None:
@@ -98,6 +100,13 @@ def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variab
     return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
 
 
+def of_frame(pose: Field, unit: str) -> Variable:
+    """The pose of a minimum-perturbation frame in the frame that it was made from."""
+    units = f"{UNITS[unit]} (x, y), rad (theta)"
+    name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
+    return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
+
+
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Coefficients of the odd harmonics of xi, and what they leave."""
     angles = angles_of(table.axes)
@@ -124,6 +133,7 @@ def about(scene: Scene) -> dict:
     """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
     system = scene.system
     meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
+    meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
     meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
     return {
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",

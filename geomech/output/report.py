@@ -58,6 +58,8 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         labels = scene.system.shape_labels
         save_connection(folder / "connection.nc", study)
         _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
+        if scene.system.carried:
+            _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
         _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
     tables = {}
     for gait, some in zip(gaits, amplitudes):

@@ -14,6 +14,7 @@ from geomech.output.plots.maps import (
     connection_figure,
     draw_gait,
     drawable,
+    frame_figure,
     largest,
     shape_space,
     unknown,
@@ -27,7 +28,7 @@ from geomech.output.plots.terradynamics import elements_figure, intrusion_figure
 __all__ = [
     "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
     "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure", "draw_gait", "drawable",
-    "elements_figure", "figure", "filmstrip", "intrusion_figure", "largest", "medium_band", "net", "quantity", "save",
-    "shape_space", "stage", "stress_figure", "styled", "unknown", "vector_field", "work_precision",
+    "elements_figure", "figure", "filmstrip", "frame_figure", "intrusion_figure", "largest", "medium_band", "net", "quantity",
+    "save", "shape_space", "stage", "stress_figure", "styled", "unknown", "vector_field", "work_precision",
     "work_precision_figure",
 ]  # fmt: skip

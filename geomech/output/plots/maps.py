@@ -233,6 +233,25 @@ def connection_figure(connection: Connection, unit: str = "BL", labels: Labels =
 
 
 @styled
+def frame_figure(pose: Field, unit: str = "BL", labels: Labels = ANGLES):
+    """The pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
+    from cmcrameri import cm
+
+    fig, axes = figure(10.8, 3.0, 3, layout="compressed")
+    pose = drawable(pose)
+    for component, ax in enumerate(axes[0]):
+        values, name = pose.values[component], ("x", "y", "heading")[component]
+        top = largest(values)
+        image = ax.pcolormesh(
+            *pose.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True
+        )
+        fig.colorbar(image, ax=ax, shrink=0.85).set_label(f"{name} ({'rad' if component == 2 else unit})")
+        ax.set_title(f"{name} of the frame")
+        shape_space(ax, pose.axes, labels)
+    return fig
+
+
+@styled
 def ccf_figure(
     field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None, labels: Labels = ANGLES
 ):
