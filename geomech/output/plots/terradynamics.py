@@ -16,29 +16,40 @@ POSES = 5  # of the body that are drawn
 def stress_figure(survey, point: tuple[float, float] | None = None):
     """alpha_z and alpha_x over tilt and direction of motion (Fig. 7(c) and (d)) of an `rft.vertical.Survey`, hatched where the
     map pulls. point: (beta, gamma) in degrees to mark."""
-    from cmcrameri import cm
-
     fig, axes = figure(8.6, 3.5, 2)
-    ahead = np.abs(survey.gamma) < np.pi / 2
-    beta, gamma = np.degrees(survey.beta), np.degrees(survey.gamma[ahead])
-    top = largest(np.stack([survey.alpha_x, survey.alpha_z]))
-    for ax, name, values in zip(axes[0], "zx", (survey.alpha_z, survey.alpha_x)):
-        image = ax.pcolormesh(
-            beta, gamma, values[:, ahead].T, cmap=cm.vik, vmin=-top, vmax=top, shading="nearest", rasterized=True
-        )
-        ax.contour(beta, gamma, values[:, ahead].T, levels=[0.0], colors="0.35", linewidths=0.6)
+    for ax, name in zip(axes[0], "zx"):
+        stress_map(ax, survey, name)
         if survey.pulling:
-            ax.contourf(
-                beta, gamma, (survey.normal[:, ahead] > 0).T, levels=[0.5, 1.5], colors="none", hatches=["////"]
-            )
             ax.set_title("hatched: pulls on the leading face", loc="left", fontsize=8)
         if point:
             ax.plot(*_shown(*point), "o", mfc="white", mec="black", ms=5, clip_on=False, zorder=5)
-        ticks = [-90, -45, 0, 45, 90]
-        ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"direction $\gamma$ below the horizontal (degrees)")
-        ax.set(aspect="equal", xlim=(-90, 90), ylim=(-90, 90), xticks=ticks, yticks=ticks)
-        fig.colorbar(image, ax=ax, shrink=0.85).set_label(rf"$\alpha_{name}$ (N/cm$^3$)")
     return fig
+
+
+def stress_map(ax, survey, name: str):
+    """alpha_x or alpha_z (``name`` "x" or "z") of an `rft.vertical.Survey` for motion forwards, hatched where it pulls. Colours
+    are to the scale of both."""
+    from cmcrameri import cm
+
+    ahead = np.abs(survey.gamma) < np.pi / 2
+    beta, gamma = np.degrees(survey.beta), np.degrees(survey.gamma[ahead])
+    values, top = getattr(survey, f"alpha_{name}")[:, ahead].T, largest(np.stack([survey.alpha_x, survey.alpha_z]))
+    colours = {"cmap": cm.vik, "vmin": -top, "vmax": top}
+    image = ax.pcolormesh(beta, gamma, values, shading="nearest", rasterized=True, **colours)
+    ax.contour(beta, gamma, values, levels=[0.0], colors="0.35", linewidths=0.6)
+    if survey.pulling:
+        pulled = (survey.normal[:, ahead] > 0).T
+        ax.contourf(beta, gamma, pulled, levels=[0.5, 1.5], colors="none", hatches=["////"])
+    square_of_angles(ax)
+    ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(rf"$\alpha_{name}$ (N/cm$^3$)")
+    return ax
+
+
+def square_of_angles(ax) -> None:
+    """Axes of tilt and direction of motion."""
+    ticks = [-90, -45, 0, 45, 90]
+    ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"direction $\gamma$ below the horizontal (degrees)")
+    ax.set(aspect="equal", xlim=(-90, 90), ylim=(-90, 90), xticks=ticks, yticks=ticks)
 
 
 def _shown(beta: float, gamma: float) -> tuple[float, float]:

@@ -1,0 +1,141 @@
+"""Fig. 8(a): stress around a dragged cylinder by plates, and drag and lift on rods of four shapes against depth.
+
+(a) Resistive force theory takes the stress on a part of a rod for that on a plate of the same tilt at the same depth; the
+text says that the two are nearly equal in discrete-element simulation. The line is the map for plates, the dots the elements
+of a cylinder that moves level: normal stress, positive where the grains push, and tangential stress, positive from the bottom
+of the cylinder to its top. Tilts run from 0 (the underside) through 90 degrees (the front) to 180 (the top); that the
+published angle from 0 to pi starts below is assumed. Its data are not in the text.
+
+(b), (c) Drag and lift against the depth of the rod's axis. (d) Lift over drag deep down, beside the sign that was measured
+(Ding, Gravish and Goldman, Phys. Rev. Lett. 106, 028001 (2011)): up on round and square rods, down on a half cylinder that
+lies on its flat side. The nine-term map says up for all. It pulls on faces that look up by more than 53 degrees, where plates
+are pushed: that lifts. Without tension (dashed, open) nothing is left of the half cylinder's lift but 0.04 of its drag, still
+not the measured sign: it takes faces that look up to be pressed down, as plates were in that work. Undersides that slide
+along themselves carry nothing here; they could only add lift.
+
+Sizes of the rods and depths are assumed; medium: 3 mm glass, as in the text.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from rft.vertical import VERTICAL, HalfCylinder, RoundRod, SquareRod, loads, parts
+
+RADIUS, WIDTH = 0.0127, 0.1  # m, assumed
+RODS = {
+    "round": (RoundRod(RADIUS, WIDTH), "up"),
+    "half, flat down": (HalfCylinder(RADIUS, WIDTH, "down"), "down"),
+    "half, flat up": (HalfCylinder(RADIUS, WIDTH, "up"), None),
+    "square": (SquareRod(2 * RADIUS, WIDTH), "up"),
+}  # and the sign of the lift that was measured
+DEEPEST, DEEP = 0.15, 100.0  # m; at the second, one depth for all of a rod
+LEVEL = (1.0, 0.0, 0.0)
+
+
+def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) -> dict:
+    """ "beta": (B,) radians. "normal", "tangent": (B,) by plates, N/cm^3. "cylinder": {"beta", "normal", "tangent"} of its
+    elements. "pulled": beta from which on the grains pull. "depth": (D,) of the axis, m. "rods": by name and tension
+    {"drag", "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0 where it is not known."""
+    keep = VERTICAL[medium].stress
+    beta = np.linspace(0.0, np.pi, 361)
+    normal, tangent = on_face(keep, beta)
+    here = parts(RODS["round"][0].outline(48), (0, -1, 0), LEVEL)
+    leads = (here.depth > 0).ravel()
+    around = np.mod(np.arctan2(here.n[0].ravel(), -here.n[1].ravel())[leads], np.pi)
+    t_x, t_z = (t.ravel()[leads] for t in keep.traction(here.n, here.v))
+    sin, cos = np.sin(around), np.cos(around)
+    cylinder = {"beta": around, "normal": (cos * t_z - sin * t_x) / 1e6, "tangent": (cos * t_x + sin * t_z) / 1e6}
+    return {
+        "beta": beta, "normal": normal, "tangent": tangent, "cylinder": cylinder,
+        "pulled": float(beta[(normal < 0) & (beta > np.pi / 2)].min()), "depth": np.linspace(RADIUS, DEEPEST, depths),
+        "rods": {name: {tension: rod_forces(replace(keep, tension=tension), rod.outline(elements), depths)
+                        for tension in ("keep", "cut")} for name, (rod, _) in RODS.items()},
+        "measured": {name: {"up": 1, "down": -1, None: 0}[sign] for name, (_, sign) in RODS.items()},
+    }  # fmt: skip
+
+
+def on_face(stress, beta):
+    """Normal and tangential stress per depth on plates that move level, N/cm^3."""
+    a_x, a_z = stress(beta, 0.0)
+    sin, cos = np.sin(beta), np.cos(beta)
+    return sin * a_x + cos * a_z, sin * a_z - cos * a_x
+
+
+def rod_forces(stress, outline, depths: int) -> dict:
+    depth = np.append(np.linspace(RADIUS, DEEPEST, depths), DEEP)
+    force = loads(stress, outline, np.stack([0 * depth, -depth, 0 * depth], -1), LEVEL).force
+    drag, lift = -force[:, 0], force[:, 1]
+    return {"drag": drag[:-1], "lift": lift[:-1], "ratio": float(lift[-1] / drag[-1])}
+
+
+def table(numbers: dict) -> str:
+    """Lift over drag deep down, and the measured sign."""
+    lines = ["lift over drag     map as it is   tension cut   measured"]
+    for name, found in numbers["rods"].items():
+        said = {1: "up", -1: "down", 0: "not told"}[numbers["measured"][name]]
+        lines.append(f"{name:19}{found['keep']['ratio']:+12.2f}{found['cut']['ratio']:+14.2f}   {said}")
+    return "\n".join(lines)
+
+
+COLOURS = dict(zip(RODS, ("black", "#D55E00", "#0072B2", "#009E73")))
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(7.8, 6.2, 2, 2)
+    draw_stress(axes[0, 0], numbers)
+    for ax, what in ((axes[0, 1], "drag"), (axes[1, 0], "lift")):
+        for name, found in numbers["rods"].items():
+            for tension, dashes in (("keep", "-"), ("cut", "--")):
+                label = name if tension == "keep" else None
+                ax.plot(1e2 * numbers["depth"], found[tension][what], dashes, color=COLOURS[name], label=label)
+        ax.set(xlabel="depth of the axis (cm)", ylabel=f"{what} (N)", xlim=(0, 1e2 * DEEPEST))
+        ax.set_xticks(range(0, 16, 5))
+        ax.axhline(0.0, color="0.6", lw=0.6)
+    axes[0, 1].plot([], [], "--", color="0.4", label="tension cut")
+    axes[0, 1].legend(loc="upper left")
+    draw_ratios(axes[1, 1], numbers)
+    for ax, letter in zip(axes.flat, "abcd"):
+        ax.set_title(f"({letter})", loc="left")
+    return fig
+
+
+def draw_stress(ax, numbers: dict) -> None:
+    around = numbers["cylinder"]
+    ax.axvspan(np.degrees(numbers["pulled"]), 180, color="0.92", lw=0)
+    for what, colour, said in (("normal", "#D55E00", "normal"), ("tangent", "#0072B2", "tangential")):
+        ax.plot(np.degrees(numbers["beta"]), numbers[what], color=colour, label=f"{said}, plates")
+        ax.plot(np.degrees(around["beta"]), around[what], "o", color=colour, mfc="white", ms=4, label="cylinder")
+    ax.axhline(0.0, color="0.6", lw=0.6)
+    ax.set(xlabel=r"tilt $\beta$ of the face: underside 0, front 90, top 180", ylabel="stress / depth (N/cm$^3$)")
+    ax.set(xlim=(0, 180), xticks=range(0, 181, 45))
+    ax.text(178, ax.get_ylim()[1], "grains pull", ha="right", va="top", fontsize=8)
+    ax.legend(loc="lower left")
+
+
+def draw_ratios(ax, numbers: dict) -> None:
+    for k, (name, found) in enumerate(numbers["rods"].items()):
+        style = {"color": COLOURS[name], "ls": "none", "marker": "o"}
+        ax.plot(k, found["keep"]["ratio"], ms=5, label="map as it is" if k == 0 else None, **style)
+        ax.plot(k, found["cut"]["ratio"], ms=9, mfc="none", label="tension cut" if k == 0 else None, **style)
+        if sign := numbers["measured"][name]:
+            ax.annotate(
+                "", (k + 0.3, 0.3 * sign), (k + 0.3, 0.0), arrowprops={"arrowstyle": "-|>", "color": "0.3", "lw": 1.6}
+            )
+            up = "up" if sign > 0 else "down"
+            ax.text(
+                k + 0.3, 0.34 * sign, f"measured:\n{up}", fontsize=7, ha="center", va="bottom" if sign > 0 else "top"
+            )
+    ax.axhline(0.0, color="0.6", lw=0.6)
+    ax.set(xticks=range(len(RODS)), xticklabels=[n.replace(", ", ",\n") for n in RODS], ylabel="lift / drag, deep down")
+    ax.set(xlim=(-0.4, len(RODS) - 0.3), ylim=(-0.6, 1.3))
+    ax.legend(loc="upper left", ncols=2)
+
+
+if __name__ == "__main__":
+    main("fig08a", compute, draw, table)
