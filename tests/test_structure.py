@@ -13,7 +13,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 # top shows media, bodies and effects to type checkers.
 KNOW_MECHANICS = {
     "__init__.py", "commands/scenes.py", "commands/stress.py", "kinds.py", "scene/intruder.py", "study/batch.py",
-    "study/calibration.py", "study/sweep.py",
+    "study/calibration.py", "study/stress_calibration.py", "study/sweep.py",
 }  # fmt: skip
 
 

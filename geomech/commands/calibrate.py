@@ -21,7 +21,10 @@ def calibrate(
         Optional[Path], typer.Option("-o", "--output", metavar="MEDIUM.toml", help="medium to write")
     ] = None,
     plot: PlotOption = None,
-    law: Annotated[str, typer.Option(help="granular, viscous or coulomb")] = "granular",
+    law: Annotated[
+        Optional[str],
+        typer.Option(help="granular, viscous or coulomb; stress-map or zeta; by the columns if left out"),
+    ] = None,
     end_caps: Annotated[
         str, typer.Option(metavar="left-out|fitted|E", help="drag on the rod's ends; E = 1: one flat end")
     ] = "left-out",
@@ -31,23 +34,30 @@ def calibrate(
     density: Annotated[
         Size, typer.Option(help="of the bed in kg/m^3, grains and voids, in place of the file's")
     ] = None,
+    area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
     as_json: JsonOption = False,
 ):
-    """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N."""
+    """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, of
+    the vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to
+    a plate pushed straight down, columns depth_m, force_N."""
+    from geomech.files import note
     from geomech.output import plots
     from geomech.study.calibration import CALIBRATIONS
+    from geomech.study.stress_calibration import law_of
 
-    how = CALIBRATIONS[choose("--law", law, CALIBRATIONS)]
+    law = choose("--law", law_of(drag) if law is None else law, CALIBRATIONS)
     if out and out == plot:
         raise SceneError(f"cannot write {out} twice: give --plot another name")
     check_files([Path(drag)], out, plot)
-    sizes = {"radius": radius, "length": length, "depth": depth, "density": density}
-    found = how(law, drag, {k: x for k, x in sizes.items() if x is not None}, caps(end_caps))
+    sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
+    found = CALIBRATIONS[law](law, drag, {k: x for k, x in sizes.items() if x is not None}, caps(end_caps))
     if out:
         with whole_file(out) as part:
             part.write_text(found.toml(), encoding="utf-8")
     if plot:
-        plots.save(plots.drag_figure(found.curves()), plot)
+        plots.save(getattr(plots, found.picture)(found.curves()), plot)
+    for told in found.notes():
+        note(told)
     print(json.dumps(found.numbers()) if as_json else found.text())
     if out and not as_json:
         print(f'medium in {out}: in a scene, [medium] file = "{out.name}"')

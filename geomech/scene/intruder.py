@@ -204,12 +204,18 @@ def read_medium(place: str, table: Mapping) -> PlateStress:
         return dataclasses.replace(base, zeta=base.zeta * choices.zeta, **{k: getattr(choices, k) for k in said})
 
 
-def plate_drags(place: str, file) -> PlateDrags:
-    """The stress map through the plate drags of a CSV file: beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
+def plate_rows(place: str, file) -> np.ndarray:
+    """(4, N), plate drags of a CSV file: beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
     found = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
-    beta, gamma, a_x, a_z = found.values()
-    if len(beta) and max(np.abs(beta).max(), np.abs(gamma).max()) < RADIANS:
+    rows = np.stack(list(found.values()))
+    if rows.size and np.abs(rows[:2]).max() < RADIANS:
         raise SceneError(f"{place}: {Path(file).name}: beta and gamma look like radians: give degrees")
+    return rows
+
+
+def plate_drags(place: str, file) -> PlateDrags:
+    """The stress map through the plate drags of a CSV file (`plate_rows`)."""
+    beta, gamma, a_x, a_z = plate_rows(place, file)
     with named(f"{place}: {Path(file).name}"):
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 

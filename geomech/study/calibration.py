@@ -13,6 +13,7 @@ import numpy as np
 from geomech.errors import SceneError, named
 from geomech.scene import drag
 from geomech.scene.write import table
+from geomech.study.stress_calibration import OfPenetration, OfPlates, of_penetration, of_plates
 from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
 
@@ -35,6 +36,11 @@ class OfDrag:
     fit: Fit
     psi_deg: np.ndarray
     name: str
+    picture = "drag_figure"
+
+    def notes(self) -> list[str]:
+        """What one who uses the medium should know."""
+        return []
 
     def numbers(self) -> dict:
         """What `geomech calibrate --json` prints. covariance: of ``parameters``, gamma0 in rad; errors: the standard ones, of
@@ -133,6 +139,8 @@ def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
 def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfDrag:
     """A law fitted to the file or sample ``source``. sizes: of `SIZES`, those that overrule the header lines. SceneError, one
     line that names the file, if the data are bad or do not settle the law."""
+    if "area" in sizes:
+        raise SceneError(f"--area belongs to another measurement: leave it out for --law {law}")
     try:
         measured = drag.read(source)
     except ValueError as error:
@@ -145,4 +153,8 @@ def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float |
     return found
 
 
-CALIBRATIONS: dict[str, Callable[..., OfDrag]] = dict.fromkeys(FITS, of_drag)
+CALIBRATIONS: dict[str, Callable[..., OfDrag | OfPlates | OfPenetration]] = {
+    **dict.fromkeys(FITS, of_drag),
+    "stress-map": of_plates,
+    "zeta": of_penetration,
+}

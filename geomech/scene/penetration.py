@@ -1,0 +1,94 @@
+"""CSV files of a level plate pushed straight down: depth and force, and the area of the plate in a column or a header line."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from geomech.rows import Rows
+from geomech.scene.drag import LENGTHS, LONGEST_COMMENT, MOST_COMMENTS, NUMBER, SAID
+
+UNITS = {  # in small letters; without one it is the SI unit
+    "depth": {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "z": {"": -1.0, "m": -1.0, "cm": -1e-2, "mm": -1e-3},
+    "force": {"": 1.0, "n": 1.0, "kn": 1e3, "mn": 1e-3},
+    "area": {"": 1.0, "m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
+}
+SQUARE = r"(um|mm|cm|m)\s*(?:\^|\*\*)?\s*[2²]"
+
+
+class Penetration(NamedTuple):
+    """depth (m, positive downwards) and force (N, positive upwards): (N,). area: of the plate, m^2, (1,) or (N,), or None if
+    the file does not tell. name: of the file."""
+
+    depth: np.ndarray
+    force: np.ndarray
+    area: np.ndarray | None
+    name: str
+
+
+def read(source: Rows) -> Penetration:
+    """The test in a file; ValueError, one line, if it holds none.
+
+    Columns, in any order: depth and force, and area if wanted, each in the SI unit or with another behind its name, as
+    depth_mm, force_N or area_cm2; others are ignored. In place of depth may stand z, upwards, and force_z for force. A
+    header line may give the area: ``# plate area = 9.5 cm^2``, or ``# plate 38 x 25 mm``."""
+    found = {}
+    for column, word in enumerate(source.header[1]):
+        named = quantity(word)
+        if named and named[0] in found:
+            raise ValueError(
+                f"{source.name}, line {source.header[0]}: the header has two columns of {named[0]}: keep one"
+            )
+        if named:
+            found[named[0]] = (column, named[1])
+    for name in ("depth", "force"):
+        if name not in found:
+            told = f"the header has no column {name}: it must have depth_m,force_N (or depth_mm, depth_cm)"
+            raise ValueError(f"{source.name}, line {source.header[0]}: {told}")
+    names = tuple(str(k) for k in range(len(source.header[1])))
+    rows = source.numbers(names, tuple(str(column) for column, _ in found.values())).T
+    values = {name: scale * row for (name, (_, scale)), row in zip(found.items(), rows)}
+    written = _area(source)
+    if written is not None and "area" in values:
+        raise ValueError(f"{source.name}: the area is given in a column and in a header line: keep one")
+    area = values.get("area", None if written is None else np.array([written]))
+    return Penetration(values["depth"], values["force"], area, source.name)
+
+
+def quantity(word: str) -> tuple[str, float] | None:
+    """(depth, force or area; its unit in SI) of a column, None if it is none of them."""
+    unit = r"[ _]*[\(\[]?([a-z]*)\s*\^?([2²]?)[\)\]]?"
+    found = re.fullmatch(r"(?:plate[ _])?(depth|z|area|force)(?:(?<=force)[ _]z)?" + unit, word)
+    if not found:
+        return None
+    units, unit = UNITS[found[1]], found[2] + found[3].replace("²", "2")
+    return (found[1].replace("z", "depth"), units[unit]) if unit in units else None
+
+
+def _area(source: Rows) -> float | None:
+    """m^2, of the header lines; ValueError if they give two."""
+    found = set()
+    for line in source.comments[:MOST_COMMENTS]:
+        text = line[:LONGEST_COMMENT].lower()
+        beside = re.findall(r"\barea" + SAID + NUMBER + r"\s*" + SQUARE, text)
+        before = [
+            (x, unit) for unit, x in re.findall(r"\barea[ _]*[\(\[]?" + SQUARE + r"[\)\]]?\s*[=:]?\s*" + NUMBER, text)
+        ]
+        found |= {_rounded(float(x) * LENGTHS[unit] ** 2) for x, unit in beside + before}
+        if not beside and not before:
+            found |= {float(x) for x in re.findall(r"\barea\s*[=:]\s*" + NUMBER + r"\s*$", text)}
+        side = NUMBER + r"\s*(mm|cm|m)"
+        sides = re.findall(r"\bplate\b[^\d]*" + side + r"?\s*(?:x|by|times)\s*" + side + r"\b", text)
+        found |= {_rounded(float(a) * LENGTHS[ua or ub] * float(b) * LENGTHS[ub]) for a, ua, b, ub in sides}
+    if len(found) > 1:
+        told = " and ".join(f"{x:g}" for x in sorted(found))
+        raise ValueError(f"{source.name}: the header lines give areas {told} m^2: keep one")
+    return found.pop() if found else None
+
+
+def _rounded(x: float) -> float:
+    """Without the digits that a change of units adds."""
+    return float(f"{x:.12g}")
