@@ -236,7 +236,7 @@ REFUSED = {
     "3 to 100000 depths below the surface are needed, got 0": lambda: fit_zeta([-1.0, -2, -3], [1.0, 2, 3], 1e-3),
     "the force is against the law": lambda: fit_zeta([0.01, 0.02, 0.03], [-1.0, -2, -3], 1e-3),
     "zeta = 1e+05 is that of no grains": lambda: fit_zeta([0.01, 0.02, 0.03], [0.1e9, 0.2e9, 0.3e9], 1e-1),
-    "areas positive": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], 0.0),
+    "the area of the plate must be a number above 0": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], 0.0),
     "depths and forces must be finite": lambda: fit_zeta([0.01, np.nan, 0.03], [1.0, 2, 3], 1e-3),
     "depth and force must be equally many": lambda: fit_zeta([0.01, 0.02], [1.0, 2, 3], 1e-3),
     "area must be one number": lambda: fit_zeta([0.01, 0.02, 0.03], [1.0, 2, 3], [1e-3, 1e-3]),
@@ -355,6 +355,7 @@ def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path, capsys):
     assert (code, err, found["law"], found["area"]) == (0, "", "zeta", 9.5e-4)
     assert found["zeta"] == pytest.approx(0.224, rel=1e-9)
     assert 0 < found["error"] < 1e-10
+    assert found["covariance"] == [[pytest.approx(found["error"] ** 2)]]
     again = scene.load(written(tmp_path / "t.toml", '[medium]\nfile = "m.toml"\n' + plate))
     assert again.medium == StressMap(zeta=found["zeta"])
     np.testing.assert_allclose(again.run().force, scene.load(tmp_path / "s.toml").run().force, rtol=1e-9)
@@ -390,7 +391,8 @@ HEADS = {
     "depth_mm,force_mN,t": (1e-3, 1e-3, None),
     "z,force_z": (-1, 1, None),
     "z_mm,force_z_kN": (-1e-3, 1e3, None),
-    "z (cm),force": (-1e-2, 1, None),
+    "z (cm),Fz_N": (-1e-2, 1, None),
+    "penetration depth [mm],F_z (mN),plate_area_cm2": (1e-3, 1e-3, 1e-4),
     "z_m,force": (-1, 1, None),
     "depth,force,area": (1, 1, 1),
     "depth,force,area_m2": (1, 1, 1),
@@ -409,7 +411,9 @@ HEADS = {
 def test_columns_and_areas_in_the_units_they_name(head, tmp_path):
     per_depth, per_force, area = HEADS[head]
     names = head.split("\n")[-1].split(",")
-    row = ",".join({"d": "2", "z": "2", "f": "3"}.get(n.strip()[0].lower(), "7") for n in names)
+    row = ",".join(
+        {"d": "2", "p": "2", "z": "2", "f": "3"}.get(n.replace("plate", "").strip(" _")[0].lower(), "7") for n in names
+    )
     found = penetration.read(rows.read(written(tmp_path / "p.csv", head, row), 1000, ""))
     assert (found.depth[0], found.force[0]) == pytest.approx((2 * per_depth, 3 * per_force))
     if area is None:
@@ -424,6 +428,8 @@ BAD = {
         "plates: p.csv, line 2: a row must be 4 finite numbers",
     ),
     "short row": (["beta,gamma,alpha_x,alpha_z", "0,90,0.1"], "line 2: a row must be 4 finite numbers"),
+    "turns": (["beta,gamma,alpha_x,alpha_z", "0,361,0,1"], "beta and gamma must be from -360 to 360 degrees, got 361"),
+    "inches": (["depth_inch,force_N", "1,2"], "line 1: the header has no column depth: it must have depth_m,force_N"),
     "few": (["beta,gamma,alpha_x,alpha_z", "0,90,0,1"], "p.csv: number of plate drags must be a whole number from 6"),
     "none": (["beta,gamma,alpha_x,alpha_z"], "p.csv: number of plate drags must be"),
     "column": (["beta,gamma,alpha_x", "0,90,0"], "line 1: the header must be beta,gamma,alpha_x,alpha_z"),
@@ -437,7 +443,7 @@ BAD = {
         "area is given in a column and in a header line",
     ),
     "two depths": (["depth_mm,depth_m,force", "1,2,3"], "p.csv, line 1: the header has two columns of depth: keep one"),
-    "text": (["depth,force", "0.01,soft"], "p.csv, line 2: a row must be"),
+    "text": (["depth,force", "0.01,soft"], "p.csv, line 2: a row must be 2 finite numbers (depth,force)"),
     "few depths": (["# plate area 9 cm^2", "depth,force", "0.01,1"], "3 to 100000 depths below the surface are needed"),
 }
 
@@ -473,6 +479,11 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path, capsys):
     file = plates(tmp_path)
     assert stress_calibration.law_of(str(file)) == "stress-map"
     assert stress_calibration.law_of(str(written(tmp_path / "p.csv", "depth_m,force_N", "1,2"))) == "zeta"
+    for head, law in (
+        ("z,force_z", "zeta"), ("depth_inch;force", "zeta"), ("psi_deg,depth,force", "granular"), ("t,z", "granular"),
+        ("gamma,beta_deg", "stress-map"), ("gamma,alpha_x", "stress-map"), ("area,force", "granular"),
+    ):  # fmt: skip
+        assert stress_calibration.law_of(str(written(tmp_path / "q.csv", head))) == law
     assert stress_calibration.law_of("dem-rod-drag") == stress_calibration.law_of("nowhere.csv") == "granular"
     for law, said in (
         ("granular", "the header has no column psi_deg"), ("zeta", "the header has no column depth"),

@@ -210,6 +210,10 @@ def plate_rows(place: str, file) -> np.ndarray:
     rows = np.stack(list(found.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
         raise SceneError(f"{place}: {Path(file).name}: beta and gamma look like radians: give degrees")
+    if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
+        raise SceneError(
+            f"{place}: {Path(file).name}: beta and gamma must be from -360 to 360 degrees, got {largest:g}"
+        )
     return rows
 
 

@@ -16,6 +16,12 @@ UNITS = {  # in small letters; without one it is the SI unit
     "force": {"": 1.0, "n": 1.0, "kn": 1e3, "mn": 1e-3},
     "area": {"": 1.0, "m2": 1.0, "cm2": 1e-4, "mm2": 1e-6},
 }
+WORDS = {
+    "depth": "(?:penetration[ _])?depth",
+    "z": "z",
+    "force": "(?:force|f)(?:[ _]?z)?",
+    "area": "(?:plate[ _])?area",
+}
 SQUARE = r"(um|mm|cm|m)\s*(?:\^|\*\*)?\s*[2²]"
 
 
@@ -35,21 +41,19 @@ def read(source: Rows) -> Penetration:
     Columns, in any order: depth and force, and area if wanted, each in the SI unit or with another behind its name, as
     depth_mm, force_N or area_cm2; others are ignored. In place of depth may stand z, upwards, and force_z for force. A
     header line may give the area: ``# plate area = 9.5 cm^2``, or ``# plate 38 x 25 mm``."""
+    line, words = source.header
     found = {}
-    for column, word in enumerate(source.header[1]):
+    for word in words:
         named = quantity(word)
         if named and named[0] in found:
-            raise ValueError(
-                f"{source.name}, line {source.header[0]}: the header has two columns of {named[0]}: keep one"
-            )
+            raise ValueError(f"{source.name}, line {line}: the header has two columns of {named[0]}: keep one")
         if named:
-            found[named[0]] = (column, named[1])
+            found[named[0]] = (word, named[1])
     for name in ("depth", "force"):
         if name not in found:
-            told = f"the header has no column {name}: it must have depth_m,force_N (or depth_mm, depth_cm)"
-            raise ValueError(f"{source.name}, line {source.header[0]}: {told}")
-    names = tuple(str(k) for k in range(len(source.header[1])))
-    rows = source.numbers(names, tuple(str(column) for column, _ in found.values())).T
+            told = "it must have depth_m,force_N (or depth_mm, depth_cm; z_m, force_z)"
+            raise ValueError(f"{source.name}, line {line}: the header has no column {name}: {told}")
+    rows = source.numbers(words, tuple(word for word, _ in found.values())).T
     values = {name: scale * row for (name, (_, scale)), row in zip(found.items(), rows)}
     written = _area(source)
     if written is not None and "area" in values:
@@ -60,12 +64,12 @@ def read(source: Rows) -> Penetration:
 
 def quantity(word: str) -> tuple[str, float] | None:
     """(depth, force or area; its unit in SI) of a column, None if it is none of them."""
-    unit = r"[ _]*[\(\[]?([a-z]*)\s*\^?([2²]?)[\)\]]?"
-    found = re.fullmatch(r"(?:plate[ _])?(depth|z|area|force)(?:(?<=force)[ _]z)?" + unit, word)
-    if not found:
-        return None
-    units, unit = UNITS[found[1]], found[2] + found[3].replace("²", "2")
-    return (found[1].replace("z", "depth"), units[unit]) if unit in units else None
+    for name, words in WORDS.items():
+        found = re.fullmatch(words + r"[ _]*[\(\[]?([a-z]*)\s*\^?([2²]?)[\)\]]?", word)
+        scale = UNITS[name].get(found[1] + found[2].replace("²", "2")) if found else None
+        if scale is not None:
+            return ("depth" if name == "z" else name), scale
+    return None
 
 
 def _area(source: Rows) -> float | None:

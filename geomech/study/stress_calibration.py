@@ -97,7 +97,7 @@ class OfPlates:
             "         N/cm^3   95 % interval        from the data   generic set times zeta",
         ]
         for key, value, (low, high), share, generic in zip(KEYS, f.values, f.intervals, f.resolution, f.zeta * GENERIC):
-            lines.append(f"{key:5}{value:10.4f}   {low:7.4f} to {high:7.4f}{100 * share:13.0f} %{generic:16.4f}")
+            lines.append(f"{key:5}{value:10.4f}   {low:7.4f} to {high:7.4f}{100 * abs(share):13.0f} %{generic:16.4f}")
         lines.append(f"zeta of the generic set that comes nearest: {f.zeta:.4g}; rms residual {self.rms:.3g} N/cm^3")
         lines.append(f"the map {survey(f.stress).told()}")
         if self.beta_deg.size > MOST_LINES:
@@ -229,10 +229,13 @@ def _name(source: str) -> str:
 def law_of(source: str) -> str:
     """The law that a file's columns are of: granular for drag on a rod, or what cannot be read."""
     try:
-        there = {*read_rows(source, LARGEST_FILE, "").header[1]}
+        there = read_rows(source, LARGEST_FILE, "").header[1]
     except ValueError:
         return "granular"
-    if {"alpha_x", "alpha_z"} & there:
+    begins = lambda *words: any(word.startswith(words) for word in there)
+    if begins("psi"):
+        return "granular"
+    if begins("alpha_", "beta"):
         return "stress-map"
     found = {named[0] for word in there if (named := penetration.quantity(word))}
-    return "zeta" if {"depth", "force"} <= found and not any(word.startswith("psi") for word in there) else "granular"
+    return "zeta" if begins("depth") or {"depth", "force"} <= found else "granular"

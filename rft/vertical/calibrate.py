@@ -130,8 +130,8 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     depth, force, area = (np.atleast_1d(real_array(*x)) for x in (("depth", depth), ("force", force), ("area", area)))
     require(depth.ndim == 1 and depth.shape == force.shape, "depth and force must be equally many numbers")
     require(area.shape in ((1,), depth.shape), "area must be one number, or as many as depths")
-    finite = bool(np.isfinite(depth).all() and np.isfinite(force).all())
-    require(finite and bool(((area > 0) & np.isfinite(area)).all()), "depths and forces must be finite, areas positive")
+    require(bool(np.isfinite(depth).all() and np.isfinite(force).all()), "depths and forces must be finite")
+    require(bool(((area > 0) & np.isfinite(area)).all()), "the area of the plate must be a number above 0")
     order = np.argsort(depth, kind="stable")
     order = order[depth[order] > 0]
     require(FEWEST_DEPTHS <= order.size <= MOST, f"{FEWEST_DEPTHS} to {MOST} depths below the surface are needed, got "
