@@ -21,6 +21,7 @@ DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
 LEVEL = 0.95  # of intervals
 FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
 MOST = 100_000
+LARGEST = 1e12  # of any number; what is below 1 over it counts as 0
 STRENGTHS = (0.01, 100.0)  # of zeta: more than a factor of 20 beyond all named media is a slip of units
 EXACT = 1e-6  # least noise, over zeta
 STRAY = 0.5  # rms of what the generic shape leaves of drags, over theirs, from which on slips are looked for
@@ -130,10 +131,11 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     depth, force, area = (np.atleast_1d(real_array(*x)) for x in (("depth", depth), ("force", force), ("area", area)))
     require(depth.ndim == 1 and depth.shape == force.shape, "depth and force must be equally many numbers")
     require(area.shape in ((1,), depth.shape), "area must be one number, or as many as depths")
-    require(bool(np.isfinite(depth).all() and np.isfinite(force).all()), "depths and forces must be finite")
-    require(bool(((area > 0) & np.isfinite(area)).all()), "the area of the plate must be a number above 0")
+    small = all(bool((np.abs(x) <= LARGEST).all()) for x in (depth, force, area))
+    require(small, f"depths, forces and areas must be finite numbers of at most {LARGEST:g}")
+    require(bool((area >= 1 / LARGEST).all()), "the area of the plate must be above 0")
     order = np.argsort(depth, kind="stable")
-    order = order[depth[order] > 0]
+    order = order[depth[order] > 1 / LARGEST]
     require(FEWEST_DEPTHS <= order.size <= MOST, f"{FEWEST_DEPTHS} to {MOST} depths below the surface are needed, got "
             f"{order.size}: depth is positive downwards")  # fmt: skip
     d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
@@ -161,9 +163,9 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     same = all(x.ndim == 1 and x.shape == rows[0].shape for x in rows)
     require(same, "beta, gamma, alpha_x and alpha_z must be equally many numbers")
     rows = np.stack(rows)
-    require(bool(np.isfinite(rows).all()), "plate drags must be finite numbers")
+    require(bool((np.abs(rows) <= LARGEST).all()), f"plate drags must be finite numbers of at most {LARGEST:g}")
     in_range("number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST, whole=True)
-    require(bool((rows[2:] != 0).any()), "the plate drags are all 0: measure some force")
+    require(bool((np.abs(rows[2:]) > 1 / LARGEST).any()), "the plate drags are all 0: measure some force")
     return rows
 
 
