@@ -8,8 +8,8 @@ published angle from 0 to pi starts below is assumed. Its data are not in the te
 
 (b), (c) Drag and lift against the depth of the rod's axis. (d) Lift over drag deep down, beside the sign that was measured
 (Ding, Gravish and Goldman, Phys. Rev. Lett. 106, 028001 (2011)): up on round and square rods, down on a half cylinder that
-lies on its flat side. The nine-term map says up for all. It pulls on faces that look up by more than 53 degrees, where plates
-are pushed: that lifts. Without tension (dashed, open) nothing is left of the half cylinder's lift but 0.04 of its drag, still
+lies on its flat side. The nine-term map says up for all. It pulls on faces that look up by more than 53 degrees, and
+that lifts. Without tension (dashed, open) nothing is left of the half cylinder's lift but 0.04 of its drag, still
 not the measured sign: it takes faces that look up to be pressed down, as plates were in that work. Undersides that slide
 along themselves carry nothing here; they could only add lift.
 

@@ -84,7 +84,7 @@ def test_where_drags_determine_all_it_is_plain_least_squares():
 def test_intervals_cover():
     """Of sets that are named and one far from generic, by 6, 12 and 40 drags, with 95 %."""
     rng, inside, total = np.random.default_rng(1), 0, 0
-    for k in range(450):
+    for k in range(270):
         stress = (VERTICAL["poppy-seeds-loose"].stress, VERTICAL["poppy-seeds-close"].stress, FAR)[k % 3]
         found = fit_stress(*noisy(stress, rng, count=(6, 12, 40)[k // 3 % 3]))
         low, high = found.intervals.T
@@ -323,6 +323,16 @@ def test_numbers_of_text_and_picture(tmp_path):
         [drawn["low"] / drawn["law"], drawn["high"] / drawn["law"]], np.tile(test.fit.interval / z, (4, 1)).T
     )
     assert test.rms == drawn["rms"] == pytest.approx(np.sqrt(np.mean((drawn["force"] - drawn["law"]) ** 2)))
+
+
+def test_drags_are_drawn_where_the_same_plate_moves_ahead():
+    from geomech.output.plots.plates import _ahead
+
+    beta, gamma = np.random.default_rng(8).uniform(-360, 360, (2, 400))
+    b, g, side = _ahead(beta, gamma)
+    assert np.abs([b, g]).max() <= 90
+    a_x, a_z = StressMap()(beta * RAD, gamma * RAD)
+    np.testing.assert_allclose(StressMap()(b * RAD, g * RAD), [side * a_x, a_z], atol=1e-12)
 
 
 TEST = ("0.01,2.1", "0.02,4.2", "0.03,5.9", "0.05,10.1")
