@@ -380,6 +380,7 @@ def test_zeta_as_text_and_picture(tmp_path, capsys):
     assert (code, err) == (0, "")
     assert text.startswith("zeta fitted to p.csv: 40 depths to 6 cm\nzeta        0.3")
     assert (tmp_path / "p.png").stat().st_size > 10_000
+    assert text.endswith('medium in %s: in an intruder scene, [medium] file = "m.toml"\n' % (tmp_path / "m.toml"))
     assert "zeta = 0.3" in (tmp_path / "m.toml").read_text()
 
 

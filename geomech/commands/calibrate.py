@@ -60,7 +60,7 @@ def calibrate(
         note(told)
     print(json.dumps(found.numbers()) if as_json else found.text())
     if out and not as_json:
-        print(f'medium in {out}: in a scene, [medium] file = "{out.name}"')
+        print(f'medium in {out}: in {found.scene}, [medium] file = "{out.name}"')
 
 
 def caps(text: str) -> float | str:

@@ -36,7 +36,7 @@ class OfDrag:
     fit: Fit
     psi_deg: np.ndarray
     name: str
-    picture = "drag_figure"
+    picture, scene = "drag_figure", "a scene"
 
     def notes(self) -> list[str]:
         """What one who uses the medium should know."""

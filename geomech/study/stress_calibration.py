@@ -33,7 +33,7 @@ class OfPlates:
     alpha_x: np.ndarray
     alpha_z: np.ndarray
     name: str
-    picture = "plates_figure"
+    picture, scene = "plates_figure", "an intruder scene"
 
     def numbers(self) -> dict:
         """What `geomech calibrate --json` prints; intervals with 95 %, resolution: the share that comes from the data."""
@@ -125,7 +125,7 @@ class OfPenetration:
     fit: ZetaFit
     area: np.ndarray
     name: str
-    picture = "penetration_figure"
+    picture, scene = "penetration_figure", "an intruder scene"
 
     def numbers(self) -> dict:
         """What `geomech calibrate --json` prints; interval with 95 %."""
