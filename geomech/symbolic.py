@@ -1,4 +1,9 @@
-"""Curvature in closed form, for connections given as sympy matrices."""
+"""Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
+
+    A, alpha = system.symbolic()            # or rft.symbolic.viscous_chain(lengths, ratio), with symbols
+    A = symbolic.simplified(A, alpha)
+    print(symbolic.latex(symbolic.ccf(A, alpha)))
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 import sympy as sp
+
+from geomech.waves import Waves
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
@@ -32,3 +39,22 @@ def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
         return np.einsum("...ij,...j->...i", matrix, adot)
 
     return xi
+
+
+def simplified(A: sp.Matrix, alpha) -> sp.Matrix:
+    """The matrix with every entry one fraction in lowest terms, whose parts are sums of cosines and sines of sums of angles:
+    two formulas of one function come out alike. An entry that is no rational function of sines and cosines, or neither even
+    nor odd in alpha, stays as it is."""
+    waves = Waves(A, alpha)
+    return A.applyfunc(waves.reduced)
+
+
+def latex(A: sp.Matrix, name: str = "A") -> str:
+    """LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number."""
+    common = {sp.fraction(x)[1].as_coeff_Mul()[1] for x in A if x != 0} - {1}
+    if len(common) != 1:
+        return f"{name} = {sp.latex(A)}"
+    (D,) = common
+    front = sp.latex(1 / sp.Symbol("D"))
+    rest = A.applyfunc(lambda x: x * D)
+    return f"{name} = {front} {sp.latex(rest)}, \\qquad D = {sp.latex(D)}"

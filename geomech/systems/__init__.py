@@ -1,16 +1,29 @@
 """Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
 
 from geomech.systems.base import Cycle, Plain, Premise, System, checked_system
+from geomech.systems.diff_drive import DifferentialDrive
+from geomech.systems.floating import FloatingChain
+from geomech.systems.ideal_fluid import IdealFluidSwimmer
 from geomech.systems.no_slip import NoSlipSnake
 from geomech.systems.solver import Solver
 from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
 
-KINDS = {"swimmer": Swimmer, "no-slip-snake": NoSlipSnake, "table": Table}
+KINDS = {
+    "swimmer": Swimmer,
+    "no-slip-snake": NoSlipSnake,
+    "differential-drive": DifferentialDrive,
+    "ideal-fluid-swimmer": IdealFluidSwimmer,
+    "floating-chain": FloatingChain,
+    "table": Table,
+}
 
 __all__ = [
     "KINDS",
     "Cycle",
+    "DifferentialDrive",
+    "FloatingChain",
+    "IdealFluidSwimmer",
     "NoSlipSnake",
     "Plain",
     "Premise",

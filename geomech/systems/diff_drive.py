@@ -1,0 +1,57 @@
+"""The differential drive: a cart on two wheels that roll and do not slip, each turned by itself.
+
+Its shape variables are the angles of the wheels, of which nothing depends: A is the same everywhere, dA = 0, and the CCF is
+the bracket of its columns alone, (0, -wheel_radius^2 / track, 0): parallel parking. Source: R. L. Hatton and H. Choset,
+Int. J. Robotics Research 30, 988 (2011), Sec. 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geomech.errors import choose, number
+from geomech.systems.base import Plain
+from rft.symbolic import differential_drive, exact
+
+
+@dataclass(frozen=True)
+class DifferentialDrive(Plain):
+    """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
+
+    wheel_radius (m): of both, in the unit of track. track (m): between the wheels, in the unit wanted for displacement;
+    1 for body lengths. frame (-): "mean", midway between the wheels and heading forwards.
+    """
+
+    wheel_radius: float = 0.5
+    track: float = 1.0
+    frame: str = "mean"
+
+    kind = "differential-drive"
+    joints = 2
+    linear = True
+
+    def __post_init__(self):
+        number("track", self.track, 1e-9, 1e9)
+        number("wheel_radius", self.wheel_radius, 1e-9, 1e9)
+        choose("frame", self.frame, ["mean"])
+
+    length = property(lambda self: self.track)
+    shape_labels = (("left wheel", "rad"), ("right wheel", "rad"))
+
+    @property
+    def _matrix(self) -> np.ndarray:
+        half, turn = self.wheel_radius / 2, self.wheel_radius / self.track
+        return np.array([[half, half], [0.0, 0.0], [-turn, turn]])
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3), (track/time, track/time, rad/time): (r (w_1 + w_2) / 2, 0, r (w_2 - w_1) / track)."""
+        _, rates = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        return rates @ self._matrix.T
+
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        """A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
+        radius, track = exact(self.wheel_radius), exact(self.track)
+        return differential_drive(radius, track)

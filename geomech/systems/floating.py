@@ -1,0 +1,45 @@
+"""A chain of links afloat: in space, on ice or an air table, where nothing pushes. It turns itself about, and goes nowhere.
+
+Its centre of mass stays where it is, and its angular momentum zero: a cat's righting, a diver's twist. Source: R. M. Murray,
+Z. Li and S. S. Sastry, A Mathematical Introduction to Robotic Manipulation (1994), Ch. 7; the three-link chain is the first
+example of G. C. Walsh and S. S. Sastry, IEEE Trans. Robotics and Automation 11, 139 (1995).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geomech.systems.momentum import Momentum
+
+
+@dataclass(frozen=True)
+class FloatingChain(Momentum):
+    """Links joined by hinges, with masses and moments of inertia of their own.
+
+    masses (-): of the links, relative; as their lengths if left out. inertias (-): of each link about its centre, over its
+    mass and the square of its length; 1/12, that of a thin rod, if left out.
+    """
+
+    masses: tuple[float, ...] = ()
+    inertias: tuple[float, ...] = ()
+
+    kind = "floating-chain"
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.of_links("masses", 1e-9, 1e9)
+        self.of_links("inertias", 1e-6, 1e6)
+
+    def inertia(self, number=float):
+        """Masses are parts of the whole."""
+        lengths = [number(x) for x in self.lengths]
+        masses = [number(x) for x in self.masses] or lengths
+        rod = number(1) / 12
+        about = [number(x) for x in self.inertias] or [rod] * len(lengths)
+        body, whole = sum(lengths), sum(masses)
+        masses = [m / whole for m in masses]
+        return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, about, lengths)]
+
+    @property
+    def because(self) -> str:
+        return "(the velocity at every shape, all shapes at once): momentum is zero, so that nothing coasts"

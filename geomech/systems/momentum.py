@@ -1,0 +1,135 @@
+"""Chains of links whose momentum is zero and stays so: what moves them is inertia, and no force from outside.
+
+Link i has inertia along itself, across itself and about its centre, G_i = diag(m_t, m_n, I). With its velocity v_i = J_i xi +
+B_i alphadot the kinetic energy is T = 1/2 sum v_i^T G_i v_i; momentum, its derivative with respect to xi, is zero if
+
+    xi = A alphadot,    A = -(sum J_i^T G_i J_i)^-1 sum J_i^T G_i B_i,
+
+the mechanical connection (J. E. Marsden, R. Montgomery and T. S. Ratiu, Memoirs of the AMS 436 (1990)). What is left is
+T = 1/2 alphadot^T M(alpha) alphadot, M being the kinetic-energy metric of shape space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geomech.errors import real_array, short
+from geomech.systems.base import Plain
+from rft.bodies import Chain
+from rft.bodies.base import Kinematics
+from rft.symbolic import chain_connection, exact
+
+
+@dataclass(frozen=True)
+class Linkage(Chain):
+    """A chain whose mean is that of its links' masses: "mean" is the centre of mass and the mean heading by mass."""
+
+    masses: tuple[float, ...] = ()
+
+    def _of_frame(self, x: np.ndarray, frame: str) -> np.ndarray:
+        link, masses = self._link_of(frame), np.asarray(self.masses)
+        return x[link] if link is not None else masses @ x / masses.sum()
+
+
+@dataclass(frozen=True)
+class Momentum(Plain):
+    """Base of chains without momentum.
+
+    lengths (-): relative link lengths, tail to head, all > 0, at least two. length (m): the whole body, in the unit wanted
+    for displacement; 1 for body lengths. frame (-): "mean", centre of mass and mass-weighted mean heading, or "link-1",
+    "link-2" ..., those of that link.
+    """
+
+    lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
+    length: float = 1.0
+    frame: str = "mean"
+
+    mirror = linear = joint_angles = True
+
+    def __post_init__(self):
+        object.__setattr__(self, "lengths", Chain(self.lengths, self.length).lengths)
+        self._chain._link_of(self.frame)
+
+    def of_links(self, name: str, least: float, most: float) -> None:
+        """ValueError if the field of this name is not empty, nor a number from least to most for each link."""
+        x = real_array(name, getattr(self, name))
+        if x.shape not in ((0,), (len(self.lengths),)) or not ((least <= x) & (x <= most)).all():
+            raise ValueError(
+                f"{name} must be {len(self.lengths)} numbers from {least:g} to {most:g}, one for each link, or left out, "
+                f"got {short(x.tolist())}"
+            )
+        object.__setattr__(self, name, tuple(x.tolist()))
+
+    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
+        """Masses of the links, and [along, across, about the centre] of each: the mass that it moves, in any one unit and
+        body lengths, of its own or of the fluid. number: `float`, or `rft.symbolic.exact` for formulas."""
+        raise NotImplementedError
+
+    @property
+    def joints(self) -> int:
+        return len(self.lengths) - 1
+
+    @property
+    def _chain(self) -> Linkage:
+        return Linkage(self.lengths, self.length, self.frame, tuple(self.inertia()[0]))
+
+    def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """As `rft.Chain.points`."""
+        return self._chain.points(alpha, pose)
+
+    def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """As `rft.Chain.frame_pose`."""
+        return self._chain.frame_pose(frame, alpha, alphadot)
+
+    def _weights(self, motion: Kinematics) -> np.ndarray:
+        """G (3, n, 1) for velocities (v_t, v_n, spin), spin being the turning rate times half the length."""
+        along, across, about = np.array(self.inertia()[1]).T
+        return np.stack([along, across, about / motion.half[:, 0] ** 2])[..., None]
+
+    def _moving(self, alpha, alphadot) -> tuple[Kinematics, np.ndarray, np.ndarray]:
+        """The links, G, and xi (3, B) in body lengths, for shapes (B, joints)."""
+        motion = self._chain.motion(alpha.T, alphadot.T)
+        weights = self._weights(motion)
+        zero, one = np.zeros_like(motion.c), np.ones_like(motion.c)
+        J = np.stack(
+            [
+                np.stack([motion.c, motion.s, motion.r_t]),
+                np.stack([-motion.s, motion.c, motion.r_n]),
+                np.stack([zero, zero, motion.half * one]),
+            ]
+        )  # (v, xi, n, B)
+        weighted = weights[:, None] * J
+        locked = np.einsum("vinb,vjnb->bij", weighted, J)
+        momentum = np.einsum("vinb,vnb->bi", weighted, motion.v)
+        return motion, weights, -np.linalg.solve(locked, momentum[..., None])[..., 0].T
+
+    def _flat(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
+        alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
+        return alpha.reshape(-1, self.joints), alphadot.reshape(-1, self.joints), alpha.shape[:-1]
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) in the frame, (length/time, length/time, rad/time)."""
+        alpha, alphadot, shape = self._flat(alpha, alphadot)
+        return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [self.length, self.length, 1.0]
+
+    def cost(self, alpha, alphadot) -> np.ndarray:
+        """alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
+        alpha, alphadot, shape = self._flat(alpha, alphadot)
+        motion, weights, xi = self._moving(alpha, alphadot)
+        return (weights * (motion.v + motion.carried(xi)) ** 2).sum((0, 1)).reshape(shape)
+
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        """A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
+        masses, inertia = self.inertia(exact)
+        A, alpha = chain_connection(list(map(exact, self.lengths)), inertia, self.frame, masses)
+        return scaled(A, self.length), alpha
+
+
+def scaled(A, length: float):
+    """A with its rows of translation in units of the length."""
+    import sympy as sp
+
+    return sp.diag(exact(length), exact(length), 1) * A
