@@ -1,8 +1,8 @@
 """Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
 
-    A, alpha = system.symbolic()            # or rft.symbolic.viscous_chain(lengths, ratio), with symbols
-    A = symbolic.simplified(A, alpha)
-    print(symbolic.latex(symbolic.ccf(A, alpha)))
+A, alpha = system.symbolic()            # or rft.symbolic.viscous_chain(lengths, ratio), with symbols
+A = symbolic.simplified(A, alpha)
+print(symbolic.latex(symbolic.ccf(A, alpha)))
 """
 
 from __future__ import annotations
@@ -50,11 +50,12 @@ def simplified(A: sp.Matrix, alpha) -> sp.Matrix:
 
 
 def latex(A: sp.Matrix, name: str = "A") -> str:
-    """LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number."""
-    common = {sp.fraction(x)[1].as_coeff_Mul()[1] for x in A if x != 0} - {1}
-    if len(common) != 1:
-        return f"{name} = {sp.latex(A)}"
-    (D,) = common
-    front = sp.latex(1 / sp.Symbol("D"))
-    rest = A.applyfunc(lambda x: x * D)
-    return f"{name} = {front} {sp.latex(rest)}, \\qquad D = {sp.latex(D)}"
+    """LaTeX of a matrix, with its denominator in front if all entries have the same, up to a number. It needs amsmath."""
+    below = lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f.is_Pow and f.exp.is_negative and not f.is_number))
+    common = {below(x) for x in A if x != 0}
+    written = lambda M: sp.latex(M, mat_str="pmatrix", mat_delim="")
+    if len(common) != 1 or common == {1}:
+        return f"{name} = {written(A)}"
+    (one_over,) = common
+    above = A.applyfunc(lambda x: sp.Mul(*(f for f in sp.Mul.make_args(x) if f not in one_over.args and f != one_over)))
+    return f"{name} = \\frac{{1}}{{D}} {written(above)}, \\qquad D = {sp.latex(1 / one_over)}"

@@ -11,7 +11,6 @@ from typing import Any
 
 import sympy as sp
 
-
 MOST = 2  # parts of alpha that are no high powers yet
 MULTIPLES = sorted(range(-8, 9), key=abs)  # of the heading in one angle
 

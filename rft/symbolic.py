@@ -6,6 +6,7 @@ Sizes are numbers or symbols. Each function returns (A, alpha): a sympy Matrix (
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -54,7 +55,7 @@ def links(lengths, seen_from: int) -> list[Link]:
     headings = [sp.Add(*alpha[:k]) - sp.Add(*alpha[: seen_from - 1]) for k in range(len(lengths))]
     halves = [x / 2 * sp.Matrix([sp.cos(h), sp.sin(h)]) for x, h in zip(lengths, headings)]
     places = [sp.zeros(2, 1)]
-    for tail, head in zip(halves, halves[1:]):
+    for tail, head in itertools.pairwise(halves):
         places.append(places[-1] + tail + head)
     made = []
     for heading, place in zip(headings, [p - places[seen_from - 1] for p in places]):
@@ -66,6 +67,13 @@ def links(lengths, seen_from: int) -> list[Link]:
         B[2, :] = sp.Matrix([heading]).jacobian(alpha)
         made.append(Link(heading, place, J, B))
     return made
+
+
+def in_units_of(length, A):
+    """A with its rows of translation in units of which the body has so many."""
+    import sympy as sp
+
+    return sp.diag(exact(length), exact(length), 1) * A
 
 
 def quarter_turn():

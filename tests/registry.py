@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Wave
-from geomech.systems import NoSlipSnake, Swimmer, Table
+from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
 from rft import (
     Backbone,
     BodyInertia,
@@ -77,6 +77,9 @@ GAITS = {
 SYSTEMS = {
     "swimmer": Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, BODIES["uneven"]),
     "no-slip-snake": NoSlipSnake((0.8, 1.3, 1.0), length=0.4, frame="link-1"),
+    "differential-drive": DifferentialDrive(0.03, 0.15),
+    "ideal-fluid-swimmer": IdealFluidSwimmer((0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0)),
+    "floating-chain": FloatingChain((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05)),
     "table": Table(
         pathlib.Path(__file__).parent / "data" / "uneven.nc"
     ),  # of the swimmer above; the file has its scene

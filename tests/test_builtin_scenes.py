@@ -13,6 +13,7 @@ from rft import CATALOGUE
 # Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's own numerics.
 PINNED = {
     "butterfly-glass": (0.267792218, 0.0, 0.0),
+    "differential-drive": (0.081690399, -0.264082852, 0.0),
     "no-slip-snake": (0.110055635, 0.0210151860, 0.0),
     "sandfish-close": (0.277242251, -0.0855674831, 0.0),
     "sandfish-heavy": (0.353167793, -0.087359391, 0.0),
@@ -23,8 +24,10 @@ PINNED = {
     "seven-link-wave": (0.249123776, 0.0, 0.0),
     "shovel-nosed-snake": (0.178712041, -3.32132635e-05, 0.0),
     "three-link-coulomb": (-0.00628353877, -0.000775375048, 0.0),
+    "three-link-floating": (0.0, 0.0, -0.25739213),
     "three-link-glass": (0.0634476015, 0.00687549129, 0.0),
     "three-link-glass-close": (0.0420145543, 0.00471086455, 0.0),
+    "three-link-ideal-fluid": (-0.274035615, -0.011117928, 0.0),
     "three-link-viscous": (-0.0494990214, 0.0134003664, 0.0),
 }
 

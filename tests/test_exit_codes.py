@@ -28,6 +28,7 @@ COMMANDS = {
     "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
     "calibrate": ["-o", "out.toml", "--plot", "out.svg"],
     "explain": [],
+    "symbolic": [],
     "stress": ["--beta", "30", "--gamma", "-50", "--plot", "out.svg"],
     "intrude": ["-o", "out.csv", "--plot", "out.svg"],
     "scenes": [],
@@ -35,7 +36,8 @@ COMMANDS = {
 }
 # Where it is no scene with a gait.
 SUBJECT = {
-    "scenes": [], "keys": [], "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"],
+    "scenes": [], "keys": [], "symbolic": ["differential-drive"],
+    "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"],
 }  # fmt: skip
 SOLVING = [name for name in COMMANDS if name not in ("explain", *SUBJECT)]
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py

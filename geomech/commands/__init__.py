@@ -3,5 +3,5 @@ here; `geomech.commands.options` has what they share."""
 
 COMMANDS = (
     "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "calibrate",
-    "stress", "intrude", "explain", "scenes", "keys",
+    "stress", "intrude", "explain", "symbolic", "scenes", "keys",
 )  # fmt: skip

@@ -106,7 +106,8 @@ class Plain:
     that one beyond a full turn is likely a slip of unit. closed: forces on an element have an exact form, which finer
     loads come near to. notes: lines on what its user may not expect of how it is computed. frequency: cycles per
     second, where its forces depend on it. covariance: (n, n), of parameters of its own that are not known for certain,
-    which `varied` changes; None where all are.
+    which `varied` changes; None where all are. cost: None, or a function of alpha and alphadot that gives alphadot^T
+    M(alpha) alphadot where the metric M of `geomech.metric` is not one of drag but, say, of kinetic energy.
     """
 
     kind = "system"
@@ -116,7 +117,7 @@ class Plain:
     mirror = linear = kinks = False
     lacks = NONE
     solver = None
-    singularity = points = None
+    singularity = points = cost = None
     elements = evaluations = 1
     together = 1 << 12
     held = cut = 0
@@ -190,6 +191,10 @@ class Plain:
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
         return max(1, VALUES_TOGETHER // (phases * (self.joints + 6)))
+
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        """A (3, joints) as a sympy Matrix, and its shape variables (`geomech.symbolic`); ValueError if it has no formula."""
+        raise ValueError(f"no formula of the connection of a {self.kind}: 'geomech connection' has its numbers")
 
     def stored(self, name: str) -> Any:
         """Its own table, "connection" or "harmonics", where it is known by one; None where tables are computed."""

@@ -20,7 +20,7 @@ from geomech.errors import real_array, short
 from geomech.systems.base import Plain
 from rft.bodies import Chain
 from rft.bodies.base import Kinematics
-from rft.symbolic import chain_connection, exact
+from rft.symbolic import chain_connection, exact, in_units_of
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,7 @@ class Momentum(Plain):
     mirror = linear = joint_angles = True
 
     def __post_init__(self):
-        object.__setattr__(self, "lengths", Chain(self.lengths, self.length).lengths)
-        self._chain._link_of(self.frame)
+        object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
     def of_links(self, name: str, least: float, most: float) -> None:
         """ValueError if the field of this name is not empty, nor a number from least to most for each link."""
@@ -74,7 +73,7 @@ class Momentum(Plain):
 
     @property
     def _chain(self) -> Linkage:
-        return Linkage(self.lengths, self.length, self.frame, tuple(self.inertia()[0]))
+        return Linkage(self.lengths, self.length, self.frame, masses=tuple(self.inertia()[0]))
 
     def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
         """As `rft.Chain.points`."""
@@ -124,12 +123,5 @@ class Momentum(Plain):
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         """A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
         masses, inertia = self.inertia(exact)
-        A, alpha = chain_connection(list(map(exact, self.lengths)), inertia, self.frame, masses)
-        return scaled(A, self.length), alpha
-
-
-def scaled(A, length: float):
-    """A with its rows of translation in units of the length."""
-    import sympy as sp
-
-    return sp.diag(exact(length), exact(length), 1) * A
+        A, alpha = chain_connection(self.lengths, inertia, self.frame, masses)
+        return in_units_of(self.length, A), alpha

@@ -7,11 +7,13 @@ Source: the kinematic snake of E. A. Shammas, H. Choset and A. A. Rizzi, Int. J.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from geomech.systems.base import Plain
 from rft.bodies import Chain
+from rft.symbolic import in_units_of, no_slip_snake
 
 
 @dataclass(frozen=True)
@@ -68,3 +70,7 @@ class NoSlipSnake(Plain):
         good = np.abs(np.linalg.det(rows)) >= 1e-14
         xi = np.linalg.solve(np.where(good[..., None, None], rows, np.eye(3)), -side[..., None])[..., 0]
         return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]
+
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        A, alpha = no_slip_snake(self.lengths, self.frame)
+        return in_units_of(self.length, A), alpha

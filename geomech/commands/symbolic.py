@@ -1,0 +1,27 @@
+"""geomech symbolic."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from geomech.commands.options import SceneArgument, loaded
+from geomech.errors import SceneError, named
+
+
+def symbolic(
+    name: SceneArgument,
+    latex: Annotated[bool, typer.Option("--latex", help="LaTeX, for a paper")] = False,
+    ccf: Annotated[bool, typer.Option(help="the CCF of every two joints, too")] = True,
+):
+    """The connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
+    from geomech.output.formulas import formulas
+
+    scene = loaded(name)
+    if scene.frame == "minimum-perturbation":
+        raise SceneError(f"{scene.name}: the minimum-perturbation frame is a field of numbers: take another frame")
+    with named(scene.name):
+        A, alpha = scene.system.symbolic()
+    for line in formulas(A, alpha, ccf, latex):
+        print(line, flush=True)

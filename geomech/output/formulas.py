@@ -1,0 +1,28 @@
+"""A connection and its CCFs as formulas: lines of plain text, or of LaTeX."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from geomech import symbolic
+
+ROWS = ("x", "y", "theta")
+
+
+def formulas(A, alpha, ccf: bool = True, latex: bool = False) -> Iterator[str]:
+    """Of A(alpha), xi = A alphadot, and of the CCF of every two joints if asked for, one after the other as they are found:
+    an equation of LaTeX each, or a line for each entry."""
+    A = symbolic.simplified(A, alpha)
+    told = symbolic.latex if latex else _text
+    yield told(A, "A")
+    if ccf:
+        for i, j in itertools.combinations(range(len(alpha)), 2):
+            of_two = symbolic.simplified(symbolic.ccf(A, alpha, i, j), alpha)
+            yield told(of_two, f"F_{{{i + 1}{j + 1}}}" if latex else f"CCF_{i + 1}{j + 1}")
+
+
+def _text(matrix, name: str) -> str:
+    entries = [(r, k) for r in range(3) for k in range(matrix.shape[1])]
+    column = lambda k: f"_{k + 1}" if name == "A" else ""
+    return "\n".join(f"{name}_{ROWS[r]}{column(k)} = {matrix[r, k]}" for r, k in entries)
