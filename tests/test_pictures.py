@@ -374,3 +374,15 @@ def test_a_row_of_rounding_has_no_arrows():
     assert arrows[1].get_clim() == (0.0, 1.0)
     for k in (0, 2):
         assert lengths[k].max() == pytest.approx(arrows[k].get_clim()[1])
+
+
+@pytest.mark.parametrize(("name", "rows"), [("three-link-floating", [2]), ("differential-drive", [1])])
+def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
+    """No patterns of 1e-16, no hatching over them; the strip of a motion shows what there is."""
+    study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
+    made = plots.ccf_figure(study.curvature, [study.scene.gait], "BL", study.curvature_error)
+    for k in range(3):
+        colours = np.asarray(made.axes[k].collections[0].get_array())
+        assert (np.abs(colours).max() > 1e-3) == (k in rows)
+        assert k in rows or made.axes[k].get_legend() is None
+        assert ([x.get_text() for x in made.axes[3 + k].get_yticklabels()] == ["0"]) == (k not in rows)

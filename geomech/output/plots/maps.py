@@ -16,7 +16,7 @@ COMPONENTS = ("x", "y", r"\theta")
 TITLES = ("forward", "sideways", "turning")
 Labels = Sequence[tuple[str, str]]
 ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
-PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
+OF_CCF = 1e-12  # the same of a CCF, a derivative
 PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
 HATCHED = "error above value"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
@@ -77,13 +77,19 @@ def drawable(field: Field) -> Field:
     return Field(axes, field.values[(..., *np.ix_(*picks))], field.degree)
 
 
+def has(field: Field, component: int) -> bool:
+    """Whether a component of a CCF is more than rounding."""
+    size = np.nanmax(np.abs(field.values), axis=tuple(range(1, field.values.ndim)), initial=0.0)
+    return bool(size[component] > OF_CCF * size.max())
+
+
 @styled
 def ccf_map(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
     labels: Labels = ANGLES, legend: bool = True,
 ):  # fmt: skip
     """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)), as far as the field goes; the colours
-    are centred on zero.
+    are centred on zero. One that is nothing but rounding is drawn as nothing.
 
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is
     known (`unknown`); there no line of zeros is drawn, and beside them only what parts two signs that are known
@@ -92,8 +98,10 @@ def ccf_map(
 
     ax = axes_of(ax)
     field, error = drawable(field), error and drawable(error)
-    values = field.values[component]
-    top, smooth = largest(values), "nearest" if field.masked else "gouraud"
+    values, told = field.values[component], has(field, component)
+    if not told:
+        values, error = 0 * values, None
+    top, smooth = largest(values) if told else 1.0, "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
     hidden = None
     if error is not None:
@@ -110,7 +118,7 @@ def ccf_map(
         ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
     of = rf"CCF$_{{{COMPONENTS[component]}}}$"
     ax.set_title(f"{of}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85)
+    colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85, ticks=None if told else [0.0])
     per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
     colorbar.set_label(f"{of} ({_unit(component, unit)}/{per})")
     return ax

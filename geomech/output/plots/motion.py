@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from geomech.field import Field
-from geomech.output.plots.maps import ccf_map, draw_gait, shape_space
+from geomech.output.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.study.motion import Motion
 
@@ -63,12 +63,13 @@ def world(ax, motion: Motion, rows, limits=None) -> Callable:
 
 
 def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = None) -> Callable:
-    """The gait among all shapes: on the map of the CCF along x, or the bare plane of two shape variables; against phase a
-    line each for few, a map along the body for many. A function of row as `world`."""
+    """The gait among all shapes: on the map of the CCF along x, or of the first component that there is, or the bare plane of
+    two shape variables; against phase a line each for few, a map along the body for many. A function of row as `world`."""
     scene, system = motion.scene, motion.scene.system
     if system.joints == 2:
         if field is not None:
-            ccf_map(field, 0, [scene.gait], system.unit, ax, error, labels=system.shape_labels)
+            component = next((k for k in range(3) if has(field, k)), 0)
+            ccf_map(field, component, [scene.gait], system.unit, ax, error, labels=system.shape_labels)
         else:
             draw_gait(scene.gait, ax)
             low, high = motion.alpha.min(0), motion.alpha.max(0)
