@@ -1,10 +1,12 @@
 """Systems without drag: chains whose momentum is zero, and the differential drive, against sums of their own."""
 
+import re
+
 import numpy as np
 import pytest
 from registry import SYSTEMS
 
-from geomech import metric
+from geomech import coordinates, metric
 from geomech.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.scene import Scene
@@ -183,3 +185,26 @@ def test_systems_without_a_metric_have_no_cost():
         "ideal-fluid-swimmer",
         "floating-chain",
     ]
+
+
+@pytest.mark.parametrize("system", [AFLOAT, SWIMMER], ids=lambda s: s.kind)
+def test_frames_tell_of_one_motion(system):
+    alpha, alphadot = np.random.default_rng(5).normal(size=(2, 20, 2))
+    seen = system.velocity(alpha, alphadot)
+    for frame in ("mean", "link-2", "link-3"):
+        h, hdot = system.frame_pose(frame, alpha, alphadot)
+        other = system.in_frame(frame).velocity(alpha, alphadot)
+        np.testing.assert_allclose(coordinates.change_velocity(seen, h, hdot), other, atol=1e-14)
+
+
+def test_masses_are_values_within_bounds():
+    some = FloatingChain(np.array([1, 1, 1]), masses=np.array([1, 2, 3]), inertias=[0.1, 1e-6, 1e6])
+    assert some == FloatingChain(masses=(1.0, 2.0, 3.0), inertias=(0.1, 1e-6, 1e6))
+    assert len({some, IdealFluidSwimmer(masses=[1e-9, 1e9, 1], inertias=[1e-6, 1, 1e6], aspect=1)}) == 2
+    for kind in (FloatingChain, IdealFluidSwimmer):
+        for name, low, high in (("masses", 1e-9, 1e9), ("inertias", 1e-6, 1e6)):
+            for wrong in (0.9 * low, 1.1 * high, np.nan):
+                with pytest.raises(
+                    ValueError, match=re.escape(f"{name} must be 3 numbers from {low:g} to {high:g}, one")
+                ):
+                    kind(**{name: (1.0, wrong, 1.0)})

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from geomech.commands.options import SceneArgument, loaded
-from geomech.errors import SceneError, named
+from geomech.errors import named
 
 
 def symbolic(
@@ -19,8 +19,6 @@ def symbolic(
     from geomech.output.formulas import formulas
 
     scene = loaded(name)
-    if scene.frame == "minimum-perturbation":
-        raise SceneError(f"{scene.name}: the minimum-perturbation frame is a field of numbers: take another frame")
     with named(scene.name):
         A, alpha = scene.system.symbolic()
     for line in formulas(A, alpha, ccf, latex):

@@ -112,6 +112,9 @@ class Framed:
     def with_solver(self, **changes) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(**changes)) if changes else self
 
+    def symbolic(self):
+        raise ValueError(f"no formula in the {NAME} frame, which is a field of numbers: take another frame")
+
     def in_frame(self, frame: str) -> System:
         return self if frame == NAME else self.inner.in_frame(frame)
 
