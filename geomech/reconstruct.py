@@ -7,6 +7,7 @@ than any power of the number of phases, with kinks (sticking links) like its squ
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -113,3 +114,38 @@ def _coefficients(f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if n % 2 == 0:
         c[..., [0, -1]] *= 0.5
     return k, c
+
+
+def slopes(xi) -> tuple[np.ndarray, np.ndarray]:
+    """(net pose (3,) of `displacement`, its derivatives (3, N, 3) by the body velocities) for one cycle xi (N, 3)."""
+    xi, n = real_array("xi", xi), np.shape(xi)[-2]
+    s = _spectrum(xi)
+    turns = s.mean_turn + s.k
+    reach, step = _reach(turns), 1e-5
+    net = np.array([*_parts((s.wave * reach).sum()), 2 * np.pi * s.mean_turn[0]])
+    share = np.where((n % 2 == 0) & (np.abs(s.k) == n // 2), 0.5, 1.0)
+    phases = 2 * np.pi * np.arange(n) / n
+    seen = np.exp(-1j * np.outer(phases, s.k)) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
+    heading = turning(xi) - turning(xi)[0]
+    wave, way = np.exp(1j * heading) * seen, xi[:, 0] + 1j * xi[:, 1]
+    turned = (s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)).sum() / n
+    spread = _turning_of(n)  # heading at one phase by the turning velocity at another
+    dz = np.stack([wave, 1j * wave, (1j * wave * way) @ (spread - spread[0]) + turned], -1)
+    return net, np.stack([dz.real, dz.imag, np.broadcast_to([0.0, 0.0, 2 * np.pi / n], (n, 3))])
+
+
+def _parts(z: complex) -> tuple[float, float]:
+    return z.real, z.imag
+
+
+def _reach(turns: np.ndarray) -> np.ndarray:
+    """Integral of e^(i turns t) over a cycle."""
+    return 2 * np.pi * np.exp(1j * np.pi * turns) * np.sinc(turns)
+
+
+@functools.lru_cache(maxsize=8)
+def _turning_of(n: int) -> np.ndarray:
+    """(N, N): `turning` at the phases (rows) by the turning velocity at each of them (columns)."""
+    unit = np.zeros((n, n, 3))
+    unit[..., 2] = np.eye(n)
+    return turning(unit).T

@@ -2,6 +2,6 @@
 here; `geomech.commands.options` has what they share."""
 
 COMMANDS = (
-    "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "calibrate",
-    "stress", "intrude", "explain", "symbolic", "scenes", "keys",
+    "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "optimize",
+    "calibrate", "stress", "intrude", "explain", "symbolic", "scenes", "keys",
 )  # fmt: skip

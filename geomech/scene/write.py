@@ -10,6 +10,7 @@ import tomllib
 
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
+from geomech.gaits import Gait
 from geomech.scene.intruder import IntruderScene, as_tables
 from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
@@ -32,6 +33,11 @@ def toml(scene: Scene | IntruderScene) -> str:
 def table(name: str, values: dict) -> str:
     """One table as TOML."""
     return _text({name: values})
+
+
+def gait_table(gait: Gait) -> dict:
+    """What stands in [gait]."""
+    return _of_kind(gait, "kind", GAITS)
 
 
 def medium_toml(name: str, entry) -> str:
@@ -70,7 +76,7 @@ def _anew(scene: Scene) -> dict:
             del part["frame"]  # the scene's
             if scene.frame != "mean":
                 out = {"frame": scene.frame, **out}
-    out["gait"] = _of_kind(scene.gait, "kind", GAITS)
+    out["gait"] = gait_table(scene.gait)
     if "frequency" in out["gait"]:
         for effect in effects:
             effect.pop("frequency", None)  # the gait's

@@ -1,0 +1,60 @@
+"""geomech optimize."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from geomech import terminal
+from geomech.commands.options import (
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    allow,
+    an_angle,
+    check_outputs,
+    loaded,
+)
+from geomech.errors import SceneError
+from geomech.files import whole_file
+
+
+def optimize(
+    name: SceneArgument,
+    aim: Annotated[str, typer.Option("--for", help="displacement, efficiency, turning or speed")],
+    direction: Annotated[Optional[str], typer.Option(help="x or y: displacement along that axis of the body")] = None,
+    harmonics: Annotated[Optional[int], typer.Option(help="of the Fourier series; 5 if left out")] = None,
+    within: Annotated[
+        Optional[float],
+        typer.Option(metavar="EXTENT", help="of every joint, in rad or as 120deg; the field's if left out", parser=an_angle),
+    ] = None,
+    starts: Annotated[int, typer.Option(metavar="N", help="loops to begin with; the first is the scene's")] = 1,
+    rate: Annotated[Optional[float], typer.Option(help="rad/s that no joint exceeds, for speed")] = None,
+    power: Annotated[Optional[float], typer.Option(help="mean, body's axial drag x BL/s, for speed")] = None,
+    out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="BEST.toml", help="scene to write")] = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+    yes: YesOption = False,
+):  # fmt: skip
+    """The best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
+    from geomech.optimise import checked, search
+    from geomech.output import optima, plots
+
+    scene = loaded(name)
+    request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
+    if out and out.suffix != ".toml":
+        raise SceneError(f"cannot write {out}: end the name of a scene in .toml")
+    check_outputs(scene, out, plot)
+    allow(scene, request.cost(), yes)
+    with terminal.progress(f"{aim} of {scene.name}") as bar:
+        found = search(request, bar)
+    if plot:
+        plots.save(plots.optimum_figure(found), plot)
+    if out:
+        with whole_file(out) as part:
+            part.write_text(optima.scene_toml(found), encoding="utf-8")
+    print(json.dumps(found.numbers()) if as_json else optima.text(found))

@@ -1,0 +1,89 @@
+"""What is to be as large as possible: a number of a cycle, with its slopes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.errors import SceneError, choose, number
+from geomech.optimise.cycles import Brought
+
+AIMS = ("displacement", "efficiency", "turning", "speed")
+DIRECTIONS = ("x", "y")
+TINY = 1e-12  # body lengths: a distance that is none
+
+
+@dataclass(frozen=True)
+class Aim:
+    """name: of AIMS. direction: "x" or "y", or "" for the net distance. length: of the body. rate (rad per unit of time): that
+    no shape variable goes beyond, and power (the body's axial drag x body length / time): that its mean keeps below, for speed.
+
+    displacement: net distance of a cycle over the body's length, or its part along an axis of the body frame as this points in
+    the mean over the cycle; where a gait does not turn, neither depends on where it starts. turning: angle of a cycle, rad.
+    efficiency: displacement over the length of the path. speed: displacement over the least time a cycle takes.
+    """
+
+    name: str
+    direction: str = ""
+    length: float = 1.0
+    rate: float | None = None
+    power: float | None = None
+
+    def __post_init__(self):
+        choose("--for", self.name, AIMS)
+        if self.direction:
+            choose("--direction", self.direction, DIRECTIONS)
+            if self.name == "turning":
+                raise SceneError("--direction is that of a displacement: turning takes none, drop it")
+        for name in ("rate", "power"):
+            if getattr(self, name) is not None:
+                number(f"--{name}", getattr(self, name), 1e-9, 1e9)
+                if self.name != "speed":
+                    raise SceneError(f"--{name} limits speed: say --for speed, or drop it")
+
+    straight = property(lambda self: self.name != "turning", doc="Whether turning is no part of it.")
+    costs = property(lambda self: self.name == "efficiency" or self.power is not None, doc="Whether it asks for power.")
+    timed = property(lambda self: self.name == "speed", doc="Whether the pacing is part of it.")
+    unit = property(
+        lambda self: {"turning": "rad per cycle", "speed": "BL/s"}.get(
+            self.name, "BL per cycle" if self.name == "displacement" else "BL per unit of path length"
+        )
+    )
+
+    def value(self, b: Brought, time: float = 1.0) -> tuple[float, np.ndarray]:
+        """(value, its slopes); time: of a rad of phase, for speed, whose slopes are those at that pacing."""
+        if self.name == "turning":
+            theta = b.net[0][2]
+            return abs(theta), (-1.0 if theta < 0 else 1.0) * b.net[1][2]
+        far = self._displacement(b)
+        if self.name == "efficiency":
+            value = far[0] / b.length[0]
+            return value, (far[1] - value * b.length[1]) / b.length[0]
+        cycle = 2 * np.pi * time if self.timed else 1.0
+        return far[0] / cycle, far[1] / cycle
+
+    def _displacement(self, b: Brought) -> tuple[float, np.ndarray]:
+        (x, y, _), (dx, dy, _) = b.net
+        if not self.direction:
+            size = np.hypot(x, y) + TINY
+            return size / self.length, (x * dx + y * dy) / size / self.length
+        value, slopes = self.along(b)
+        return abs(value) / self.length, (-1.0 if value < 0 else 1.0) * slopes / self.length
+
+    def along(self, b: Brought) -> tuple[float, np.ndarray]:
+        """Displacement along the direction, with its sign, in the system's unit."""
+        (x, y, _), (dx, dy, _), (swing, d_swing) = *b.net, b.swing
+        c, s = np.cos(swing), np.sin(swing)
+        along, across = c * x - s * y, s * x + c * y
+        if self.direction == "x":
+            return along, c * dx - s * dy - across * d_swing
+        return across, s * dx + c * dy + along * d_swing
+
+    def time(self, fastest: float, power: float | None, degree: float) -> tuple[float, list[str]]:
+        """(least time of a rad of phase, the limits that keep it so) of a cycle with shape variables that go ``fastest``, and
+        with that mean power and its degree in the rate, at a rad of phase per unit of time."""
+        times = {"rate": fastest / self.rate if self.rate else 0.0}
+        times["power"] = (power / self.power) ** (1 / degree) if self.power else 0.0
+        longest = max(times.values())
+        return longest, [name for name, x in times.items() if 0 < longest <= x * (1 + 1e-2)]

@@ -1,0 +1,201 @@
+"""The way up: sequential quadratic programming from one loop to the best one near, inside its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from geomech.optimise.aims import Aim
+
+EVEN = 1e-3  # of the value: what uneven pacing costs; it decides among pacings that bring the same
+STRAIGHT = 1e-3  # rad: below it a gait does not turn
+STRIDE, TOGETHER = (
+    0.5,
+    50,
+)  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
+FLAT, BACK = 0.05, 1e-6  # of the first harmonic: how thin a plane, and how far back a stroke, is none
+TRIES = 2.5  # cycles that a step takes, at most in the mean
+MARGIN = 0.5  # of the start's distance from singular shapes, which is kept
+
+
+def climb(
+    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, most: int = 100, tolerance: float = 1e-6,
+    singularity: Callable | None = None, told: Callable = lambda: None,
+) -> np.ndarray:  # fmt: skip
+    """The loop that ``aim`` leads to from ``p``; cycles: `Phases` or `Runs`. turn (rad): of a cycle, at most, where the aim is
+    to get along. singularity: of shapes, not to be met."""
+    from scipy.optimize import minimize
+
+    seen = _Seen(cycles, p.shape, told, TRIES * most)
+    loops, unit, shape = cycles.loops, cycles.loops.unit, p.shape
+    paced = aim.timed and aim.rate is not None
+    time = _time(cycles, aim, p, seen(p.ravel() / unit)) if aim.timed else 1.0
+    first = aim.value(seen(p.ravel() / unit), 1.0)[0]
+    weight = 0.0 if paced else EVEN * max(first, 0.01)
+    split = lambda x: (x[:-1], x[-1]) if paced else (x, 1.0)
+
+    def down(x):
+        x, slower = split(x)
+        b = seen(x)
+        value, slopes = aim.value(b, 1 / (2 * np.pi))
+        if aim.timed and not paced:
+            slower, d_slower = _by_power(cycles, aim, b, time)
+            slopes = slopes / slower - value / slower**2 * d_slower
+            f, df = value / slower, slopes
+        else:
+            f, df = value / slower, slopes / slower
+        df = unit * np.ravel(weight * b.uneven[1] - df)
+        return weight * b.uneven[0] - f, np.append(df, f / slower) if paced else df
+
+    A, limit = loops.limits()
+    rules = [_linear(A * unit, limit, paced)]
+    if paced:
+        rules.append(_rates(loops, aim.rate * time, unit))
+        if aim.power is not None:
+            rules.append(_power(cycles, aim, seen, time, unit))
+    theta = seen(p.ravel() / unit).net[1][2]
+    if aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else, as in sines, none of them turns
+        rules += _straight(seen, turn, unit, paced)
+    if (once := _once_round(loops, p, unit, paced)) is not None:
+        rules.append(once)
+    if singularity is not None:
+        rules.append(_away(loops, singularity, p, unit, paced))
+    x, left = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit, most
+    while left > 0:
+        room = np.where(np.arange(len(x)) < p.size, STRIDE, np.inf)
+        begun, way = x, []
+        try:
+            found = minimize(
+                down, x, jac=True, method="SLSQP", constraints=rules, bounds=np.stack([x - room, x + room], -1),
+                options={"maxiter": min(left, TOGETHER), "ftol": tolerance}, callback=lambda y: way.append(np.array(y)),
+            )  # fmt: skip
+            way.append(found.x)
+        except _Enough:
+            left = 0
+        x = next((y for y in reversed(way) if np.isfinite(y).all()), x)
+        left -= max(len(way), 1)
+        if left > 0 and np.abs(x - begun)[: p.size].max() < STRIDE * (1 - 1e-6) and found.success:
+            break
+    return np.reshape(split(x)[0] * unit, shape)
+
+
+class _Enough(Exception):
+    """Leaves a search that takes too many cycles."""
+
+
+class _Seen:
+    """The last cycle, which the value and all rules ask for; `_Enough` after ``most``."""
+
+    def __init__(self, cycles, shape, told, most: float):
+        self.cycles, self.shape, self.told, self.x, self.found = cycles, shape, told, None, None
+        self.last = cycles.count + most
+
+    def __call__(self, x: np.ndarray):
+        if self.x is None or not np.array_equal(self.x, x):
+            if self.cycles.count >= self.last:
+                raise _Enough
+            self.found = self.cycles(np.reshape(x * self.cycles.loops.unit, self.shape))
+            self.x = np.array(x)
+            self.told()
+        return self.found
+
+
+def _time(cycles, aim: Aim, p, b) -> float:
+    power = b.power[0] if b.power else None
+    return aim.time(np.abs(cycles.loops.cycle(p)[1]).max(), power, cycles.degree)[0]
+
+
+def _by_power(cycles, aim: Aim, b, time: float) -> tuple:
+    """Time of a rad of phase by the limit of power, over ``time``, and its slopes."""
+    P, dP = b.power
+    slower = (P / aim.power) ** (1 / cycles.degree) / time
+    return slower, slower / P / cycles.degree * dP
+
+
+def _linear(A, limit, paced: bool) -> dict:
+    A = np.column_stack([A, np.zeros(len(A))]) if paced else A
+    return {"type": "ineq", "fun": lambda x: limit - A @ x, "jac": lambda x: -A}
+
+
+def _rates(loops, fastest: float, unit: float) -> dict:
+    """No shape variable faster than the limit: the last of x times ``fastest``."""
+    A = np.concatenate([np.kron(loops.rates, one) for one in np.eye(loops.joints)[:, None]]) * unit
+    A = np.column_stack([np.concatenate([A, -A]), np.full(2 * len(A), -fastest)])
+    return {"type": "ineq", "fun": lambda x: -A @ x, "jac": lambda x: -A}
+
+
+def _power(cycles, aim: Aim, seen, time: float, unit: float) -> dict:
+    def slack(x):
+        return np.array([x[-1] - _by_power(cycles, aim, seen(x[:-1]), time)[0]])
+
+    def slopes(x):
+        return np.append(-unit * np.ravel(_by_power(cycles, aim, seen(x[:-1]), time)[1]), 1.0)[None]
+
+    return {"type": "ineq", "fun": slack, "jac": slopes}
+
+
+def _straight(seen, turn: float, unit: float, paced: bool) -> list[dict]:
+    """Net turn of at most ``turn`` either way, or of none."""
+    own = lambda x: x[:-1] if paced else x
+    theta = lambda x: seen(own(x)).net[0][2]
+    slopes = lambda x: np.append(unit * np.ravel(seen(own(x)).net[1][2]), np.zeros(int(paced)))[None]
+    if turn < STRAIGHT:
+        return [{"type": "eq", "fun": lambda x: np.array([theta(x)]), "jac": slopes}]
+    return [
+        {"type": "ineq", "fun": lambda x, s=s: np.array([turn - s * theta(x)]), "jac": lambda x, s=s: -s * slopes(x)}
+        for s in (1.0, -1.0)
+    ]
+
+
+def _once_round(loops, p, unit: float, paced: bool) -> dict | None:
+    """Never back about the centre, in the plane of the first harmonic: one stroke a cycle. None where ``p`` itself goes back,
+    or has no such plane: else p's sense and plane are kept."""
+    if p.ndim != 2 or p.shape[1] < 2:
+        return None
+    plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
+    if size[1] < FLAT * size[0]:
+        return None
+    at, rates = loops.basis[::2].copy(), loops.rates[::2]
+    at[:, 0] = 0.0  # about the centre
+
+    def going(x):
+        q = np.reshape((x[:-1] if paced else x) * unit, p.shape) @ plane
+        return at @ q, rates @ q
+
+    def swept(x):
+        (u, v), (du, dv) = (y.T for y in going(x))
+        return (u * dv - v * du) / (size[0] * size[1])
+
+    side = np.sign(swept(np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit).mean())
+
+    def slopes(x):
+        (u, v), (du, dv) = (y.T for y in going(x))
+        by_u, by_v = dv[:, None] * at - v[:, None] * rates, u[:, None] * rates - du[:, None] * at
+        rows = by_u[..., None] * plane[:, 0] + by_v[..., None] * plane[:, 1]  # (N, 2 K + 1, joints)
+        rows = side * unit * rows.reshape(len(at), -1) / (size[0] * size[1])
+        return np.column_stack([rows, np.zeros(len(rows))]) if paced else rows
+
+    start = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit
+    if (side * swept(start)).min() < -BACK:
+        return None
+    return {"type": "ineq", "fun": lambda x: side * swept(x), "jac": slopes}
+
+
+def _away(loops, singularity, p, unit: float, paced: bool) -> dict:
+    """On this side of the singular shapes, no nearer than MARGIN of where the start is."""
+    d = singularity(loops.cycle(p)[0])
+    side, least = np.sign(d[0]), MARGIN * np.abs(d).min()
+    joints, h = p.shape[-1], 1e-6
+
+    def slack(x):
+        shapes = loops.cycle(np.reshape((x[:-1] if paced else x) * unit, p.shape))[0]
+        return side * singularity(shapes) - least
+
+    def slopes(x):
+        shapes = loops.cycle(np.reshape((x[:-1] if paced else x) * unit, p.shape))[0]
+        by = [singularity(shapes + h * e) - singularity(shapes - h * e) for e in np.eye(joints)]
+        rows = side * unit * np.einsum("nk,nj->nkj", loops.basis, np.stack(by, -1) / (2 * h)).reshape(len(shapes), -1)
+        return np.column_stack([rows, np.zeros(len(rows))]) if paced else rows
+
+    return {"type": "ineq", "fun": slack, "jac": slopes}

@@ -1,0 +1,159 @@
+"""Loops in shape space as finite Fourier series: their numbers, their limits, where to start, and when two are one.
+
+The numbers of a loop are p (2 K + 1, joints), rad: the centre, then cosines and sines of the harmonics 1, 1, 2, 2 ... K. Shapes
+and rates at the phases are linear in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.gaits import Fourier, Gait
+
+DENSE = 1024  # phases at which a limit is held, and loops are compared
+TOUCHING = 5e-3  # of a limit: how near a loop is that touches it
+NARROWER = 5e-4  # of a limit: what a curve has beyond its phases
+SMALL, SIZEABLE = 0.05, 0.3  # of the limit: a start that is too small, and what it is made
+SAME = 0.02  # of its size: largest distance between two loops that are one
+
+
+@dataclass(frozen=True)
+class Loops:
+    """All loops of ``harmonics`` harmonics in ``joints`` shape variables that stay ``within`` (rad) of 0, seen at
+    ``phases``."""
+
+    joints: int
+    harmonics: int
+    within: float
+    phases: int = 64
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return 2 * self.harmonics + 1, self.joints
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """(N, 2 K + 1): shapes are basis @ p."""
+        return waves(self.phases, self.harmonics)
+
+    @cached_property
+    def rates(self) -> np.ndarray:
+        """(N, 2 K + 1): rates of shape are rates @ p."""
+        k = np.arange(1, self.harmonics + 1)
+        out = np.zeros_like(self.basis)
+        out[:, 1::2], out[:, 2::2] = -k * self.basis[:, 2::2], k * self.basis[:, 1::2]
+        return out
+
+    @property
+    def unit(self) -> float:
+        """Of p, so that steps are of the size of the room."""
+        return self.within / 2.5
+
+    def cycle(self, p) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha, alphadot), (..., N, joints), of loops p (..., 2 K + 1, joints)."""
+        return self.basis @ p, self.rates @ p
+
+    def limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """(A, b) with A p <= b for p as a row, at up to 256 phases of all shape variables together."""
+        rows = self.basis[:: max(1, self.joints * self.phases // 256)]
+        A = np.concatenate([np.kron(rows, unit) for unit in np.eye(self.joints)[:, None]])
+        return np.concatenate([A, -A]), np.full(2 * len(A), self.within * (1 - NARROWER))
+
+    def active(self, p) -> list[str]:
+        """Limits that the loop touches."""
+        found = []
+        for j, (low, high) in enumerate(zip(*self.reach(p))):
+            found += [f"alpha_{j + 1} >= {-self.within:g}"] if low <= -self.within * (1 - TOUCHING) else []
+            found += [f"alpha_{j + 1} <= {self.within:g}"] if high >= self.within * (1 - TOUCHING) else []
+        return found
+
+    def gait(self, p) -> Fourier:
+        """The loop as a gait, at amplitude 1."""
+        p = np.reshape(p, self.shape)
+        cos, sin = (tuple(map(tuple, p[first::2].T.tolist())) for first in (1, 2))
+        return Fourier(cos=cos, sin=sin, centre=tuple(p[0].tolist()))
+
+    def of(self, gait: Gait) -> np.ndarray:
+        """p of what the gait has up to the highest harmonic."""
+        alpha = gait.shape(2 * np.pi * np.arange(DENSE) / DENSE)
+        c = np.fft.rfft(alpha, axis=0)[: self.harmonics + 1] / DENSE
+        p = np.empty(self.shape)
+        p[0], p[1::2], p[2::2] = c[0].real, 2 * c[1:].real, -2 * c[1:].imag
+        return p
+
+    def fitted(self, p) -> np.ndarray:
+        """p drawn together about the nearest centre that lies inside, as little as it takes to stay within the limit."""
+        p = np.array(np.reshape(p, self.shape))
+        moving = waves(DENSE, self.harmonics)[:, 1:] @ p[1:]
+        high, low = moving.max(0), moving.min(0)
+        limit = self.within * (1 - NARROWER / 2)
+        size = min(1.0, float((2 * limit / np.maximum(high - low, 1e-300)).min()))
+        p[1:] *= size
+        p[0] = np.clip(p[0], -limit - size * low, limit - size * high)
+        return p
+
+    def _sizeable(self, p) -> np.ndarray:
+        """p, made larger where it is so small that slopes are too; a travelling wave where it does not move."""
+        p = np.array(p)
+        size = np.abs(waves(DENSE, self.harmonics)[:, 1:] @ p[1:]).max()
+        if size == 0:
+            lag = np.pi / 2 * np.arange(self.joints)
+            p[1], p[2], size = np.cos(lag), np.sin(lag), 1.0
+        if size < SMALL * self.within:
+            p[1:] *= SIZEABLE * self.within / size
+        return p
+
+    def reach(self, p) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest value of every shape variable (joints,), rad."""
+        alpha = waves(DENSE, self.harmonics) @ np.reshape(p, self.shape)
+        return alpha.min(0), alpha.max(0)
+
+    def starts(self, own, count: int, seed: int = 0) -> list[np.ndarray]:
+        """``count`` loops to begin with: ``own``, then travelling waves of several sizes and lags, then random ones."""
+        rng, found = np.random.default_rng(seed), [self.fitted(self._sizeable(own))]
+        lags = [np.pi / 2, -np.pi / 2, 2 * np.pi / 3, np.pi / 4]
+        for k in range(count - 1):
+            p = np.zeros(self.shape)
+            lag = np.arange(self.joints) * (lags[k] if k < len(lags) else rng.uniform(-np.pi, np.pi))
+            size = self.within * (0.7 if k == 0 else rng.uniform(0.4, 0.9))
+            p[1], p[2] = size * np.cos(lag), size * np.sin(lag)
+            if k > 0:
+                falling = 1 / np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None] ** 2
+                p[1:] += 0.3 * size * falling * rng.normal(size=(2 * self.harmonics, self.joints))
+                p[0] += 0.1 * self.within * rng.normal(size=self.joints)
+            found.append(self.fitted(p))
+        return found
+
+
+def waves(phases: int, harmonics: int) -> np.ndarray:
+    """(N, 2 K + 1): 1, cos t, sin t, cos 2t ... at equally spaced phases."""
+    kt = 2 * np.pi * np.outer(np.arange(phases) / phases, np.arange(1, harmonics + 1))
+    return np.concatenate([np.ones((phases, 1)), np.stack([np.cos(kt), np.sin(kt)], -1).reshape(phases, -1)], 1)
+
+
+def shifted(p: np.ndarray, t: float) -> np.ndarray:
+    """The loop that starts at phase t of this one."""
+    k = np.arange(1, (len(p) + 1) // 2)[:, None]
+    cos, sin, out = np.cos(k * t), np.sin(k * t), p.copy()
+    out[1::2], out[2::2] = cos * p[1::2] + sin * p[2::2], cos * p[2::2] - sin * p[1::2]
+    return out
+
+
+def reversed_(p: np.ndarray) -> np.ndarray:
+    """The loop run backwards from the same start."""
+    return np.concatenate([p[:1], (p[1:].reshape(-1, 2, p.shape[1]) * [[1.0], [-1.0]]).reshape(p[1:].shape)])
+
+
+def same(p: np.ndarray, q: np.ndarray, mirror: bool = True, tolerance: float = SAME) -> bool:
+    """Whether two loops are one, whatever their start, their pacing and their sense, or, with ``mirror``, their left and right
+    changed (alpha -> -alpha): no point of either is further from the other curve than ``tolerance`` of its size."""
+    seen = waves(DENSE // 4, (len(p) - 1) // 2)
+    first, size = seen @ p, np.ptp(seen @ p, axis=0).max()
+    for other in (q, -q) if mirror else (q,):
+        apart = np.linalg.norm(first[:, None] - (seen @ other)[None], axis=-1)
+        if max(apart.min(0).max(), apart.min(1).max()) <= tolerance * size + np.pi * size / len(seen) / 2:
+            return True
+    return False

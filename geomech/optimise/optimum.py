@@ -1,0 +1,74 @@
+"""What an optimisation finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.gaits import Gait, Sine
+from geomech.optimise.request import Request
+from geomech.scene.model import Scene
+from geomech.scene.write import gait_table
+
+
+@dataclass(frozen=True)
+class Told:
+    """A gait by the direct tier. value, error: of the aim. displacement: (3,), in the frame at the start, the system's unit.
+    length: of the path, work: of a cycle at a rad of phase per unit of time, in body drag x body length, None where there
+    is no power. time: of a rad of phase. limits: of the time."""
+
+    gait: Gait
+    value: float
+    error: float
+    displacement: np.ndarray
+    length: float | None
+    work: float | None
+    time: float
+    limits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What `optimise` found. best, start: told by the direct tier. active: limits that the best touches. answers: value and
+    number of starts of every different loop found, best first. seconds: it took."""
+
+    request: Request
+    best: Told
+    start: Told
+    active: tuple[str, ...]
+    answers: tuple[tuple[float, int], ...]
+    evaluations: int
+    seconds: float
+
+    value = property(lambda self: self.best.value)
+    estimate = property(lambda self: self.best.error)
+    gait = property(lambda self: self.best.gait)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene with the best gait, in a field that holds it."""
+        scene, gait = self.request.scene, self.best.gait
+        scene = scene.changed(gait=gait)
+        if isinstance(gait, Sine) or scene.system.stored("connection"):
+            return scene
+        room = np.abs(gait.centre) + np.abs(gait.unit(np.linspace(0, 2 * np.pi, 721))).max()
+        return scene.with_numerics(extent=max(scene.numerics.extent, float(room.max()) * 1.0001))
+
+    def numbers(self) -> dict:
+        """As JSON has them."""
+        b = self.best
+        return {
+            "objective": self.request.aim.name,
+            "value": b.value,
+            "start_value": self.start.value,
+            "displacement": b.displacement.tolist(),
+            "path_length": b.length,
+            "work": b.work,
+            "gait": gait_table(b.gait),
+            "evaluations": self.evaluations,
+            "seconds": self.seconds,
+            "active": list(self.active),
+            "estimate": b.error,
+        }

@@ -1,0 +1,150 @@
+"""What is asked of the optimiser, checked before anything is computed, and what it will cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.connection import evaluate
+from geomech.errors import SceneError, named, number
+from geomech.gaits import Sine
+from geomech.optimise.aims import Aim
+from geomech.optimise.climb import TRIES
+from geomech.optimise.loops import Loops
+from geomech.optimise.undulations import Undulations
+from geomech.scene.model import Scene
+from geomech.study import cost
+from geomech.systems.base import Premise
+
+JOINTS = 12  # more make more numbers than a search without a model of them can find
+PHASES = 128  # of a cycle in the search
+ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
+NEAR, FINISH, RUNS = 100, 16, 12  # steps of the search in tables, by the direct tier, and of gaits run as a whole
+DEGREES = 1e-3  # by which the degree of the power may scatter
+
+
+@dataclass(frozen=True)
+class Request:
+    """A scene, what is to be large in it, and the loops that are tried; `checked` makes one."""
+
+    scene: Scene
+    aim: Aim
+    loops: Loops | Undulations
+    starts: int
+
+    system = property(lambda self: self.scene.system)
+    whole = property(
+        lambda self: self.system.steps or isinstance(self.loops, Undulations), doc="Whether gaits are run as a whole."
+    )
+    looks_up = property(
+        lambda self: not self.whole and self.system.joints == 2 and not self.system.linear and self.stored is None
+        and self.system.singularity is None,
+        doc="Whether a table leads near.",
+    )  # fmt: skip
+    stored = property(lambda self: self.system.stored("connection"))
+
+    @cached_property
+    def power(self) -> Callable | None:
+        """power(alpha, alphadot, xi) in body drag x body length / time, None if the system has none."""
+        work, length = getattr(self.system, "work", None), self.system.length
+        return work and (lambda alpha, alphadot, xi: work(alpha, alphadot, xi).power / length)
+
+    @cached_property
+    def degree(self) -> float:
+        """Of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; ValueError if there is no such."""
+        if self.power is None:
+            raise ValueError(f"--for {self.aim.name} asks for power, and a {self.system.kind} has none")
+        if self.system.steps:
+            return 1.0 if self.system.kinks else 2.0
+        rng = np.random.default_rng(0)
+        alpha, rate = (
+            self.loops.unit * rng.normal(size=(8, self.system.joints)),
+            rng.normal(size=(8, self.system.joints)),
+        )
+        slow, fast = (self.power(alpha, u, evaluate(self.system.velocity, alpha, u)) for u in (rate, 2 * rate))
+        degrees = np.log2(fast / slow)
+        if np.ptp(degrees) > DEGREES:
+            raise ValueError(
+                f"no path has a length with {self.system.blames}: its power is of no one degree in the rate; "
+                "optimize for displacement"
+            )
+        return float(np.round(degrees.mean(), 3))
+
+    def cost(self) -> cost.Cost:
+        """Balances, seconds and memory that it takes at most."""
+        scene, loops = self.scene, self.loops
+        numbers = int(np.prod(loops.shape))
+        each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
+        jobs = cost.direct(scene, scene.gait, 3 + self.starts, max(scene.numerics.phases, PHASES))
+        if self.looks_up:
+            jobs.append(cost.built(scene.with_numerics(extent=self.extent), "harmonic"))
+            climbs, steps = min(2, self.starts), FINISH
+        else:
+            climbs, steps = self.starts, RUNS if self.whole else NEAR
+        gaits = int(climbs * steps * TRIES * each)
+        jobs += cost.direct(scene, scene.gait, gaits, loops.phases, each, checked=False)
+        return cost.price(jobs)
+
+    @property
+    def extent(self) -> float:
+        """Of the field that is looked up."""
+        return self.loops.within * ROOM
+
+
+def checked(
+    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: float | None = None,
+    starts: int = 1, rate: float | None = None, power: float | None = None,
+) -> Request:  # fmt: skip
+    """The request, or SceneError, one line, for one that makes no sense."""
+    with named(scene.name):
+        number("--starts", starts, 1, 1000, whole=True)
+        system, limits = scene.system, {"rate": rate, "power": power}
+        wanted = Aim(aim, direction or "", system.length, **limits)
+        if wanted.timed:
+            if system.lacks & Premise.RATE_INDEPENDENT:
+                system.refuse("speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
+            if rate is None and power is None:
+                wanted = Aim(aim, direction or "", system.length, rate=_own_rate(scene))
+        loops = _loops(scene, harmonics, within)
+        if isinstance(loops, Undulations) and wanted.rate is not None:
+            raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
+        request = Request(scene, wanted, loops, int(starts))
+        if wanted.costs:
+            request.degree  # noqa: B018 - refuses what has none
+        return request
+
+
+def _own_rate(scene: Scene) -> float:
+    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency; else 1 rad a unit of time."""
+    if scene.frequency is None:
+        return 1.0
+    return float(2 * np.pi * scene.frequency * np.abs(scene.gait.cycle(PHASES)[1]).max())
+
+
+def _loops(scene: Scene, harmonics: int | None, within: float | None) -> Loops | Undulations:
+    gait, system, n = scene.gait, scene.system, scene.numerics
+    if isinstance(gait, Sine):
+        for name, value in (("harmonics", harmonics), ("within", within)):
+            if value is not None:
+                raise SceneError(f"--{name} is that of joints: of a sine, amplitude and waves are sought; drop it")
+        return Undulations(gait, max(64, min(n.phases, PHASES)))
+    if system.joints > JOINTS:
+        raise SceneError(f"a loop of {system.joints} joints is too much to search: at most {JOINTS}, or a sine gait")
+    number("--harmonics", 5 if harmonics is None else harmonics, 1, 32, whole=True)
+    harmonics = 5 if harmonics is None else int(harmonics)
+    edge = _edge(system)
+    if within is None:
+        within = min(max(n.extent, float(np.abs(gait.cycle(PHASES)[0]).max())), edge)
+    number("--within", within, 1e-6, 100)
+    if within > edge * (1 + 1e-9):
+        raise SceneError(f"--within {within:g} lies outside the table's own field: at most {edge:g}")
+    return Loops(system.joints, harmonics, min(float(within), edge), max(PHASES, 16 * harmonics))
+
+
+def _edge(system) -> float:
+    """Half width of the field of a table; infinity where there is none."""
+    own = system.stored("connection")
+    return min(min(-a[0], a[-1]) for a in own.axes) if own else float("inf")

@@ -1,0 +1,250 @@
+"""The search for the best gait of a scene: in a table where that is near and cheap, finished and told by the direct tier."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from geomech import metric
+from geomech.errors import named
+from geomech.files import note
+from geomech.gaits import Gait
+from geomech.optimise import loops as series
+from geomech.optimise.climb import TRIES, climb
+from geomech.optimise.cycles import Brought, Phases, Runs, brought
+from geomech.optimise.loops import Loops
+from geomech.optimise.optimum import Optimum, Told
+from geomech.optimise.request import FINISH, NEAR, RUNS, Request, checked
+from geomech.reconstruct import turning
+from geomech.scene.model import Scene
+from geomech.study import estimate
+from geomech.study.bench import Study
+
+NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
+FINISHED = 2  # answers of the table that the direct tier goes on from
+TURNED = 0.02  # rad: what 128 phases leave of a net turn
+AS_MUCH = 1e-3  # of the value
+STRAIGHTENED = 4  # steps of Newton, at most
+ENOUGH = 64  # harmonics that any start is told in
+
+
+def optimise(
+    scene: Scene, aim: str = "displacement", direction: str | None = None, harmonics: int | None = None,
+    within: float | None = None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
+    progress: Callable | None = None,
+) -> Optimum:  # fmt: skip
+    """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
+    ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, searched for from the scene's own
+    gait and ``starts`` - 1 others. A sine is sought among sines. SceneError for what makes no sense."""
+    request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
+    return search(request, progress)
+
+
+def search(request: Request, progress: Callable | None = None) -> Optimum:
+    """`optimise` of a request that is checked."""
+    with named(request.scene.name):
+        return _Search(request, progress).optimum()
+
+
+class _Search:
+    """One search, with its count of cycles."""
+
+    def __init__(self, request: Request, progress: Callable | None):
+        self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
+        climbs = request.starts + min(FINISHED, request.starts) if request.looks_up else request.starts
+        self.expected = climbs * TRIES * (RUNS if request.whole else FINISH)
+
+    def optimum(self) -> Optimum:
+        r = self.r
+        own = r.loops.of(r.scene.gait)
+        start = self._told(self._start(own))
+        turn = abs(float(start.displacement[2]))
+        found = self._climbed(r.loops.starts(own, r.starts), turn)
+        best, answers, p = start, [], None
+        for q, times in found:
+            told, q = self._forwards(self._told(self._turned_to(q)), q)
+            straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED
+            answers.append((told.value, times))
+            if straight and told.value > best.value:
+                best, p = told, q
+        if p is None:
+            best, p = dataclasses.replace(start, gait=self._as_series(start.gait)), r.loops.fitted(own)
+        active = [*r.loops.active(p), *best.limits]
+        best = dataclasses.replace(best, gait=self._timed(best))
+        return Optimum(
+            r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), self.count,
+            time.perf_counter() - self.began,
+        )  # fmt: skip
+
+    def _climbed(self, starts: list[np.ndarray], turn: float) -> list[tuple[np.ndarray, int]]:
+        """Different loops that the starts lead to, each with how many led there."""
+        r, tier = self.r, self._direct()
+        if not r.looks_up:
+            most = RUNS if r.whole else NEAR
+            return self._different([self._up(tier, p, turn, most, NEAR_TOLERANCE) for p in starts])
+        table = self._table()
+        near = [self._up(table, p, turn, NEAR, NEAR_TOLERANCE) for p in starts]
+        ranked = sorted(self._different(near), key=lambda found: -self._worth(tier, found[0], turn))[:FINISHED]
+        finished = [
+            max((self._up(tier, p, turn, FINISH, TOLERANCE), p), key=lambda q: self._worth(tier, q, turn))
+            for p, _ in ranked
+        ]
+        return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
+
+    def _worth(self, tier, p, turn: float) -> float:
+        """Value of a loop as the search sees it, none if it turns too much."""
+        b = tier(p)
+        self.count += 1
+        if self.r.aim.straight and abs(b.net[0][2]) > turn + TURNED:
+            return -np.inf
+        power = b.power[0] if b.power else None
+        timed = self.r.aim.timed
+        period = self.r.aim.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
+        return self.r.aim.value(b, period)[0]
+
+    def _up(self, cycles, p, turn: float, most: int, tolerance: float) -> np.ndarray:
+        before = cycles.count
+        p = climb(
+            cycles, self.r.aim, p, turn=turn, most=most, tolerance=tolerance,
+            singularity=self.r.system.singularity, told=self._tell,
+        )  # fmt: skip
+        self.count += cycles.count - before
+        return self._straightened(cycles, self.r.loops.fitted(p), turn)
+
+    def _straightened(self, cycles, p, turn: float) -> np.ndarray:
+        """The loop near by that turns no more than it may: the search may end a little beyond."""
+        for _ in range(STRAIGHTENED if self.r.aim.straight else 0):
+            b = cycles(p)
+            self.count += 1
+            theta, slopes = b.net[0][2], b.net[1][2]
+            more = theta - np.clip(theta, -turn, turn)
+            if abs(more) < TURNED / 20:
+                break
+            p = self.r.loops.fitted(p - more * slopes / ((slopes**2).sum() or 1.0))
+        return p
+
+    def _tell(self) -> None:
+        self.expected = max(self.expected, 1.1 * self.count)
+        if self.progress:
+            self.progress(min(1.0, self.count / self.expected))
+
+    def _different(self, found: list[np.ndarray]) -> list[tuple[np.ndarray, int]]:
+        kept: list[list] = []
+        for p in found:
+            for one in kept:
+                if self._same(p, one[0]):
+                    one[1] += 1
+                    break
+            else:
+                kept.append([p, 1])
+        return [tuple(one) for one in kept]
+
+    def _same(self, p, q) -> bool:
+        loops = self.r.loops
+        return series.same(p, q, self.r.system.mirror) if isinstance(loops, Loops) else loops.same(p, q)
+
+    def _direct(self) -> Phases | Runs:
+        r = self.r
+        degree = r.degree if r.aim.costs else 1.0
+        if r.whole:
+            return Runs(r.loops, r.system.run, r.aim.costs, degree)
+        velocity = _inside(r.system.velocity, r.loops.within) if r.stored else r.system.velocity
+        return Phases(r.loops, velocity, r.power if r.aim.costs else None, degree)
+
+    def _table(self) -> Phases:
+        """Cycles by the harmonics of the velocity, and those of the power if that is asked for."""
+        r, power = self.r, None
+        study = Study(r.scene).turned(extent=r.extent)
+        table = study.table("harmonic")
+        if r.aim.costs:
+            run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
+            norm = _inside(metric.fit_norm(run, table.axes).norm, r.extent)
+            power = lambda alpha, alphadot, xi: norm(alpha, alphadot) ** r.degree
+        return Phases(r.loops, _inside(table.velocity, r.extent), power, r.degree if r.aim.costs else 1.0)
+
+    def _start(self, own) -> Gait:
+        """The scene's gait; where that goes beyond the limits, drawn together so as to keep them."""
+        r, gait = self.r, self.r.scene.gait
+        if isinstance(r.loops, Loops) and np.abs(gait.cycle(series.DENSE)[0]).max() > r.loops.within * (1 + 1e-3):
+            note(
+                f"{r.scene.name}: its gait reaches beyond {r.loops.within:g} rad: the search starts from a smaller one"
+            )
+            return r.loops.gait(r.loops.fitted(own))
+        return gait
+
+    def _turned_to(self, p: np.ndarray) -> Gait:
+        """The gait; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
+        r = self.r
+        if not (r.aim.direction and isinstance(r.loops, Loops)) or r.whole:
+            return r.loops.gait(p)
+        for _ in range(3):  # the crossing nearest to the start, more closely each time
+            ahead = turning(r.system.run(*r.loops.cycle(p)).xi)
+            n, after = len(ahead), np.roll(ahead, -1)
+            places = np.flatnonzero(ahead * after <= 0)
+            k = places[np.argmin(np.minimum(places, n - places))]
+            share = ahead[k] / ((ahead[k] - after[k]) or 1.0)
+            p = series.shifted(p, 2 * np.pi / n * (k + share))
+        return r.loops.gait(p)
+
+    def _forwards(self, told: Told, p: np.ndarray) -> tuple[Told, np.ndarray]:
+        """Run backwards where a direction is asked for and the gait goes the other way, if that brings as much."""
+        k = "xy".find(self.r.aim.direction or "-")
+        if k < 0 or told.displacement[k] >= 0 or not isinstance(self.r.loops, Loops):
+            return told, p
+        back = series.reversed_(p)
+        other = self._told(self._turned_to(back))
+        return (other, back) if other.value >= told.value * (1 - AS_MUCH) else (told, p)
+
+    def _timed(self, told: Told) -> Gait:
+        gait = told.gait
+        frequency = 1 / (2 * np.pi * told.time) if self.r.aim.timed else self.r.scene.gait.frequency
+        return dataclasses.replace(gait, frequency=frequency)
+
+    def _as_series(self, gait: Gait) -> Gait:
+        """The start itself, at amplitude 1."""
+        if isinstance(self.r.loops, Loops):
+            for harmonics in (self.r.loops.harmonics, 16, ENOUGH):
+                some = dataclasses.replace(self.r.loops, harmonics=harmonics)
+                found = some.gait(some.of(gait))
+                if np.abs(found.cycle(512)[0] - gait.cycle(512)[0]).max() < 1e-9:
+                    break
+            return found
+        return gait
+
+    def _told(self, gait: Gait) -> Told:
+        r, system, aim = self.r, self.r.system, self.r.aim
+        phases = max(r.scene.numerics.phases, r.loops.phases, 4 * gait.harmonics)
+        (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
+        self.count += 1
+        alpha, alphadot = gait.cycle(phases)
+        degree = r.degree if r.power else 1.0
+        full = system.run(alpha, alphadot, r.power is not None)
+        b, coarse = self._brought(full, net, degree), None
+        period, limits = 1.0, []
+        if aim.timed:
+            period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
+        value = aim.value(b, period)[0]
+        error = errors[1] if aim.name == "turning" else errors[0]
+        length = b.length and b.length[0]
+        if aim.name == "efficiency":
+            coarse = 2 * np.pi * (np.maximum(full.work.power[::2] / system.length, 0.0) ** (1 / degree)).mean()
+            error = (error + value * abs(length - coarse)) / length
+        if aim.timed:
+            error = error / (2 * np.pi * period)
+        work = 2 * np.pi * b.power[0] if b.power else None
+        return Told(gait, float(value), float(error), net, length, work, float(period), tuple(limits))
+
+    def _brought(self, run, net, degree: float) -> Brought:
+        """Numbers of a gait without slopes."""
+        if run.work is not None:
+            run = run._replace(work=run.work._replace(power=run.work.power / self.r.system.length))
+        flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
+        return Brought(*map(flat, (net, *brought(run, degree)[1:])))
+
+
+def _inside(look_up: Callable, extent: float) -> Callable:
+    """A look-up that takes shapes beyond its field for those at its edge."""
+    return lambda alpha, alphadot: look_up(np.clip(alpha, -extent, extent), alphadot)

@@ -1,0 +1,42 @@
+"""An optimum as text, and as a scene file."""
+
+from __future__ import annotations
+
+import textwrap
+
+from geomech.optimise import Optimum
+from geomech.scene.write import toml
+
+
+def text(optimum: Optimum) -> str:
+    """What was found, in lines."""
+    aim, best, system = optimum.request.aim, optimum.best, optimum.scene.system
+    towards = f" along {aim.direction}" if aim.direction else ""
+    (x, y, theta), unit = best.displacement, system.unit
+    lines = [
+        f"{optimum.scene.name}: {aim.name}{towards} {best.value:.6g} {aim.unit}, error {best.error:.1g} "
+        f"(the scene's gait: {optimum.start.value:.6g})",
+        f"displacement per cycle: x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad",
+    ]
+    if best.length is not None:
+        lines.append(f"path length {best.length:.6g}, work {best.work:.6g} (body's axial drag x body length)")
+    if aim.timed:
+        limits = {
+            "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",
+            "power": aim.power and f"mean power {aim.power:g}",
+        }
+        told = " and ".join(filter(None, limits.values()))
+        lines.append(f"frequency {best.gait.frequency:.6g} Hz, with {told}")
+    lines.append(f"limits that it touches: {', '.join(optimum.active) or 'none'}")
+    if optimum.request.starts > 1:
+        found = ", ".join(f"{value:.6g} (from {count})" for value, count in optimum.answers)
+        lines.append(f"{optimum.request.starts} starts, answers that differ: {found}")
+    if optimum.best.value <= optimum.start.value * (1 + 1e-12):
+        lines.append("nothing better than the scene's own gait was found")
+    return "\n".join([*lines, f"{optimum.evaluations} cycles evaluated in {optimum.seconds:.2g} s"])
+
+
+def scene_toml(optimum: Optimum) -> str:
+    """The scene with the best gait, and what it is, as a comment."""
+    told = textwrap.wrap(" ".join(text(optimum).splitlines()[:1]), 110)
+    return "".join(f"# {line}\n" for line in told) + "\n" + toml(optimum.scene)
