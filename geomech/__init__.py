@@ -1,13 +1,12 @@
 """Geometric mechanics of locomotion: from a force law to the displacement of a gait.
 
-    scene = geomech.load("three-link-glass")      # a built-in name, or a TOML file
-    study = geomech.Study(scene)
+    study = geomech.Study(geomech.load("three-link-glass"))  # a built-in name, or a TOML file
     study.displacement("direct", amplitudes=[0.5, 1.0])
 
 load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
 Study                                   what follows: connection, CCF, displacements and their errors
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
-tiers                                   ways to predict a displacement
+tiers, optimise                         ways to predict a displacement; the gait with the largest
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
 undulation, plots                       swimmers that undulate; figures
 
@@ -23,6 +22,7 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
     from geomech import connection as connection
     from geomech import curvature as curvature
     from geomech import gaits as gaits
+    from geomech import optimise as optimise
     from geomech import reconstruct as reconstruct
     from geomech import systems as systems
     from geomech import tiers as tiers
@@ -42,7 +42,10 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
 __version__ = "0.1.0"
 
 _MODULES = {  # by the name they have here; none is imported before it is asked for
-    **{name: f"geomech.{name}" for name in ("connection", "curvature", "gaits", "reconstruct", "systems", "tiers")},
+    **{
+        name: f"geomech.{name}"
+        for name in ("connection", "curvature", "gaits", "optimise", "reconstruct", "systems", "tiers")
+    },
     **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
     "plots": "geomech.output.plots",
     "undulation": "geomech.study.undulation",
