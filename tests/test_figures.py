@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks
+from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks, optimal_gaits
 from geomech.scene import load
 from geomech.study.bench import Study
 from rft import Granular
@@ -96,3 +96,16 @@ def test_figures_load_nothing_when_imported():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_optimal_gaits(tmp_path):
+    """Sand's strokes reach further and bring more than the fluid's, and the cheap ones are shorter than the long."""
+    numbers = optimal_gaits.compute(harmonics=2, grid=17, phases=64)
+    fluid, sand = numbers.values()
+    for aim in optimal_gaits.AIMS:
+        assert optimal_gaits.reach(sand[aim].gait) > 1.05 * optimal_gaits.reach(fluid[aim].gait)
+        assert sand[aim].value > 1.1 * fluid[aim].value
+    for found in numbers.values():
+        assert found["efficiency"].best.length < found["displacement"].best.length
+    assert "0.1" in optimal_gaits.table(numbers)
+    assert drawn(optimal_gaits, numbers, tmp_path)

@@ -316,6 +316,7 @@ def test_singular_shapes_are_kept_away_from():
         ("sandfish-loose", {"harmonics": 3}, "amplitude and waves are sought"),
         ("sandfish-loose", {"within": 1.0}, "amplitude and waves are sought"),
         ("sandfish-loose", {"aim": "speed"}, "say --power"),
+        ("sandfish-loose", {"aim": "turning"}, "does not turn"),
     ],
 )
 def test_requests_that_make_no_sense(name, asked, said):
@@ -331,3 +332,14 @@ def test_a_cycle_without_slopes_is_that_with():
     net, swing, length, power, _ = brought(run, 2.0)
     assert (swing, length, power) == pytest.approx((b.swing[0], b.length[0], b.power[0]))
     assert net == pytest.approx(b.net[0])
+
+
+def test_a_scene_in_the_minimum_perturbation_frame(cheap):
+    """The same stroke; its displacement is told in that frame."""
+    scene = parse('frame = "minimum-perturbation"\n' + optima.scene_toml(cheap).split('frame = "link-2"')[1])
+    found = optimise(scene, "efficiency")
+    assert cheap.value <= found.start.value * (1 + 1e-6)
+    assert found.value == pytest.approx(cheap.value, rel=1e-3)
+    assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
+    with pytest.raises(SceneError, match="outside the field that the scene has"):
+        checked(scene, "efficiency", within=3.0)

@@ -15,13 +15,14 @@ from geomech.scene.write import gait_table
 
 @dataclass(frozen=True)
 class Told:
-    """A gait by the direct tier. value, error: of the aim. displacement: (3,), in the frame at the start, the system's unit.
-    length: of the path, work: of a cycle at a rad of phase per unit of time, in body drag x body length, None where there
-    is no power. time: of a rad of phase. limits: of the time."""
+    """A gait by the direct tier. value, error: of the aim. heading: error of the net turn, rad. displacement: (3,), in the
+    frame at the start, the system's unit. length: of the path, work: of a cycle at a rad of phase per unit of time, in body
+    drag x body length, None where there is no power. time: of a rad of phase. limits: of the time."""
 
     gait: Gait
     value: float
     error: float
+    heading: float
     displacement: np.ndarray
     length: float | None
     work: float | None

@@ -17,7 +17,7 @@ from geomech.optimise.loops import Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene
 from geomech.study import cost
-from geomech.systems.base import Premise
+from geomech.systems.base import Premise, System
 
 JOINTS = 12  # more make more numbers than a search without a model of them can find
 PHASES = 128  # of a cycle in the search
@@ -35,7 +35,11 @@ class Request:
     loops: Loops | Undulations
     starts: int
 
-    system = property(lambda self: self.scene.system)
+    @property
+    def system(self) -> System:
+        """The scene's; in the frame that it has by itself, where the search is, if the scene has another."""
+        return _inner(self.scene.system)
+
     whole = property(
         lambda self: self.system.steps or isinstance(self.loops, Undulations), doc="Whether gaits are run as a whole."
     )
@@ -80,7 +84,7 @@ class Request:
         each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
         jobs = cost.direct(scene, scene.gait, 3 + self.starts, max(scene.numerics.phases, PHASES))
         if self.looks_up:
-            jobs.append(cost.built(scene.with_numerics(extent=self.extent), "harmonic"))
+            jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
             climbs, steps = min(2, self.starts), FINISH
         else:
             climbs, steps = self.starts, RUNS if self.whole else NEAR
@@ -109,6 +113,8 @@ def checked(
             if rate is None and power is None:
                 wanted = Aim(aim, direction or "", system.length, rate=_own_rate(scene))
         loops = _loops(scene, harmonics, within)
+        if isinstance(loops, Undulations) and not wanted.straight:
+            raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
         if isinstance(loops, Undulations) and wanted.rate is not None:
             raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
         request = Request(scene, wanted, loops, int(starts))
@@ -140,11 +146,16 @@ def _loops(scene: Scene, harmonics: int | None, within: float | None) -> Loops |
         within = min(max(n.extent, float(np.abs(gait.cycle(PHASES)[0]).max())), edge)
     number("--within", within, 1e-6, 100)
     if within > edge * (1 + 1e-9):
-        raise SceneError(f"--within {within:g} lies outside the table's own field: at most {edge:g}")
+        raise SceneError(f"--within {within:g} lies outside the field that the scene has: at most {edge:g}")
     return Loops(system.joints, harmonics, min(float(within), edge), max(PHASES, 16 * harmonics))
 
 
+def _inner(system: System) -> System:
+    return system.inner if getattr(system, "carried", False) else system
+
+
 def _edge(system) -> float:
-    """Half width of the field of a table; infinity where there is none."""
+    """Half width of the field of a table, or of a frame; infinity where there is neither."""
     own = system.stored("connection")
-    return min(min(-a[0], a[-1]) for a in own.axes) if own else float("inf")
+    axes = own.axes if own else system.axes if getattr(system, "carried", False) else ()
+    return min((min(-a[0], a[-1]) for a in axes), default=float("inf"))

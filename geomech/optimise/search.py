@@ -66,7 +66,7 @@ class _Search:
         best, answers, p = start, [], None
         for q, times in found:
             told, q = self._forwards(self._told(self._turned_to(q)), q)
-            straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED
+            straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED + told.heading
             answers.append((told.value, times))
             if straight and told.value > best.value:
                 best, p = told, q
@@ -157,7 +157,7 @@ class _Search:
     def _table(self) -> Phases:
         """Cycles by the harmonics of the velocity, and those of the power if that is asked for."""
         r, power = self.r, None
-        study = Study(r.scene).turned(extent=r.extent)
+        study = Study(r.scene.changed(system=r.system)).turned(extent=r.extent)
         table = study.table("harmonic")
         if r.aim.costs:
             run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
@@ -181,7 +181,7 @@ class _Search:
         if not (r.aim.direction and isinstance(r.loops, Loops)) or r.whole:
             return r.loops.gait(p)
         for _ in range(3):  # the crossing nearest to the start, more closely each time
-            ahead = turning(r.system.run(*r.loops.cycle(p)).xi)
+            ahead = turning(r.scene.system.run(*r.loops.cycle(p)).xi)
             n, after = len(ahead), np.roll(ahead, -1)
             places = np.flatnonzero(ahead * after <= 0)
             k = places[np.argmin(np.minimum(places, n - places))]
@@ -215,7 +215,7 @@ class _Search:
         return gait
 
     def _told(self, gait: Gait) -> Told:
-        r, system, aim = self.r, self.r.system, self.r.aim
+        r, system, aim = self.r, self.r.scene.system, self.r.aim
         phases = max(r.scene.numerics.phases, r.loops.phases, 4 * gait.harmonics)
         (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
         self.count += 1
@@ -235,7 +235,7 @@ class _Search:
         if aim.timed:
             error = error / (2 * np.pi * period)
         work = 2 * np.pi * b.power[0] if b.power else None
-        return Told(gait, float(value), float(error), net, length, work, float(period), tuple(limits))
+        return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
 
     def _brought(self, run, net, degree: float) -> Brought:
         """Numbers of a gait without slopes."""
