@@ -51,7 +51,7 @@ class Waves:
                 return [*map(int, powers), turns]
         return None
 
-    def reduced(self, entry):
+    def reduced(self, entry) -> Any:
         """The entry in lowest terms, or as it is."""
         try:
             return self.told(*self.value(entry))
@@ -90,7 +90,7 @@ class Waves:
             odd ^= its
         return made, odd
 
-    def wave(self, angle):
+    def wave(self, angle) -> Any:
         """exp(i angle)."""
         powers = self.multiples(angle, self.heading)
         if powers is None:

@@ -69,14 +69,14 @@ def links(lengths, seen_from: int) -> list[Link]:
     return made
 
 
-def in_units_of(length, A):
+def in_units_of(length, A) -> Any:
     """A with its rows of translation in units of which the body has so many."""
     import sympy as sp
 
     return sp.diag(exact(length), exact(length), 1) * A
 
 
-def quarter_turn():
+def quarter_turn() -> Any:
     """A quarter turn to the left."""
     import sympy as sp
 

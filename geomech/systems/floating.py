@@ -8,6 +8,7 @@ example of G. C. Walsh and S. S. Sastry, IEEE Trans. Robotics and Automation 11,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from geomech.systems.momentum import Momentum
 
@@ -30,7 +31,7 @@ class FloatingChain(Momentum):
         self.of_links("masses", 1e-9, 1e9)
         self.of_links("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float):
+    def inertia(self, number=float) -> Any:
         """Masses are parts of the whole."""
         lengths = [number(x) for x in self.lengths]
         masses = [number(x) for x in self.masses] or lengths

@@ -9,6 +9,7 @@ SIAM J. Applied Dynamical Systems 5, 650 (2006), and R. L. Hatton and H. Choset,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from geomech.errors import number as checked
 from geomech.systems.momentum import Momentum
@@ -38,7 +39,7 @@ class IdealFluidSwimmer(Momentum):
         self.of_links("masses", 1e-9, 1e9)
         self.of_links("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float):
+    def inertia(self, number=float) -> Any:
         """In units of pi rho times the square of the body's length, per unit depth."""
         body, aspect = sum(number(x) for x in self.lengths), number(self.aspect)
         a = [number(x) / body / 2 for x in self.lengths]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -190,7 +191,7 @@ class Swimmer(Plain):
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
         return {"xi": s.xi.tolist(), **told}
 
-    def symbolic(self):
+    def symbolic(self) -> Any:
         plain = type(self.body) is rft.Chain and self.body.modes is None
         if not self.linear or not plain or type(self.medium) is not rft.Viscous:
             raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
