@@ -21,10 +21,12 @@ import sys
 import tempfile
 
 import numpy as np
-from registry import BODIES, EFFECTS, MEDIA, OUTLINES, STRESSES
+from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA, OUTLINES, SOLIDS, STRESSES
 from scipy.io import netcdf_file
+from scipy.spatial.transform import Rotation
 
 import rft
+import rft.spatial
 import rft.vertical
 from geomech import cli
 from geomech import scene as scenes
@@ -135,6 +137,16 @@ def intrusions():
         yield f"intrusion, {medium}, {name}", np.column_stack([found.force, found.moment])
 
 
+def solids():
+    """Every body of three dimensions, under the ground and across its surface, plain and with each effect."""
+    medium, place = rft.spatial.Spatial(3e5, 0.3), [(0.02, 0.1, -0.01), (-0.05, 0.0, -0.2)]
+    turn = Rotation.from_rotvec([(0.3, -0.7, 0.2), (1.0, 2.0, -0.4)]).as_matrix()
+    effects = {name: [make(0.4)] for name, (make, _) in GROUND_EFFECTS.items()}
+    for (name, body), (effect, some) in itertools.product(SOLIDS.items(), {"plain": [], **effects}.items()):
+        found = rft.spatial.wrench(medium, body.mesh(300), turn, place, [-0.3, 0.1, -0.4], [2.0, 9.0, 1.0], some)
+        yield f"solid, {name}, {effect}", np.column_stack([found.force, found.moment, found.power])
+
+
 # The quick ones first, each with what the names of its entries begin with.
 PARTS = {
     velocities: ("velocity", "work"),
@@ -142,6 +154,7 @@ PARTS = {
     tiers: ("tier",),
     marches: ("march",),
     intrusions: ("intrusion",),
+    solids: ("solid",),
 }
 
 

@@ -25,6 +25,7 @@ from rft import (
     Viscous,
 )
 from rft.media import CATALOGUE
+from rft.spatial import Cylinder, Leg, Screw, Sphere
 from rft.vertical import (
     VERTICAL,
     CLeg,
@@ -39,6 +40,9 @@ from rft.vertical import (
     StressMap,
     Wheel,
 )
+from rft.vertical.effects import Aeration, Slope
+from rft.vertical.effects import DisturbedGround as DisturbedPlaces
+from rft.vertical.effects import GrainInertia as GrainPressure
 
 MEDIA = {
     **{name: entry.medium for name, entry in CATALOGUE.items()},
@@ -110,6 +114,14 @@ OUTLINES = {
     "spline, open": Spline(points=((0.0, 0.0), (0.02, -0.01), (0.04, 0.01)), width=0.01, closed=False),
 }
 
+# Bodies of three dimensions.
+SOLIDS = {
+    "sphere": Sphere(radius=0.02),
+    "cylinder": Cylinder(radius=0.01, length=0.05),
+    "screw": Screw(radius=0.03, core=0.015, pitch=0.06, length=0.12),
+    "leg": Leg(radius=0.03, width=0.02, thickness=0.004, relative_curvature=-0.6),
+}
+
 # name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)
 EFFECTS = {
     "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1),
@@ -123,6 +135,14 @@ EFFECTS = {
     "body-inertia, frequency": (lambda x: BodyInertia(mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3), 2),
     "transient": (lambda x: Transient(travel=2 * x), 1),
     "disturbed-ground": (lambda x: DisturbedGround(radius=0.05, weakening=x), 1),
+}
+
+# Of the vertical plane, likewise.
+GROUND_EFFECTS = {
+    "aeration": (lambda x: Aeration(air_speed=0.03 * x, fluidisation=0.03), 1),
+    "grain-inertia": (lambda x: GrainPressure(strength=2 * x, density=700.0), 1),
+    "slope": (lambda x: Slope(angle=-x, repose=0.6), 1),
+    "disturbed-ground": (lambda x: DisturbedPlaces(places=(0.0, -0.1), radius=0.05, weakening=x), 1),
 }
 
 assert Coulomb in {type(m) for m in MEDIA.values()}

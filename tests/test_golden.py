@@ -14,6 +14,7 @@ import pytest
         (golden.tiers, 30),
         (golden.marches, 50),
         (golden.intrusions, 100),
+        (golden.solids, 20),
     ],
     ids=lambda x: getattr(x, "__name__", ""),
 )

@@ -15,7 +15,7 @@ from geomech.errors import SceneError
 from geomech.field import Field
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.output.explain import explain
-from geomech.scene import IntruderScene, Numerics, Scene
+from geomech.scene import IntruderScene, MeshScene, Numerics, Scene
 from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
@@ -23,8 +23,9 @@ from geomech.systems import Solver, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2, spatial
 from rft.vertical import SHAPES, Drag, Path, Penetrate, Rotate
+from rft.vertical import effects as ground
 
 WRONG = {
     "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
@@ -48,6 +49,12 @@ PARTS = {
     "Outline": OUTLINES["c-leg"].outline(3), "Drag": Drag(0.1), "Penetrate": Penetrate(0.1), "Rotate": Rotate(0.1),
     "Path": Path((0, 1, 2), (0, 1, 2), (0, 1, 0)),
     "IntruderScene": IntruderScene(STRESSES["generic"], OUTLINES["plate"], Drag(0.1)),
+    "Aeration": ground.Aeration(0.01, 0.03), "GrainPressure": ground.GrainInertia(), "Slope": ground.Slope(0.1),
+    "DisturbedPlaces": ground.DisturbedGround((0.0,), 0.02, 0.5), "Spatial": spatial.Spatial(3e5),
+    "Sphere": spatial.Sphere(0.02), "Cylinder": spatial.Cylinder(0.02, 0.1), "Screw": spatial.Screw(0.03, 0.01, 0.02, 0.1),
+    "Leg": spatial.Leg(0.04, 0.02, 0.003), "SpatialDrag": spatial.Drag(0.1), "SpatialPenetrate": spatial.Penetrate(0.1),
+    "SpatialRotate": spatial.Rotate(0.1), "SpatialPath": spatial.Path(*[(0, 1, 2)] * 4),
+    "MeshScene": MeshScene(spatial.Spatial(3e5), spatial.Sphere(0.02), spatial.Drag(0.1), triangles=20),
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
@@ -57,9 +64,10 @@ RIGHT = {  # what looks wrong and is not
     ("Chain", "lengths", "list"), ("masses", "empty"), ("inertias", "empty"),
     ("along", "list"), ("cos", "array"), ("sin", "array"), ("modes", "None"), ("modes", "array"),
     ("Chain", "waves", "None"),
-    ("closed", "true"), ("angle", "empty"),
+    ("closed", "true"), ("Path", "angle", "empty"),
+    ("places", "list"), *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
     ("bends", "None"),
-    *itertools.product(("name", "text"), ("text", "digits")),
+    *itertools.product(("name", "text", "matched"), ("text", "digits")),
 }  # fmt: skip
 
 

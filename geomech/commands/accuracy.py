@@ -17,14 +17,14 @@ def accuracy(
     yes: YesOption = False,
 ):
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
-    scene, for the number of elements."""
+    scene, for the number of elements or triangles."""
     from geomech.output import plots
-    from geomech.scene import IntruderScene, inputs, load
+    from geomech.scene import Intruding, inputs, load
     from geomech.study import accuracy as study
     from geomech.study import intrusion
 
     scene = load(name)
-    if isinstance(scene, IntruderScene):
+    if isinstance(scene, Intruding):
         study, draw = intrusion, plots.elements_figure
     else:
         scene, draw = loaded(name), plots.work_precision_figure

@@ -18,10 +18,9 @@ def intrude(
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
     plot: PlotOption = None,
 ):
-    """Force and moment of the grains on a body that moves through the vertical plane, along its motion. SI units."""
+    """Force and moment of the grains on a body, an outline in the vertical plane or a mesh, along its motion. SI units."""
     from geomech.files import whole_file
     from geomech.output import intrusions, plots
-    from geomech.scene.intruder import table
     from geomech.study.intrusion import price
 
     scene = loaded_intruder(name)
@@ -30,12 +29,12 @@ def intrude(
     check_outputs(scene, out, plot)
     allow(scene, price(scene), yes=True)
     found = scene.run()
-    columns = table(scene, found)
+    columns = scene.table(found)
     if out:
         with whole_file(out) as part:
             part.write_text(intrusions.csv(columns), encoding="utf-8")
     if plot:
-        plots.save(plots.intrusion_figure(columns, scene.outline.points, found.pose), plot)
+        plots.save(plots.intrusion_figure(scene, found), plot)
     print(
         json.dumps({k: v.tolist() for k, v in columns.items()}) if as_json else intrusions.told(scene, columns, found)
     )

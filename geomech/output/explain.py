@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from geomech.gaits import KINDS as GAITS
+from geomech.scene.intruding import Intruding
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
 
 
-def explain(scene: Scene) -> str:
-    """The system with its effects on and off, the engine and why, and the results that are left, as plain text."""
+def explain(scene: Scene | Intruding) -> str:
+    """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
+    intruder scene: its law, body and motion, and effects on and off."""
+    if isinstance(scene, Intruding):
+        return "\n".join(scene.told())
     system = checked_scene(scene).system
     first, *told = system.told()
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)

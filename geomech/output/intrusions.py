@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-UNITS = {"t": "s", "angle": "degrees", "x": "m", "z": "m", "force_x": "N", "force_z": "N", "moment": "N m"}
+UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
 
 def csv(columns: Mapping[str, np.ndarray]) -> str:
@@ -18,15 +18,17 @@ def csv(columns: Mapping[str, np.ndarray]) -> str:
 def told(scene, columns: Mapping[str, np.ndarray], found) -> str:
     """Extremes of force and moment, and where they are; work."""
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
-    lines = [f"{scene.name}: {kinds[0]} of {scene.outline.elements} elements, {kinds[1]} in {len(found.t)} steps"]
-    place = next(name for name in (*columns, "t") if name not in ("t", "force_x"))
-    if place == "x" and np.ptp(columns["x"]) < np.ptp(columns["z"]):
-        place = "z"
-    for name in ("force_x", "force_z", "moment"):
+    lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
+    if matched := getattr(scene, "matched", ""):
+        lines.append(matched)
+    lines += scene.effects_told()
+    place = "angle" if "angle" in columns else max((n for n in "xyz" if n in columns), key=lambda n: np.ptp(columns[n]))
+    names = [n for n in columns if n.startswith(("force", "moment")) and not (n == "moment" and "moment_y" in columns)]
+    for name in names:
         ends = [(columns[name][k], np.degrees(columns[place][k]) if place == "angle" else columns[place][k])
                 for k in (columns[name].argmin(), columns[name].argmax())]  # fmt: skip
         low, high = (f"{value + 0.0:.4g} at {place} = {where + 0.0:.4g} {UNITS[place]}" for value, where in ends)
-        lines.append(f"{name:8} {low}, to {high} ({UNITS[name]})")
+        lines.append(f"{name:8} {low}, to {high} ({'N' if name.startswith('force') else 'N m'})")
     work = float(np.sum((found.power[1:] + found.power[:-1]) / 2 * np.diff(found.t)))
     lines.append(f"work     {work:.4g} J of the grains on the body; power at most {found.power.max():.4g} W")
     return "\n".join(lines)

@@ -13,7 +13,9 @@ import numpy as np
 
 from geomech.errors import SceneError, choose, named, number, short
 from geomech.files import read_text
+from geomech.scene import solid
 from geomech.scene.columns import columns
+from geomech.scene.intruding import Intruding, as_table, checked_tables, located
 from geomech.scene.read import LARGEST, _build, _kind
 from rft.vertical import (
     MOTIONS,
@@ -28,16 +30,18 @@ from rft.vertical import (
     StressMap,
     loads,
 )
+from rft.vertical.effects import KINDS as EFFECTS
+from rft.vertical.effects import GroundEffect, folded
 from rft.vertical.loads import ORDER
 from rft.vertical.stress import COEFFICIENTS, GRAZING
 
-TABLES = ("medium", "intruder", "motion", "numerics")
 RADIANS = 3.2  # a table of angles within this is likely not in degrees
 
 
 class Intrusion(NamedTuple):
     """Forces along a motion. t (T,) s; pose and twist (T, 3) as `rft.vertical.loads` has them; force (T, 2) N; moment (T,) N m
-    about the frame's origin; power (T,) W of the grains on the body."""
+    about the frame's origin; power (T,) W of the grains on the body. With effects that have a weight the
+    force is that of both."""
 
     t: np.ndarray
     pose: np.ndarray
@@ -48,30 +52,30 @@ class Intrusion(NamedTuple):
 
 
 @dataclass(frozen=True)
-class IntruderScene:
-    """A stress map, a body and its motion. elements: of the outline. files: those that the scene names. text: its TOML."""
+class IntruderScene(Intruding):
+    """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
+    TOML."""
 
     medium: PlateStress
     intruder: Shape
     motion: Motion
     elements: int = 100
+    effects: tuple[GroundEffect, ...] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
 
+    parts = "elements"
+    takes = {
+        "medium": (PlateStress, "a stress map such as StressMap(zeta=0.24)"),
+        "intruder": (Shape, "a body such as RoundRod(radius=0.0127, width=0.1)"),
+        "motion": (Motion, "a motion such as Drag(depth=0.05)"),
+    }
+    ladder = (12, 25, 50, 100, 200, 400, 3200)
+
     def __post_init__(self):
         with named(self.name):
-            for what, kind, such in (
-                ("medium", PlateStress, "a stress map such as StressMap(zeta=0.24)"),
-                ("intruder", Shape, "a body such as RoundRod(radius=0.0127, width=0.1)"),
-                ("motion", Motion, "a motion such as Drag(depth=0.05)"),
-                ("name", str, "text"),
-                ("text", str, "text"),
-            ):
-                if not isinstance(getattr(self, what), kind):
-                    raise ValueError(f"{what} must be {such}, got {short(getattr(self, what))}")
-            if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
-                raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
+            self._check()
             number("elements", self.elements, 1, 5000, whole=True)
             object.__setattr__(self, "elements", int(self.elements))
             _ = self.outline
@@ -81,72 +85,73 @@ class IntruderScene:
         return self.intruder.outline(self.elements)
 
     @property
+    def count(self) -> int:
+        return self.outline.elements
+
+    def used(self, count: int) -> int:
+        return self.intruder.outline(count).elements
+
+    @property
+    def size(self) -> float:
+        return float(np.ptp(self.outline.points, axis=0).max())
+
+    @property
+    def per_part(self) -> float:
+        return 6e-8 * (2 if self.medium.tension == "cut" and not self.outline.closed else 1)
+
+    @property
     def order(self) -> int:
-        """Of the error in 1/elements."""
         return ORDER[self.medium.tension]
 
     def run(self, elements: int | None = None) -> Intrusion:
         """Forces along the motion, with as many elements if told so."""
         outline = self.outline if elements is None else self.intruder.outline(elements)
         t, pose, twist = self.motion.course(outline)
-        found: Loads = loads(self.medium, outline, pose, twist)
-        return Intrusion(t, pose, twist, found.force, found.moment, found.power(twist))
+        found: Loads = loads(folded(self.medium, self.effects), outline, pose, twist)
+        return Intrusion(t, pose, twist, self.weighed(found.force), found.moment, found.power(twist))
+
+    def table(self, found: Intrusion) -> dict[str, np.ndarray]:
+        """The columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x, force_z, moment."""
+        place = {"angle": found.pose[:, 2]} if self.motion.turns else {"x": found.pose[:, 0], "z": found.pose[:, 1]}
+        force = {"force_x": found.force[:, 0], "force_z": found.force[:, 1]}
+        return {"t": found.t, **place, **force, "moment": found.moment}
+
+    def tables(self) -> dict:
+        """Of a scene file that reads the same; SceneError for measured drags and paths, which are files of their own."""
+        if not isinstance(self.medium, StressMap) or MOTIONS["csv"] is type(self.motion):
+            told = "plate drags and paths are CSV files: write the scene that names them by hand"
+            raise SceneError(f"{self.name}: {told}")
+        return {
+            "medium": dataclasses.asdict(self.medium),
+            "intruder": as_table(self.intruder, SHAPES),
+            "motion": as_table(self.motion, MOTIONS),
+            "numerics": {"elements": self.elements},
+        } | ({"effects": [as_table(e, EFFECTS) for e in self.effects]} if self.effects else {})
 
 
-def table(scene: IntruderScene, found: Intrusion) -> dict[str, np.ndarray]:
-    """The columns of a result: t, angle (or x and z, if the body does not turn about a hub), force_x, force_z, moment."""
-    place = {"angle": found.pose[:, 2]} if scene.motion.turns else {"x": found.pose[:, 0], "z": found.pose[:, 1]}
-    return {"t": found.t, **place, "force_x": found.force[:, 0], "force_z": found.force[:, 1], "moment": found.moment}
-
-
-def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> IntruderScene:
+def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> Intruding:
     """The intruder scene of the tables of a TOML text; SceneError if they make none."""
-    for key in tables:
-        choose(f"{name}: table", key, TABLES)
-    for key in TABLES:
-        if not isinstance(tables.get(key, {} if key == "numerics" else None), Mapping):
-            told = "is missing: add it" if key not in tables else "must be a table"
-            raise SceneError(f"{name}: the table [{key}] {told}, see 'geomech scenes --show c-leg'")
+    rest = checked_tables(tables, name)
+    if tables["intruder"].get("kind") in [*solid.KINDS]:
+        return solid.from_tables(tables, name, text, read_medium)
     place, folder, files = (lambda key: f"{name}: [{key}]"), Path(name).absolute().parent, []
-    located = lambda key: _located(tables[key], folder, files)
-    numerics = dict(tables.get("numerics", {}))
-    for key in numerics:
+    with_file = lambda key: located(tables[key], folder, files)
+    for key in rest["numerics"]:
         choose(f"{place('numerics')} key", key, ("elements",))
     return IntruderScene(
-        medium=read_medium(place("medium"), located("medium")),
-        intruder=_intruder(place("intruder"), located("intruder")),
-        motion=_motion(place("motion"), located("motion")),
-        **numerics,
+        medium=read_medium(place("medium"), with_file("medium")),
+        intruder=_intruder(place("intruder"), with_file("intruder")),
+        motion=_motion(place("motion"), with_file("motion")),
+        effects=rest["effects"],
+        **rest["numerics"],
         name=name,
         text=text,
         files=tuple(files),
     )
 
 
-def as_tables(scene: IntruderScene) -> dict:
-    """The tables of a scene file that reads the same; SceneError for measured drags and paths, which are files of their own."""
-    if not isinstance(scene.medium, StressMap) or MOTIONS["csv"] is type(scene.motion):
-        raise SceneError(f"{scene.name}: plate drags and paths are CSV files: write the scene that names them by hand")
-    body = {"kind": next(k for k, v in SHAPES.items() if v is type(scene.intruder))} | dataclasses.asdict(
-        scene.intruder
-    )
-    motion = {"kind": next(k for k, v in MOTIONS.items() if v is type(scene.motion))} | dataclasses.asdict(scene.motion)
-    if "points" in body:
-        body["points"] = [list(p) for p in body["points"]]
-    numerics = {"elements": scene.elements}
-    return {"medium": dataclasses.asdict(scene.medium), "intruder": body, "motion": motion, "numerics": numerics}
-
-
-def _located(table: Mapping, folder: Path, files: list[str]) -> dict:
-    """The table with its file, if it names one, looked for from the scene's folder, and noted."""
-    if not isinstance(table.get("file"), str):
-        return dict(table)
-    files.append(str(folder / table["file"]))
-    return {**table, "file": files[-1]}
-
-
 def _intruder(place: str, table: dict) -> Shape:
-    kind = SHAPES[_kind(place, table, "kind", SHAPES)]
+    kind = SHAPES[_kind(place, table, "kind", SHAPES | solid.KINDS)]
     rest = {k: v for k, v in table.items() if k != "kind"}
     if "file" in rest and "points" in (f.name for f in dataclasses.fields(kind)):
         if "points" in rest:

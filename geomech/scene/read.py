@@ -26,7 +26,7 @@ from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
 if TYPE_CHECKING:
-    from geomech.scene.intruder import IntruderScene
+    from geomech.scene.intruding import Intruding
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
@@ -65,8 +65,8 @@ def _folder():
     return resources.files("geomech.scene") / "builtin"
 
 
-def load(scene: str | Path) -> Scene | IntruderScene:
-    """The scene of a built-in name or a TOML file, an `IntruderScene` if it has an [intruder]; SceneError, one line, if it is
+def load(scene: str | Path) -> Scene | Intruding:
+    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder]; SceneError, one line, if it is
     not one."""
     if not isinstance(scene, (str, Path)):
         raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
@@ -105,7 +105,7 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     return scene.changed(medium=_medium(f"{scene.name}: [medium]", tables["medium"]), files=files)
 
 
-def inputs(scene: Scene | IntruderScene) -> list[Path]:
+def inputs(scene: Scene | Intruding) -> list[Path]:
     """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system, or
     of an intruder scene's parts."""
     parts = () if hasattr(scene, "intruder") else (checked_scene(scene).gait, scene.system)
@@ -113,7 +113,7 @@ def inputs(scene: Scene | IntruderScene) -> list[Path]:
     return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
-def parse(text: str, name: str = "scene") -> Scene | IntruderScene:
+def parse(text: str, name: str = "scene") -> Scene | Intruding:
     """The scene of a TOML text; SceneError if it is not one."""
     if not isinstance(text, str):
         raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
@@ -124,7 +124,7 @@ def parse(text: str, name: str = "scene") -> Scene | IntruderScene:
     return from_tables(tables, name, text)
 
 
-def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | IntruderScene:
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Intruding:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")

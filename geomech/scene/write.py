@@ -11,7 +11,7 @@ import tomllib
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
-from geomech.scene.intruder import IntruderScene, as_tables
+from geomech.scene.intruding import Intruding
 from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
@@ -20,14 +20,14 @@ from geomech.systems.said import name_in
 from geomech.systems.swimmer import PARTS, Swimmer
 
 
-def toml(scene: Scene | IntruderScene) -> str:
+def toml(scene: Scene | Intruding) -> str:
     """The text it was read from where that still holds by itself, comments and all; else a new one, in which a medium that
     came from a file stands. SceneError if it has a part that no scene file can name."""
-    intruder = isinstance(scene, IntruderScene)
+    intruder = isinstance(scene, Intruding)
     whole = scene.text if intruder else checked_scene(scene).text and not scene.files
     if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return _text(as_tables(scene) if intruder else _anew(scene))
+    return _text(scene.tables() if intruder else _anew(scene))
 
 
 def table(name: str, values: dict) -> str:

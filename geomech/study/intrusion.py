@@ -1,4 +1,5 @@
-"""What accuracy costs in an intruder scene: error of force and moment against the number of elements, and time."""
+"""What accuracy costs in an intruder scene: error of force and moment against the number of elements or triangles, and
+time."""
 
 from __future__ import annotations
 
@@ -7,40 +8,39 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.scene.intruder import IntruderScene
+from geomech.scene.intruding import Intruding
 from geomech.study.cost import BASE, Cost
 
-ELEMENTS = (12, 25, 50, 100, 200, 400)
-FINEST = 3200  # elements of the truth
-PER_PART = 6e-8  # s for an element at a pose, measured
 TOLERANCES = 10.0 ** -np.arange(1, 7)
 ROUNDING = 1e-13  # errors below say nothing
 
 
-def study(scene: IntruderScene, progress: Callable | None = None, runs: int = 3) -> dict:
-    """{"scene", "poses", "finest", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest":
-    [{"tolerance", "elements", "error", "seconds"}]}, a line for the force and one for the moment. Errors are rms over the
-    motion against the finest, over the largest of it; each setting is timed ``runs`` times, and the quickest counts."""
-    truth, found, seconds = scene.run(FINEST), [], []
-    for done, elements in enumerate(ELEMENTS):
+def study(scene: Intruding, progress: Callable | None = None, runs: int = 3) -> dict:
+    """{"scene", "parts", "poses", "finest", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest":
+    [{"tolerance", "elements", "error", "seconds"}]}, a line for the force and one for the moment; of a mesh "triangles"
+    stands for "elements". Errors are rms over the motion against the finest of the scene's ladder, over the largest of it;
+    each setting is timed ``runs`` times, and the quickest counts."""
+    *counts, finest = scene.ladder
+    truth, found, seconds = scene.run(finest), [], []
+    for done, count in enumerate(counts):
         times = []
         for _ in range(runs):
             start = time.perf_counter()
-            run = scene.run(elements)
+            run = scene.run(count)
             times.append(time.perf_counter() - start)
         found.append(run)
         seconds.append(min(times))
         if progress:
-            progress((done + 1) / len(ELEMENTS))
-    used = [scene.intruder.outline(n).elements for n in ELEMENTS]  # a shape may take more than it is asked for
-    size = float(np.ptp(scene.outline.points, axis=0).max())
-    lines = [_line(what, used, found, truth, size, seconds, scene.order) for what in ("force", "moment")]
+            progress((done + 1) / len(counts))
+    used = [scene.used(n) for n in counts]  # a shape may take more than it is asked for
+    lines = [_line(what, used, found, truth, scene.size, seconds, scene.order) for what in ("force", "moment")]
     return {
         "scene": scene.name,
+        "parts": scene.parts,
         "poses": len(truth.t),
-        "finest": FINEST,
+        "finest": scene.used(finest),
         "lines": lines,
-        "cheapest": [_cheapest(lines, tolerance) for tolerance in TOLERANCES],
+        "cheapest": [_cheapest(lines, tolerance, scene.parts) for tolerance in TOLERANCES],
     }
 
 
@@ -56,55 +56,65 @@ def _line(what: str, used, found, truth, size: float, seconds, order: int) -> di
     return {"label": what, "order": order, "value": used, "error": errors, "seconds": seconds, "slope": slope}
 
 
-def _cheapest(lines, tolerance: float) -> dict:
-    """The fewest elements tried that meet a tolerance in force and moment."""
-    for k, elements in enumerate(lines[0]["value"]):
+def _cheapest(lines, tolerance: float, parts: str) -> dict:
+    """The fewest parts tried that meet a tolerance in force and moment."""
+    for k, count in enumerate(lines[0]["value"]):
         error = max(line["error"][k] for line in lines)
         if error <= tolerance:
             return {
-                "tolerance": float(tolerance), "elements": elements, "error": error, "seconds": lines[0]["seconds"][k],
+                "tolerance": float(tolerance), parts: count, "error": error, "seconds": lines[0]["seconds"][k],
             }  # fmt: skip
-    return {"tolerance": float(tolerance), "elements": None}
+    return {"tolerance": float(tolerance), parts: None}
 
 
-class Forces(Cost):
+class Elements(Cost):
     """What forces along a motion cost; balances counts the elements, at every pose."""
 
+    parts = "elements"
+
     def __str__(self) -> str:
-        return f"{self.balances:,} elements at a pose, about {max(1.0, self.seconds):.0f} s of computing"
+        return f"{self.balances:,} {self.parts} at a pose, about {max(1.0, self.seconds):.0f} s of computing"
 
 
-def cost(scene: IntruderScene, runs: int = 3) -> Forces:
+class Triangles(Elements):
+    """The same of a mesh."""
+
+    parts = "triangles"
+
+
+def cost(scene: Intruding, runs: int = 3) -> Elements:
     """Of `study`."""
-    return price(scene, FINEST + runs * sum(ELEMENTS))
+    *counts, finest = scene.ladder
+    return price(scene, finest + runs * sum(counts))
 
 
-def price(scene: IntruderScene, elements: int | None = None) -> Forces:
-    """Of a run with so many elements, or the scene's own."""
-    parts = scene.motion.samples * (elements or scene.outline.elements)
-    sides = 2 if scene.medium.tension == "cut" and not scene.outline.closed else 1
-    return Forces(parts, parts * sides * PER_PART, BASE)
+def price(scene: Intruding, count: int | None = None) -> Elements:
+    """Of a run with so many parts, or the scene's own."""
+    parts = scene.motion.samples * (count or scene.count)
+    kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
+    return kind(parts, parts * scene.per_part, BASE)
 
 
 def sentences(results: dict) -> list[str]:
-    """One sentence each for force and moment: from the fewest elements to the most, and the measured order."""
+    """One sentence each for force and moment: from the fewest parts to the most, and the measured order."""
     out = []
     for line in results["lines"]:
         e, t, v = line["error"], line["seconds"], line["value"]
         slope = "no slope, all rounding" if line["slope"] is None else f"measured order {line['slope']:.1f}"
         out.append(
-            f"{line['label']}, {v[0]} to {v[-1]} elements: error {e[0]:.1e} to {e[-1]:.1e} of its largest for "
+            f"{line['label']}, {v[0]} to {v[-1]} {results['parts']}: error {e[0]:.1e} to {e[-1]:.1e} of its largest for "
             f"{t[-1] / t[0]:.1f} times the time ({slope}; declared: {line['order']})."
         )
     return out
 
 
 def table(results: dict) -> str:
-    """The fewest elements by tolerance, as plain text."""
-    rows = ["error / largest   elements     error   seconds"]
+    """The fewest parts by tolerance, as plain text."""
+    parts = results["parts"]
+    rows = [f"error / largest  {parts:>9}     error   seconds"]
     for c in results["cheapest"]:
-        if c["elements"] is None:
+        if c[parts] is None:
             rows.append(f"{c['tolerance']:15.0e}   none of those tried")
         else:
-            rows.append(f"{c['tolerance']:15.0e}   {c['elements']:8} {c['error']:9.1e} {c['seconds']:9.4f}")
+            rows.append(f"{c['tolerance']:15.0e}  {c[parts]:9} {c['error']:9.1e} {c['seconds']:9.4f}")
     return "\n".join(rows)

@@ -26,6 +26,7 @@ from geomech.output.plots.plates import penetration_figure, plates_figure
 from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
 from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
 from geomech.output.plots.terradynamics import (
+    draw_stress,
     elements_figure,
     intrusion_figure,
     square_of_angles,
@@ -34,9 +35,9 @@ from geomech.output.plots.terradynamics import (
 )
 
 __all__ = [
-    "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map",
-    "certain", "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure",
-    "draw_gait", "drawable", "elements_figure", "figure", "filmstrip", "frame_figure", "intrusion_figure",
+    "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
+    "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure", "draw_gait",
+    "draw_stress", "drawable", "elements_figure", "figure", "filmstrip", "frame_figure", "intrusion_figure",
     "largest", "medium_band", "net", "optimum_figure", "optimum_map", "penetration_figure", "plates_figure",
     "quantity", "save", "shape_space", "square_of_angles", "stage", "stress_figure", "stress_map", "styled",
     "unknown", "vector_field", "work_precision", "work_precision_figure",

@@ -10,6 +10,7 @@ from geomech.output.plots.maps import largest
 from geomech.output.plots.style import figure, styled
 
 POSES = 5  # of the body that are drawn
+COLOURS = {"x": "C0", "y": "C2", "z": "C3"}
 
 
 @styled
@@ -59,22 +60,72 @@ def _shown(beta: float, gamma: float) -> tuple[float, float]:
 
 
 @styled
-def intrusion_figure(columns: Mapping[str, np.ndarray], points: np.ndarray, pose: np.ndarray):
-    """The body with its outline ``points`` (N, 2) at a few of its poses (T, 3), and force and moment along the motion."""
+def intrusion_figure(scene, found):
+    """Of an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
+    poses, a mesh where the force is largest, with the stress on its faces."""
     fig, axes = figure(10.2, 3.2, 3)
-    _poses(axes[0, 0], points, pose)
+    columns = scene.table(found)
+    if hasattr(found, "passage"):
+        step = int(np.linalg.norm(found.force, axis=-1).argmax())
+        axes[0, 0].remove()
+        ax = fig.add_subplot(1, 3, 1, projection="3d")
+        draw_stress(ax, *scene.faces(found, step))
+        ax.set_title(f"where the force is largest, t = {found.t[step]:.3g} s", fontsize=8)
+        names = {"force": [f"force_{a}" for a in "xyz"], "moment": [f"moment_{a}" for a in "xyz"]}
+    else:
+        _poses(axes[0, 0], scene.outline.points, found.pose)
+        names = {"force": ["force_x", "force_z"], "moment": ["moment"]}
     place, label, scale = _abscissa(columns)
-    at = scale * columns[place]
-    for name, colour, text in (("force_x", "C0", "$F_x$, forwards"), ("force_z", "C3", "$F_z$, upwards")):
-        axes[0, 1].plot(at, columns[name], color=colour, label=text)
-    axes[0, 1].set(xlabel=label, ylabel="force (N)")
-    axes[0, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    axes[0, 2].plot(at, columns["moment"], color="0.2")
-    axes[0, 2].set(xlabel=label, ylabel="moment about the origin (N m)")
-    for ax in axes[0, 1:]:
+    for ax, (what, unit), letter in zip(axes[0, 1:], (("force", "N"), ("moment", "N m")), "FM"):
+        for name in names[what]:
+            axis = name[-1]
+            text = f"${letter}_{axis}$" + {"force_x": ", forwards", "force_z": ", upwards"}.get(name, "")
+            ax.plot(scale * columns[place], columns[name], color=COLOURS.get(axis, "0.2"), label=text)
+        if len(names[what]) > 1:
+            ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        ax.set(xlabel=label, ylabel=f"{what} ({unit})" if what == "force" else f"moment about the origin ({unit})")
         ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
         ax.margins(x=0.02)
     return fig
+
+
+def draw_stress(ax, faces, above: np.ndarray, unit: float = 1e3) -> None:
+    """The faces below the surface (`rft.spatial.Faces`) on 3-D axes, in the colour of the size of the stress on them, and in
+    grey the triangles ``above`` it (Q, 3, 3)."""
+    from cmcrameri import cm
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    a, b, c = faces.corners.swapaxes(0, 1)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=-1) / 2
+    stress = np.linalg.norm(faces.force, axis=-1) / np.where(areas > 0, areas, 1.0) / unit
+    shades = ScalarMappable(Normalize(0.0, max(stress.max(initial=0.0), 1e-12)), cm.lajolla_r)
+    colours = np.concatenate([shades.to_rgba(stress), np.full((len(above), 4), [0.87, 0.87, 0.87, 1.0])])
+    corners = np.concatenate([faces.corners, above])
+    ax.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True))
+    x, y, z = faces.force.sum(0)  # seen a little from the side of what bears it
+    if x or y or z:
+        ax.view_init(elev=-np.degrees(np.arctan2(z, 2 * np.hypot(x, y))) / 2, azim=np.degrees(np.arctan2(-y, -x)) - 35)
+    low, high = corners.min((0, 1)), corners.max((0, 1))
+    _scale(ax, low, high - low)
+    ax.figure.colorbar(shades, ax=ax, shrink=0.7, pad=0.02).set_label("stress below the surface (kPa)")
+
+
+def _scale(ax, low, span) -> None:
+    """Axes that hold what begins at ``low`` and is as large as ``span``, with arrows of a round length in place of ticks."""
+    length = 0.3 * span.max()
+    length = max(k for k in (10.0 ** np.arange(-9, 3)[:, None] * [1, 2, 5]).flat if k <= length)
+    corner = low - 0.1 * length
+    for axis, way in zip("xyz", np.eye(3) * length):
+        ax.plot(*np.stack([corner, corner + way], 1), color="0.3", lw=1.0)
+        ax.text(*(corner + 1.25 * way), f"${axis}$", color="0.3", fontsize=8, ha="center", va="center")
+    low = corner - 0.1 * length
+    high = np.maximum(low + span + 0.2 * length, corner + 1.3 * length)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(high - low, zoom=0.95)
+    ax.set_axis_off()
+    ax.text2D(0.0, 0.02, f"axes: {1e3 * length:g} mm", transform=ax.transAxes, fontsize=8, color="0.3")
 
 
 def _poses(ax, points, pose) -> None:
@@ -95,6 +146,8 @@ def _poses(ax, points, pose) -> None:
 def _abscissa(columns) -> tuple[str, str, float]:
     if "angle" in columns:
         return "angle", "angle (degrees)", 180 / np.pi
+    if np.ptp(columns.get("y", 0.0)) > max(np.ptp(columns["x"]), np.ptp(columns["z"])):
+        return "t", "t (s)", 1.0
     back_and_forth = lambda name: np.unique(np.sign(np.diff(columns[name]))).size > 1
     if np.ptp(columns["z"]) > np.ptp(columns["x"]) and not back_and_forth("z"):
         return "z", "height of the origin, z (m)", 1.0
@@ -103,17 +156,20 @@ def _abscissa(columns) -> tuple[str, str, float]:
 
 @styled
 def elements_figure(results: Mapping):
-    """Error of an intruder scene against the number of elements, and against seconds (`geomech.study.intrusion`)."""
+    """Error of an intruder scene against the number of its parts, and against seconds (`geomech.study.intrusion`)."""
+    from matplotlib.ticker import NullFormatter
+
     fig, axes = figure(7.2, 3.2, 2)
     for line, colour, marker in zip(results["lines"], ("C0", "0.2"), "os"):
         order = "" if line["slope"] is None else f", order {line['slope']:.1f}"
         for ax, at in zip(axes[0], (line["value"], line["seconds"])):
             error = np.maximum(line["error"], 1e-17)
             ax.loglog(at, error, color=colour, marker=marker, lw=1.0, label=line["label"] + order)
-    for ax, label in zip(axes[0], ("elements", f"seconds for {results['poses']} poses")):
+    for ax, label in zip(axes[0], (results["parts"], f"seconds for {results['poses']} poses")):
         ax.set(xlabel=label, ylabel="rms error / largest of the motion")
         ax.grid(True, which="major", lw=0.3, color="0.85")
     axes[0, 0].set_xticks(results["lines"][0]["value"], map(str, results["lines"][0]["value"]))
     axes[0, 0].minorticks_off()
+    axes[0, 1].xaxis.set_minor_formatter(NullFormatter())
     axes[0, 0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return fig

@@ -1,0 +1,88 @@
+"""What effects do to the force on the c-leg of Fig. 8(b) in loose poppy seeds.
+
+Left: what the inertia of grains adds, rms over the turn, over the rms force without it, against the rate of turning, for
+lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift and drive over those in still, level ground against
+air speed over that of fluidisation, and slope over the angle of repose. Right: lift against angle with an earlier intrusion
+before the leg.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from rft.vertical.effects import Aeration, DisturbedGround, GrainInertia, Slope
+
+SEEN = 230.0  # rpm
+SHARE = 0.1  # of the force, from which an effect counts as seen; assumed
+REPOSE = np.radians(36.0)  # of poppy seeds, assumed
+PLACES = (-0.04, 0.0, 0.04)  # m
+
+
+def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0, 0.2, 0.4, 0.6, 0.8)) -> dict:
+    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated and sloping (N,): peaks
+    of the lift over that without. angle (T,), rad; lift {place: (T,)}, N."""
+    leg = load("c-leg")
+    plain = leg.run()
+    size = np.sqrt((plain.force**2).sum(-1).mean())
+    added = np.array([[_added(leg, plain, k, rpm) for rpm in rates] for k in strengths]) / size
+    peak = lambda effect: leg.changed(effects=(effect,)).run().force[:, 1].max() / plain.force[:, 1].max()
+    ground = lambda x: DisturbedGround(places=(x,), radius=0.02, weakening=0.5)
+    return {
+        "rates": np.array(rates),
+        "strengths": strengths,
+        "added": added,
+        "at": rates[-1] * np.sqrt(SHARE / added[:, -1]),  # it grows with the square of the rate
+        "shares": np.array(shares),
+        "aerated": np.array([peak(Aeration(x * 0.03, 0.03)) for x in shares]),
+        "sloping": np.array([peak(Slope(x * REPOSE, REPOSE)) for x in shares]),
+        "angle": plain.pose[:, 2],
+        "lift": {None: plain.force[:, 1]} | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
+    }
+
+
+def _added(leg, plain, strength: float, rpm: float) -> float:
+    fast = dataclasses.replace(leg.motion, rate=rpm * 2 * np.pi / 60)
+    found = leg.changed(motion=fast, effects=(GrainInertia(strength),)).run()
+    return np.sqrt(((found.force - plain.force) ** 2).sum(-1).mean())
+
+
+def table(numbers: dict) -> str:
+    """From which rate on the inertia of grains is seen."""
+    at_seen = numbers["added"][:, list(numbers["rates"]).index(SEEN)]
+    return "\n".join(
+        f"lambda = {k:g}: {100 * share:.0f} % of the force at {SEEN:.0f} rpm, {100 * SHARE:.0f} % at {at:.0f} rpm"
+        for k, at, share in zip(numbers["strengths"], numbers["at"], at_seen)
+    )
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(10.2, 3.2, 3)
+    left, middle, right = axes[0]
+    for k, added, shade in zip(numbers["strengths"], numbers["added"], ("#9ecae1", "#4292c6", "#084594")):
+        left.loglog(numbers["rates"], added, "o-", ms=3, lw=1.0, color=shade, label=rf"$\lambda$ = {k:g}")
+    left.axvline(SEEN, color="0.5", lw=0.8, ls="--")
+    left.axhline(SHARE, color="0.7", lw=0.6)
+    left.set(xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without", xticks=numbers["rates"])
+    left.set_xticklabels([str(x) for x in numbers["rates"]])
+    left.minorticks_off()
+    left.legend(loc="upper left")
+    middle.plot(numbers["shares"], numbers["aerated"], "o-", ms=3, lw=1.0, color="C0", label="air speed / fluidisation")
+    middle.plot(numbers["shares"], numbers["sloping"], "s-", ms=3, lw=1.0, color="C3", label="slope / angle of repose")
+    middle.set(xlabel="share", ylabel="peak lift / that without", xlim=(0, 1), ylim=(0, 1.02))
+    middle.legend(loc="lower left")
+    for place, colour in zip(numbers["lift"], ("0.2", "C1", "C2", "C4")):
+        label = "untouched" if place is None else f"earlier at x = {1e3 * place:g} mm"
+        right.plot(np.degrees(numbers["angle"]), numbers["lift"][place], color=colour, lw=1.0, label=label)
+    right.set(xlabel="angle of the leg (degrees)", ylabel="lift (N)")
+    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return fig
+
+
+if __name__ == "__main__":
+    main("ground_effects", compute, draw, table)

@@ -1,0 +1,114 @@
+"""Bodies of three dimensions by the law of Agarwal, Goldman and Kamrin (2023).
+
+Top: stress on meshes where the force is largest, as `geomech intrude` draws it. Bottom: error of the force on a sphere and a
+cylinder against the number of triangles, deep and half out of the ground; the law in the vertical plane (psi = 0) beside the
+generic map of two dimensions, both over their stress on a plate pushed straight down, for plates of all tilts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from rft.spatial import Cylinder, Spatial, Sphere, law, wrench
+from rft.vertical import VERTICAL
+
+SCENES = ("sphere", "cylinder", "screw", "extruded-c-leg")
+BODIES = {"sphere": Sphere(0.02), "cylinder": Cylinder(0.02, 0.06)}
+DEPTHS = {"deep": 0.1, "half out": 0.004}  # m, of the middle
+COLOURS = {"sphere": "#0072B2", "cylinder": "#D55E00"}
+STEP = 4  # degrees
+
+
+def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
+    """pictures: {scene: (faces, above)}. errors: {(body, depth): (triangles, error, order)}. angles: beta and gamma in rad,
+    (2, B, G); two, three: (2, B, G), alpha_x against the motion and alpha_z upwards over that straight down, of two and three
+    dimensions."""
+    pictures = {}
+    for name in SCENES:
+        scene = load(name)
+        found = scene.run()
+        pictures[name] = scene.faces(found, int(np.linalg.norm(found.force, axis=-1).argmax()))
+    line = np.radians(np.arange(STEP / 2 - 90, 90, STEP))
+    angles = np.stack(np.meshgrid(line, line, indexing="ij"))
+    two = np.stack(VERTICAL["generic"].stress(*angles))
+    three = law.of_angles(*angles, 0.0)[..., [0, 2]] * [-1, 1] / Spatial(1.0).plate
+    return {
+        "pictures": pictures,
+        "errors": {(body, name): _errors(body, depth, ladder) for body in BODIES for name, depth in DEPTHS.items()},
+        "angles": angles,
+        "two": two / VERTICAL["generic"].stress(0.0, np.pi / 2)[1],
+        "three": np.moveaxis(three, -1, 0),
+    }
+
+
+def _errors(body: str, depth: float, ladder):
+    """Of a body dragged aside and down while it turns."""
+    medium, meshes = Spatial(3e5, 0.3), [BODIES[body].mesh(n) for n in ladder]
+    forces = [wrench(medium, m, np.eye(3), [0, 0, -depth], [0.03, 0.05, -0.1], [2.0, -1.0, 3.0]).force for m in meshes]
+    triangles = np.array([len(m.faces) for m in meshes[:-1]])
+    error = np.linalg.norm(np.array(forces[:-1]) - forces[-1], axis=-1) / np.linalg.norm(forces[-1])
+    return triangles, error, float(-np.polyfit(np.log(triangles), np.log(error), 1)[0])
+
+
+def table(numbers: dict) -> str:
+    """Orders of convergence, and how the two laws agree."""
+    lines = [f"{body}, {depth}: order {order:.2f} in the number of triangles, error {e[-1]:.1e} at {n[-1]}"
+             for (body, depth), (n, e, order) in numbers["errors"].items()]  # fmt: skip
+    for name, two, three in zip("xz", numbers["two"], numbers["three"]):
+        r = np.corrcoef(two.ravel(), three.ravel())[0, 1]
+        b, g = np.degrees(numbers["angles"]).reshape(2, -1)[:, np.abs(three - two).argmax()]
+        worst = np.abs(three - two).max()
+        lines.append(
+            f"alpha_{name}: correlation {r:.2f}, most apart, by {worst:.2f}, at beta = {b:.0f}, gamma = {g:.0f}"
+        )
+    return "\n".join(lines)
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(12.0, 6.0, 4, 2)
+    for k, (name, (faces, above)) in enumerate(numbers["pictures"].items()):
+        axes[0, k].remove()
+        ax = fig.add_subplot(2, 4, k + 1, projection="3d")
+        plots.draw_stress(ax, faces, above)
+        ax.set_title(name, fontsize=9)
+    _convergence(axes[1, 0], numbers["errors"])
+    _tilts(axes[1, 1], numbers)
+    for ax, name, two, three in zip(axes[1, 2:], "xz", numbers["two"], numbers["three"]):
+        ax.plot(two.ravel(), three.ravel(), ".", ms=1.5, color="0.3", rasterized=True)
+        ends = np.array([min(two.min(), three.min()), max(two.max(), three.max())])
+        ax.plot(ends, ends, color="0.7", lw=0.8, zorder=0)
+        ax.set(xlabel=rf"$\alpha_{name}$, map of two dimensions", ylabel=rf"$\alpha_{name}$, law of three")
+        r = np.corrcoef(two.ravel(), three.ravel())[0, 1]
+        ax.set_title(f"all angles, r = {r:.2f}", fontsize=8)
+    return fig
+
+
+def _convergence(ax, errors) -> None:
+    for (body, depth), (n, e, order) in errors.items():
+        dash = "-" if depth == "deep" else "--"
+        ax.loglog(n, e, "o" + dash, ms=3, lw=1.0, color=COLOURS[body], label=f"{body}, {depth}: {order:.2f}")
+    ax.set(xlabel="triangles", ylabel="error of the force", ylim=(None, 10))
+    ax.set_title("order in 1 / triangles (declared: 1)", fontsize=8)
+    ax.legend(fontsize=7, loc="upper right", handlelength=2.6)
+
+
+def _tilts(ax, numbers) -> None:
+    beta, gamma = numbers["angles"]
+    for degrees, colour in ((88, "#0072B2"), (44, "#D55E00"), (0, "#009E73")):
+        k = int(np.abs(np.degrees(gamma[0]) - degrees).argmin())
+        for law_, dash in (("two", "--"), ("three", "-")):
+            label = rf"$\gamma$ = {np.degrees(gamma[0, k]):.0f}°" if law_ == "three" else None
+            ax.plot(np.degrees(beta[:, k]), numbers[law_][1][:, k], dash, lw=1.0, color=colour, label=label)
+    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"$\alpha_z$ / that straight down", xticks=[-90, -45, 0, 45, 90])
+    ax.set_title("dashed: two dimensions; solid: three", fontsize=8)
+    ax.set_ylim(-0.15, 1.6)
+    ax.legend(fontsize=7, loc="upper left")
+
+
+if __name__ == "__main__":
+    main("meshes", compute, draw, table)

@@ -1,0 +1,126 @@
+"""What scenes of bodies that move in a prescribed way through grains have in common, of outlines and of meshes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from geomech.errors import SceneError, choose, named, short
+from geomech.scene.read import _of_kind
+from geomech.systems.said import said
+from rft.premise import not_so
+from rft.vertical.effects import KINDS, GroundEffect, checked, weight
+
+TABLES = ("medium", "intruder", "motion", "numerics", "effects")
+
+
+class Intruding:
+    """Base of such scenes. parts: what the body is made of, in the plural. takes: {field: (class, what to give instead)}.
+    per_part: s for a part at a pose, measured."""
+
+    parts = "parts"
+    takes: Mapping[str, tuple[type, str]] = {}
+    per_part = 0.0
+    effects: tuple[GroundEffect, ...]
+    files: tuple[str, ...]
+
+    def _check(self) -> None:
+        """ValueError for fields of wrong types."""
+        for what, (kind, such) in {**self.takes, "name": (str, "text"), "text": (str, "text")}.items():
+            if not isinstance(getattr(self, what), kind):
+                raise ValueError(f"{what} must be {such}, got {short(getattr(self, what))}")
+        if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
+            raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
+        object.__setattr__(self, "effects", checked(self.effects))
+
+    @property
+    def count(self) -> int:
+        """Of the body's parts."""
+        raise NotImplementedError
+
+    def used(self, count: int) -> int:
+        """Of the parts that it has where so many are asked for."""
+        raise NotImplementedError
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        """Numbers of parts to ask for where one asks how many are enough; the last is the truth."""
+        raise NotImplementedError
+
+    @property
+    def size(self) -> float:
+        """The body's largest, m."""
+        raise NotImplementedError
+
+    @property
+    def order(self) -> int:
+        """Of the error, in 1 / parts."""
+        raise NotImplementedError
+
+    def changed(self, **parts) -> Intruding:
+        """The scene with other parts."""
+        return dataclasses.replace(self, **parts)
+
+    def told(self) -> list[str]:
+        """Lines about the law, the body and its motion, and which effects are on and off."""
+        medium, body, motion = (said(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
+        lines = [f"{self.name}: {body} of {self.count:,} {self.parts}", f"motion: {motion}", f"medium: {medium}"]
+        lines += self.effects_told()
+        off = [kind for kind in KINDS if kind not in [e.kind for e in self.effects]]
+        return [*lines, "off, not evaluated: " + (", ".join(off) or "none")]
+
+    def effects_told(self) -> list[str]:
+        """A line for each effect, and one more for what it takes for granted."""
+        lines = []
+        for effect in self.effects:
+            lines.append(
+                f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+                f"gone at {effect.limit}, order {effect.order}"
+            )
+            if effect.assumes:
+                lines.append(f"     assumes {effect.assumes}")
+        return lines
+
+    def weighed(self, force: np.ndarray) -> np.ndarray:
+        """Forces (T, k) along x, (y,) z with those that are not the grains'."""
+        x, z = weight(self.effects)
+        if not (x or z):
+            return force
+        return force + np.array([x, *[0.0] * (force.shape[1] - 2), z])
+
+
+def checked_tables(tables: Mapping, name: str) -> dict:
+    """The numerics and effects of a scene's tables; SceneError unless they are those of such a scene."""
+    for key in tables:
+        choose(f"{name}: table", key, TABLES)
+    for key in TABLES[:-1]:
+        if not isinstance(tables.get(key, {} if key == "numerics" else None), Mapping):
+            told = "is missing: add it" if key not in tables else "must be a table"
+            raise SceneError(f"{name}: the table [{key}] {told}, see 'geomech scenes --show c-leg'")
+    effects = tables.get("effects", [])
+    if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
+        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
+    made = tuple(_of_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
+    with named(f"{name}: [[effects]]"):
+        return {"numerics": dict(tables.get("numerics", {})), "effects": checked(made)}
+
+
+def located(table: Mapping, folder: Path, files: list[str]) -> dict:
+    """The table with its file, if it names one, looked for from the scene's folder, and noted."""
+    if not isinstance(table.get("file"), str):
+        return dict(table)
+    files.append(str(folder / table["file"]))
+    return {**table, "file": files[-1]}
+
+
+def as_table(thing, kinds: Mapping[str, type], **more) -> dict:
+    """The table of one of ``kinds``, lists in place of tuples."""
+    kind = next(k for k, v in kinds.items() if v is type(thing))
+    return {**more, "kind": kind} | {k: _listed(v) for k, v in dataclasses.asdict(thing).items()}
+
+
+def _listed(value):
+    return [_listed(v) for v in value] if isinstance(value, tuple) else value

@@ -1,0 +1,126 @@
+"""Meshes made from a few sizes (m): sphere, cylinder, screw, leg. All are closed; the origin is their middle, or the hip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rft.media.base import in_range, require
+from rft.spatial.mesh import Mesh, halved
+
+
+def sphere(radius: float, fineness: int = 4) -> Mesh:
+    """An icosahedron whose triangles are cut in four ``fineness`` (0 to 7) times, with corners on the sphere: 20 4^fineness
+    triangles of nearly equal size."""
+    _sizes(radius=radius)
+    in_range("fineness", fineness, 0, 7, whole=True)
+    g = (1 + 5**0.5) / 2
+    vertices = np.array([
+        (-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g), (0, -1, -g), (0, 1, -g),
+        (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1),
+    ])  # fmt: skip
+    faces = np.array([
+        (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6),
+        (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7),
+        (9, 8, 1),
+    ])  # fmt: skip
+    for _ in range(int(fineness)):
+        vertices, faces = _quartered(vertices, faces)
+    return Mesh(radius * vertices / np.linalg.norm(vertices, axis=-1, keepdims=True), faces)
+
+
+def _quartered(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every triangle cut in four at the middles of its edges, all on one sphere."""
+    size = np.linalg.norm(vertices[0])
+    vertices, faces = halved(vertices, faces)
+    return vertices * (size / np.linalg.norm(vertices, axis=-1, keepdims=True)), faces
+
+
+def cylinder(radius: float, length: float, around: int = 64, along: int = 32, across: int = 8) -> Mesh:
+    """Along y, as the rods that are dragged along x are; so many triangles around, along and from rim to middle of the
+    end faces."""
+    _sizes(radius=radius, length=length)
+    turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
+    circle = np.stack([np.cos(turn), 0 * turn, -np.sin(turn)], -1)
+    y = length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1)
+    return _tube(np.array([radius * circle + [0, place, 0] for place in y]), _count("across", across, 1))
+
+
+def screw(
+    radius: float, core: float, pitch: float, length: float, around: int = 64, along: int = 128, across: int = 6
+) -> Mesh:
+    """A right-handed Archimedean screw along x: a core with one thread of a smooth profile, as high as ``radius`` - ``core``
+    and ``pitch`` from turn to turn."""
+    _sizes(radius=radius, core=core, pitch=pitch, length=length)
+    require(core < radius, f"core must be less than the radius, got {core:g} and {radius:g}")
+    turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
+    rings = []
+    for x in length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1):
+        height = np.exp(6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0))  # of the profile; its sharpness is assumed
+        r = core + (radius - core) * height
+        rings.append(np.stack([np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)], -1))
+    return _tube(np.array(rings), _count("across", across, 1))
+
+
+def leg(
+    reach: float, curvature: float, thickness: float, width: float, along: int = 64, across: int = 8, thick: int = 2
+) -> Mesh:
+    """A strip that hangs from the hip, at the origin, to (0, 0, -2 reach), bent to an arc of 1/r = ``curvature`` / reach,
+    -1 (a half circle that opens forwards) to 1 (backwards), 0 for a flat leg; the c-leg of the paper's Fig. 8(b) has
+    ``curvature`` 1. So many quadrilaterals along it, across its width and through its thickness."""
+    _sizes(reach=reach, thickness=thickness, width=width)
+    in_range("curvature", curvature, -1, 1)
+    require(thickness < reach, f"thickness must be less than the reach, got {thickness:g} and {reach:g}")
+    s = np.linspace(-1.0, 1.0, _count("along", along, 2) + 1)
+    half = np.arcsin(abs(curvature))
+    bend = np.sign(curvature) * half * s  # of the strip's direction from straight down
+    if half:
+        r = reach / np.sin(half)
+        x, z = np.sign(curvature) * r * (np.cos(half * s) - np.cos(half)), -reach - r * np.sin(half * s)
+    else:
+        x, z = 0 * s, -reach - reach * s
+    out = np.stack([np.cos(bend), 0 * s, -np.sin(bend)], -1)  # across the strip, forwards
+    corners = _rectangle(thickness, width, _count("thick", thick, 1), _count("across", across, 1))
+    rings = (
+        np.stack([x, 0 * s, z], -1)[:, None] + corners[None, :, :1] * out[:, None] + corners[:, 1:] * [0.0, 1.0, 0.0]
+    )
+    return _tube(rings, max(1, round(across / 2)))
+
+
+def _rectangle(a: float, b: float, m: int, n: int) -> np.ndarray:
+    """(2 m + 2 n, 2): points around a rectangle a x b, counter-clockwise."""
+    u, v = np.linspace(-0.5, 0.5, m + 1)[:-1], np.linspace(-0.5, 0.5, n + 1)[:-1]
+    low, high = np.full(m, 0.5), np.full(n, 0.5)
+    sides = [(u, -low), (high, v), (-u, low), (-high, -v)]
+    return np.concatenate([np.stack(side, -1) for side in sides]) * [a, b]
+
+
+def _tube(rings: np.ndarray, across: int) -> Mesh:
+    """A closed mesh through rings (M, K, 3) of points, with ends of ``across`` smaller rings and a point in the middle."""
+    share = np.linspace(0.0, 1.0, across + 1)[1:-1][:, None, None]
+    first, last = rings[0], rings[-1]
+    near, far = first.mean(0), last.mean(0)
+    rings = np.concatenate([near + share * (first - near), rings, far + share[::-1] * (last - far)])
+    m, k, _ = rings.shape
+    i = np.arange(m * k).reshape(m, k)
+    a, b, c, d = (x.ravel() for x in (i[:-1], np.roll(i, -1, 1)[:-1], np.roll(i, -1, 1)[1:], i[1:]))
+    tip, end, ahead = m * k, m * k + 1, np.roll(np.arange(k), -1)
+    faces = [
+        np.stack([a, b, c], -1), np.stack([a, c, d], -1),
+        np.stack([np.full(k, tip), ahead, np.arange(k)], -1),
+        np.stack([np.full(k, end), i[-1], i[-1][ahead]], -1),
+    ]  # fmt: skip
+    faces = np.concatenate(faces)
+    vertices = np.concatenate([rings.reshape(-1, 3), [near, far]])
+    corner = vertices[faces]
+    inside_out = (corner[:, 0] * np.cross(corner[:, 1], corner[:, 2])).sum() < 0
+    return Mesh(vertices, faces[:, ::-1] if inside_out else faces)
+
+
+def _sizes(**sizes: float) -> None:
+    for name, value in sizes.items():
+        in_range(name, value, 1e-6, 1e3)
+
+
+def _count(name: str, value: int, low: int) -> int:
+    in_range(name, value, low, 4096, whole=True)
+    return int(value)

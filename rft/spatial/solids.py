@@ -1,0 +1,155 @@
+"""Solid bodies, one class a kind; sizes in m. Each gives its `Mesh` of about so many triangles."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.media.base import in_range, is_number, require, shown
+from rft.spatial import shapes
+from rft.spatial.mesh import MOST, Mesh, quartered, read
+from rft.spatial.smooth import smooth
+from rft.vertical.outline import check_metres
+
+FINEST = 327_680  # triangles that a body is compared to
+
+
+class Solid:
+    """Base of bodies: a mesh, and the numbers of triangles that are tried, and at last the truth, where one asks how many
+    are enough."""
+
+    def __post_init__(self):
+        sizes = ("radius", "length", "core", "pitch", "thickness", "width")
+        check_metres(self, *(name for name in sizes if hasattr(self, name)))
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        """Of about so many triangles, and at least those that the body takes."""
+        in_range("triangles", triangles, 1, MOST, whole=True)
+        return smooth(self.made(int(triangles)))
+
+    def made(self, triangles: int) -> Mesh:
+        """Of flat triangles."""
+        raise NotImplementedError
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        return (*(80 * 4**k for k in range(5)), FINEST)
+
+
+@dataclass(frozen=True)
+class Sphere(Solid):
+    """About the origin; its triangles are 20, 80, 320, ..., 327680: the next number from that asked for."""
+
+    radius: float
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        in_range("triangles", triangles, 1, MOST, whole=True)
+        flat = self.made(int(triangles))
+        return dataclasses.replace(flat, bends=flat.vertices[flat.faces] / self.radius)
+
+    def made(self, triangles: int) -> Mesh:
+        return shapes.sphere(self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01))))
+
+
+@dataclass(frozen=True)
+class Cylinder(Solid):
+    """Along y, about the origin: a rod across the plane of x and z."""
+
+    radius: float
+    length: float
+
+    def made(self, triangles: int) -> Mesh:
+        size = math.sqrt(4 * math.pi * self.radius * (self.length + 2 * self.radius) / triangles)
+        counts = _divided(size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1))
+        return shapes.cylinder(self.radius, self.length, *counts)
+
+
+@dataclass(frozen=True)
+class Screw(Solid):
+    """A right-handed Archimedean screw along x, about the origin: a core with one thread of a smooth profile."""
+
+    radius: float
+    core: float
+    pitch: float
+    length: float
+
+    def __post_init__(self):
+        super().__post_init__()
+        require(self.core < self.radius, f"core must be less than the radius, got {self.core:g} and {self.radius:g}")
+
+    def made(self, triangles: int) -> Mesh:
+        size = math.sqrt(4 * math.pi * self.core * (self.length + 2 * self.core) / triangles)
+        counts = _divided(size, (2 * math.pi * self.core, 12), (self.length, 4), (self.core, 1))
+        return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts)
+
+
+@dataclass(frozen=True)
+class Leg(Solid):
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, its free end at z = -2 R below. radius: R.
+    relative_curvature: R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a
+    positive rate about y sweeps the leg backwards. thickness: of the strip."""
+
+    radius: float
+    width: float
+    thickness: float
+    relative_curvature: float = 1.0
+
+    def __post_init__(self):
+        super().__post_init__()
+        in_range("relative_curvature", self.relative_curvature, -1.0, 1.0)
+        told = f"thickness must be less than the radius, got {self.thickness:g} and {self.radius:g}"
+        require(self.thickness < self.radius, told)
+
+    def made(self, triangles: int) -> Mesh:
+        bend = math.asin(abs(self.relative_curvature))
+        length = 2 * self.radius * (bend / math.sin(bend) if bend else 1.0)
+        size = math.sqrt(4 * length * (self.width + self.thickness) / triangles)
+        counts = _divided(size, (length, 4), (self.width, 1), (self.thickness, 1))
+        return shapes.leg(self.radius, -self.relative_curvature, self.thickness, self.width, *counts)
+
+
+@dataclass(frozen=True)
+class MeshFile(Solid):
+    """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame. scale: m to a unit of the file, 0.001 if that is
+    in mm. closed: whether it has an inside, which is then asked for; of an open one either side may lead. smooth: whether
+    its triangles stand for a curved surface, with edges where they meet at more than 40 degrees. More triangles than it has
+    are made of them by cutting each in four; its form stays."""
+
+    file: str
+    scale: float = 1.0
+    closed: bool = True
+    smooth: bool = False
+
+    def __post_init__(self):
+        require(isinstance(self.file, str), f"file must be the name of a mesh, got {shown(self.file)}")
+        good = is_number(self.scale) and 1e-9 <= self.scale <= 1e9
+        require(good, f"scale must be a number from 1e-09 to 1e+09 m to a unit, got {shown(self.scale)}")
+        require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
+        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {shown(self.smooth)}")
+        mesh = read(self.file, self.closed, self.scale)
+        mesh = smooth(mesh) if self.smooth else mesh
+        object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)
+
+    def mesh(self, triangles: int = 5000) -> Mesh:
+        in_range("triangles", triangles, 1, MOST, whole=True)
+        mesh = self._mesh
+        while 4 * len(mesh.faces) <= triangles:
+            mesh = quartered(mesh)
+        return mesh
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        own = len(self._mesh.faces)
+        finer = [own * 4**k for k in range(8) if own * 4**k <= max(FINEST, own)]
+        return (*finer[:-1], finer[-1]) if len(finer) > 1 else (own, own)
+
+
+SOLIDS = {"sphere": Sphere, "cylinder": Cylinder, "screw": Screw, "c-leg": Leg}
+
+
+def _divided(size: float, *lengths: tuple[float, int]) -> list[int]:
+    """How many pieces of a size each length is cut into, at least the number beside it."""
+    return [int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths]

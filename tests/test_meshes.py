@@ -1,0 +1,376 @@
+"""Intruder scenes of meshes: bodies, motions, files, and the commands that take them."""
+
+import csv
+import dataclasses
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+from registry import GROUND_EFFECTS
+from scipy.spatial.transform import Rotation
+from test_fuzz import VALUES, mutated
+from test_intrude import geomech, outcome, refused  # noqa: F401
+
+import geomech.scene as scenes
+from figures import meshes
+from geomech.errors import SceneError
+from geomech.output import plots
+from geomech.output.explain import explain
+from geomech.scene import MeshScene
+from rft.spatial import (
+    SOLIDS,
+    Cylinder,
+    Drag,
+    Leg,
+    Path,
+    Penetrate,
+    Rotate,
+    Screw,
+    Spatial,
+    Sphere,
+    bearing,
+    shapes,
+    wrench,
+)
+from rft.vertical import VERTICAL
+
+NAMES = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), MeshScene)]
+BODIES = (Sphere(0.02), Cylinder(0.0127, 0.1), Screw(0.03, 0.015, 0.06, 0.18), Leg(0.038, 0.025, 0.003, 0.7))
+MOTIONS = (
+    Drag(0.03, 0.2, -0.4, 0.05, 0.08, (0.1, 0.2, -0.3), 5),
+    Penetrate(0.03, 1.1, 0.6, 0.02, 0.5, 5),
+    Rotate(-0.01, (1.0, 2.0, -1.0), -3.0, 1.0, -2.0, 0.3, 0.5, 0.2, 6),
+)
+MADE = """[medium]
+density = 1500
+internal_friction = 0.5
+surface_friction = 0.3
+grazing_deg = 3
+[intruder]
+kind = "mesh"
+shape = "sphere"
+radius = 0.02
+[motion]
+kind = "drag"
+depth = 0.015
+direction_deg = 20
+heading_deg = 30
+attitude_deg = [10, 0, 20]
+distance = 0.05
+samples = 5
+[numerics]
+triangles = 300
+[[effects]]
+kind = "slope"
+angle_deg = 10
+mass = 0.2
+"""
+
+
+def stl(path, mesh, scale=1.0):
+    """Binary, by hand."""
+    rows = np.zeros(len(mesh.faces), dtype=[("n", "<f4", 3), ("p", "<f4", (3, 3)), ("a", "<u2")])
+    rows["p"] = mesh.vertices[mesh.faces] * scale
+    path.write_bytes(b" " * 80 + np.uint32(len(rows)).tobytes() + rows.tobytes())
+
+
+def test_there_is_a_scene_of_every_body():
+    assert {type(scenes.load(n).intruder) for n in NAMES} == set(SOLIDS.values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenes_of_meshes_run(name, geomech, tmp_path):  # noqa: F811
+    scene = scenes.load(name)
+    code, out, err = geomech("intrude", name, "--json", "-o", "out.csv")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    place = ["angle"] if isinstance(scene.motion, Rotate) else ["x", "y", "z"]
+    assert list(found) == [
+        "t", *place, "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z", "moment",
+    ]  # fmt: skip
+    assert found["moment"] == found["moment_y"]
+    passage = scene.motion.passage(scene.mesh)
+    k = len(passage.t) // 3
+    turn, at, v, w = passage.rotation[k], passage.place[k], passage.velocity[k], passage.spin[k]
+    wanted = wrench(scene.medium, scene.mesh, turn, at, v, w)
+    np.testing.assert_allclose([found[f"force_{a}"][k] for a in "xyz"], wanted.force, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose([found[f"moment_{a}"][k] for a in "xyz"], wanted.moment, rtol=1e-12, atol=1e-15)
+    with open(tmp_path / "out.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for key, values in found.items():
+        assert [float(row[key]) for row in rows] == values
+    assert scenes.toml(scene) == scene.text and name in geomech("scenes")[1]
+
+
+def test_strength_is_matched_to_the_vertical_plane_and_that_is_told(geomech, tmp_path):  # noqa: F811
+    scene = scenes.load("sphere")
+    plate = Spatial(scene.medium.xi_n, 0.4).stress([0.0, 0, -1], [0.0, 0, -1])[2]
+    assert plate == pytest.approx(0.254e6, rel=1e-12)
+    out = geomech("intrude", "sphere")[1]
+    assert (
+        "matched to alpha_z(0, 90 degrees) of poppy-seeds-loose" in out
+        and "matched" not in geomech("intrude", "screw")[1]
+    )
+    twice = scenes.parse(scene.text.replace("surface_friction", "zeta = 2.0\nsurface_friction"))
+    assert twice.medium.xi_n == pytest.approx(2 * scene.medium.xi_n) and "2 times alpha_z" in twice.matched
+    (tmp_path / "own.toml").write_text("[medium]\nzeta = 0.3\n")
+    (tmp_path / "s.toml").write_text(scene.text.replace('name = "poppy-seeds-loose"', 'file = "own.toml"'))
+    own = scenes.load(tmp_path / "s.toml")
+    assert own.medium.xi_n * scene.medium.plate == pytest.approx(0.3e6)
+    assert "of own.toml in" in own.matched and own.files == (str(tmp_path / "own.toml"),)
+    assert scenes.parse(MADE).medium.xi_n == Spatial.of_grains(1500, 0.5).xi_n
+
+
+def test_a_leg_of_three_dimensions_is_like_that_of_two():
+    """Thin and smooth, peaks of lift and drive are within a third of the flat one's, at angles 20 degrees off at most."""
+    solid, flat = scenes.load("extruded-c-leg").run(), scenes.load("c-leg").run()
+    for k in (0, 1):
+        one, two = solid.force[:, 2 * k], flat.force[:, k]
+        assert one.max() == pytest.approx(two.max(), rel=0.3)
+        at = solid.passage.angle[one.argmax()], flat.pose[two.argmax(), 2]
+        assert abs(np.degrees(at[0] - at[1])) < 20
+    assert np.abs(solid.force[:, 1]).max() < 1e-12
+    assert solid.moment[:, 1].min() == pytest.approx(flat.moment.min(), rel=0.2)
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=["drag", "penetrate", "rotate"])
+@pytest.mark.parametrize("body", BODIES, ids=["sphere", "cylinder", "screw", "leg"])
+def test_velocities_are_those_of_the_poses(body, motion):
+    """Against differences between poses close by."""
+    mesh = body.mesh(200)
+    dense = dataclasses.replace(motion, samples=4001).passage(mesh)
+    h, k = dense.t[1], 1234
+    np.testing.assert_allclose((dense.place[k + 1] - dense.place[k - 1]) / (2 * h), dense.velocity[k], atol=1e-9)
+    turn = Rotation.from_matrix(dense.rotation[k + 1] @ dense.rotation[k - 1].T).as_rotvec() / (2 * h)
+    np.testing.assert_allclose(turn, dense.spin[k], atol=1e-9)
+    if isinstance(motion, Penetrate):
+        lowest = (mesh.vertices @ dense.rotation[0].T + dense.place[[0, -1], None])[..., 2].min(1)
+        np.testing.assert_allclose(lowest, [0.0, -motion.depth], atol=1e-12)
+
+
+def test_a_path_of_poses_gives_the_motion_it_was_taken_from(geomech, tmp_path):  # noqa: F811
+    """A steady rotation about an oblique axis, with the hub moving, from a CSV file."""
+    made = MADE.replace("sphere", "c-leg").replace("radius", "width = 0.02\nthickness = 0.004\nradius")
+    motion = Rotate(0.01, (1.0, 2.0, -1.0), 3.0, -1.0, 1.5, 0.1, 0.5, 0.2, 21)
+    straight = dataclasses.replace(scenes.parse(made), motion=motion).run()
+    p = straight.passage
+    rows = np.column_stack([p.t, p.place, Rotation.from_matrix(p.rotation).as_rotvec()]).tolist()
+    (tmp_path / "p.csv").write_text("t,x,y,z,rx,ry,rz\n" + "\n".join(",".join(map(repr, row)) for row in rows))
+    parts = made[: made.index("[motion]")], made[made.index("[numerics]") :]
+    (tmp_path / "s.toml").write_text(f'{parts[0]}[motion]\nkind = "csv"\nfile = "p.csv"\n{parts[1]}')
+    found = json.loads(geomech("intrude", "s.toml", "--json")[1])
+    assert list(found)[:4] == ["t", "x", "y", "z"]
+    force = np.stack([found[f"force_{a}"] for a in "xyz"], -1)
+    assert np.abs(straight.force).max() > 0.1
+    np.testing.assert_allclose(force, straight.force, atol=1e-12)
+
+
+def test_velocities_of_a_path_are_of_order_2():
+    turns = lambda t: Rotation.from_rotvec(np.stack([np.sin(2 * t), t**2, 1 - t], -1))
+    errors = []
+    for samples in (50, 100, 200):
+        t = 0.1 + np.linspace(0, 1, samples) ** 1.2
+        exact = (turns(t + 1e-6) * turns(t - 1e-6).inv()).as_rotvec() / 2e-6
+        found = Path(t, np.sin(t), 0 * t, t**3 / 5, *turns(t).as_rotvec().T).passage(None)
+        errors.append([np.abs(found.spin - exact).max(), np.abs(found.velocity[:, 0] - np.cos(t)).max()])
+    assert np.max(errors[-1]) < 2e-4
+    assert (np.log2(np.divide(errors[0], errors[-1])) / 2 > 1.8).all()
+
+
+def test_meshes_of_files(geomech, tmp_path):  # noqa: F811
+    pytest.importorskip("trimesh")
+    mesh = shapes.leg(0.038, -1.0, 0.003, 0.025, 40, 6, 1)
+    stl(tmp_path / "leg.STL", mesh, 1000)
+    text = MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "leg.STL"\nscale = 0.001')
+    (tmp_path / "s.toml").write_text(text)
+    scene = scenes.load(tmp_path / "s.toml")
+    assert [p.name for p in scenes.inputs(scene)] == ["s.toml", "leg.STL"]
+    assert scenes.parse(scenes.toml(dataclasses.replace(scene, triangles=301))).mesh.volume == scene.mesh.volume
+    p = scene.motion.passage(mesh)
+    wanted = wrench(scene.medium, mesh, p.rotation, p.place, p.velocity, p.spin, scene.effects)
+    weight = [-0.2 * 9.81 * math.sin(math.radians(10)), 0.0, 0.0]
+    assert scene.run(len(mesh.faces)).force == pytest.approx(wanted.force + weight, rel=1e-4, abs=1e-6)
+    assert [len(scene.intruder.mesh(n).faces) for n in scene.ladder[:2]] == [len(mesh.faces), 4 * len(mesh.faces)]
+    refused(geomech("intrude", "s.toml", "-o", "leg.csv", "--plot", "leg.STL"), "end the name in .png")
+
+
+def bad(mesh):
+    return [
+        ("open", dataclasses.replace(mesh, faces=mesh.faces[1:], closed=False), "the mesh is open: 3 edges"),
+        ("inside out", dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], closed=False), "inside out"),
+        ("in mm", dataclasses.replace(mesh, vertices=mesh.vertices * 1e3), "give scale, 0.001 if it is in mm"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("what", "mesh", "said"), bad(shapes.sphere(0.02, 1)), ids=lambda x: x if isinstance(x, str) else ""
+)
+def test_bad_mesh_files_get_one_line(what, mesh, said, geomech, tmp_path):  # noqa: F811
+    pytest.importorskip("trimesh")
+    stl(tmp_path / "a.stl", mesh)
+    (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "a.stl"'))
+    refused(geomech("intrude", "s.toml", "--plot", "a.png"), said)
+    assert not (tmp_path / "a.png").exists()
+    if what == "open":
+        (tmp_path / "s.toml").write_text(
+            MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "a.stl"\nclosed = false')
+        )
+        assert geomech("intrude", "s.toml")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "said"),
+    [
+        ("a.stl", b"", "is no STL mesh"),
+        ("a.stl", b"hello", "is no STL mesh"),
+        ("a.stl", b"\0" * 80 + b"\xff" * 4, "is no STL mesh"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\n", "is no OBJ mesh: it has no triangles"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "is no OBJ mesh"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 1 0 0\nf 1 2 3\n", "no area"),
+        ("a.ply", b"ply\n", "is no PLY mesh"),
+        ("a.step", b"", "a mesh is an .stl, .obj or .ply file"),
+        ("gone.stl", None, "No such file"),
+        (".", None, "a mesh is an .stl"),
+    ],
+)
+def test_files_that_are_no_mesh_get_one_line(name, data, said, geomech, tmp_path):  # noqa: F811
+    pytest.importorskip("trimesh")
+    if data is not None:
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', f'file = "{name}"'))
+    refused(geomech("intrude", "s.toml"), said)
+
+
+def test_without_trimesh_files_are_refused_and_shapes_go_on(geomech, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    stl(tmp_path / "a.stl", shapes.sphere(0.02, 1))
+    (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "a.stl"'))
+    refused(geomech("intrude", "s.toml"), "needs trimesh: pip install 'geomech[mesh]'")
+    assert geomech("intrude", "sphere")[0] == 0
+
+
+REFUSED = [
+    ("density = 1500", "", "give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or"),
+    ("density = 1500", "xi_n = 3e5", "give 'xi_n' (N/m^3), or"),
+    ("density = 1500\ninternal_friction = 0.5", "xi_n = 0.2", "xi_n must be a number from 1"),
+    ("density = 1500\ninternal_friction = 0.5", 'name = "poppy"', "[medium] name: 'poppy' is unknown"),
+    ("density = 1500", "density = nan", "density must be 1 to 1e5 kg/m^3"),
+    ("surface_friction = 0.3", "surface_friction = -1", "surface_friction must be a number"),
+    ("surface_friction = 0.3", "friction = 0.3", "[medium] key: 'friction' is unknown"),
+    ("surface_friction = 0.3", 'tension = "pull"', "tension must be one of cut, keep, push"),
+    ('shape = "sphere"', "", "give 'file' (.stl, .obj, .ply) or 'shape', one of sphere, cylinder, screw, c-leg"),
+    ('shape = "sphere"', 'shape = "spere"', "[intruder] shape: 'spere' is unknown; did you mean 'sphere'"),
+    ('shape = "sphere"', 'shape = "sphere"\nfile = "a.stl"', "'shape' goes with kind = 'mesh' and no 'file'"),
+    ('kind = "mesh"', 'kind = "sphere"', "'shape' goes with kind = 'mesh'"),
+    ("radius = 0.02", "radius = 20", "radius must be a number from 1e-06 to 10 m"),
+    ("radius = 0.02", "radius = 0.02\nlength = 0.1", "[intruder] key: 'length' is unknown"),
+    ("attitude_deg = [10, 0, 20]", "attitude_deg = [10, 0]", "attitude must be an angle about y or a rotation vector"),
+    ('kind = "drag"', 'kind = "rotate"', "[motion] key: 'depth' is unknown"),
+    ("triangles = 300", "triangles = 0", "triangles must be a whole number from 1"),
+    ("triangles = 300", "elements = 300", "[numerics] key: 'elements' is unknown"),
+    ('kind = "slope"', 'kind = "hill"', "[[effects]] kind: 'hill' is unknown"),
+    ("angle_deg = 10", "angle_deg = 31", "a slope of 31 degrees slides by itself"),
+    ("mass = 0.2", 'mass = 0.2\n[[effects]]\nkind = "slope"\nangle = 0.1', "slope stands twice"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED])
+def test_what_makes_no_sense_is_refused(old, new, said):
+    assert old in MADE
+    with pytest.raises(SceneError) as caught:
+        scenes.parse(MADE.replace(old, new), "made")
+    assert said in str(caught.value) and str(caught.value).startswith("made")
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 450
+
+
+def test_what_is_written_reads_the_same():
+    for k, body in enumerate(BODIES):
+        effects = (GROUND_EFFECTS["disturbed-ground"][0](0.3), GROUND_EFFECTS["aeration"][0](0.2))[: k % 3]
+        scene = MeshScene(Spatial(2.5e5, 0.3, "keep", 0.1), body, MOTIONS[k % 3], triangles=70, effects=effects)
+        assert scenes.parse(scenes.toml(scene)) == scene
+
+
+def test_a_scene_made_in_python_says_what_is_wrong():
+    scene = MeshScene(Spatial(3e5), BODIES[0], MOTIONS[0], triangles=80)
+    assert scene.run().force.shape == (5, 3)
+    for part, said in (
+        ("medium", "a medium such as"),
+        ("intruder", "a solid such as"),
+        ("motion", "a motion of rft.spatial"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            dataclasses.replace(scene, **{part: VERTICAL["generic"].stress})
+
+
+def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(type(BODIES[0]), "ladder", (80, 320, 1280, 20480))
+    (tmp_path / "s.toml").write_text(MADE)
+    code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found["parts"] == "triangles" and found["finest"] == 20480
+    force, moment = found["lines"]
+    assert force["value"] == [80, 320, 1280] and force["order"] == 1
+    assert 0.8 < force["slope"] < 1.3 and moment["error"][-1] < 0.02
+    assert "triangles" in found["cheapest"][0]
+    assert "80 to 1280 triangles" in (tmp_path / "out" / "accuracy.txt").read_text()
+
+
+def test_pictures_show_the_stress_on_the_mesh():
+    scene = scenes.parse(MADE.replace("distance = 0.05", "distance = 0.001"))
+    found = scene.run()
+    fig = plots.intrusion_figure(scene, found)
+    step = np.linalg.norm(found.force, axis=-1).argmax()
+    faces, above = scene.faces(found, step)
+    solid = next(ax for ax in fig.axes if ax.name == "3d")
+    assert len(solid.collections[0].get_facecolor()) <= len(faces.of) + len(above)
+    p = [x[step] for x in found.passage]
+    wanted = bearing(scene.medium, scene.mesh, p[2], p[1], p[3], p[4], scene.effects)
+    np.testing.assert_array_equal(faces.force, wanted.force)
+    assert above[..., 2].min() >= -1e-12 and faces.corners[..., 2].max() <= 1e-12 and len(above) and len(faces.of)
+    areas = lambda t: np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=-1).sum() / 2
+    assert areas(faces.corners) + areas(above) == pytest.approx(scene.mesh.areas.sum())
+    lines = [line for ax in fig.axes for line in ax.lines if len(line.get_xdata()) == len(found.t)]
+    for line, values in zip(lines, [*found.force.T, *found.moment.T]):
+        np.testing.assert_array_equal(line.get_ydata(), values)
+
+
+def test_a_body_in_the_air_is_drawn_without_stress(tmp_path):
+    scene = scenes.parse(MADE.replace("depth = 0.015", "depth = -0.5").replace("mass = 0.2", ""))
+    found = scene.run()
+    assert not found.force.any()
+    fig = plots.intrusion_figure(scene, found)
+    plots.save(fig, tmp_path / "a.png")
+    faces, above = scene.faces(found, 0)
+    assert len(faces.of) == 0 and len(above) == scene.count
+
+
+def test_figure_of_meshes(tmp_path):
+    numbers = meshes.compute(ladder=(80, 320, 1280, 20480))
+    orders = {name: order for name, (_, _, order) in numbers["errors"].items()}
+    assert len(orders) == 4 and all(0.8 < order < 1.3 for order in orders.values())
+    told = meshes.table(numbers)
+    assert "alpha_z: correlation 0.93" in told and "alpha_x: correlation 0.83" in told
+    plots.save(meshes.draw(numbers), tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 50_000
+
+
+def test_explain_tells_effects_and_what_they_assume():
+    told = explain(scenes.parse(MADE))
+    assert "Sphere (radius = 0.02) of 320 triangles" in told and "on:  slope (angle = 0.174" in told
+    assert "assumes an angle of repose of 30 degrees" in told
+    assert "off, not evaluated: grain-inertia, aeration, disturbed-ground" in told
+    assert "off, not evaluated: grain-inertia, aeration, slope, disturbed-ground" in explain(scenes.load("c-leg"))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_mutated_scenes_of_meshes_are_run_or_refused(seed):
+    rng = np.random.default_rng(seed)
+    texts = [MADE, *(scenes.load(name).text + "[numerics]\ntriangles = 100\n" for name in NAMES)]
+    values = [*VALUES, '"cut"', '"screw"', '"mesh"', "[0, 0, 1]", "360", "-0.04", "[[1]]", '"rotate"']
+    keys = "kind shape xi_n name zeta tension grazing radius length core axis heading_deg rate start stop_deg samples"
+    keys = f"{keys} triangles attitude speed depth angle mass repose_deg".split()
+    seen = [outcome(mutated(texts[rng.integers(len(texts))], rng, keys, values)) for _ in range(150)]
+    assert seen.count("run") > 10 and seen.count("refused") > 50
