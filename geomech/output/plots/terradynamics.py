@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ def _shown(beta: float, gamma: float) -> tuple[float, float]:
 
 
 @styled
-def intrusion_figure(scene, found):
+def intrusion_figure(scene, found) -> Any:
     """Of an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
     poses, a mesh where the force is largest, with the stress on its faces."""
     fig, axes = figure(10.2, 3.2, 3)

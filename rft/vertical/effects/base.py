@@ -33,11 +33,11 @@ class GroundEffect:
     order = 1
     cost = ""
 
-    def share(self, x):
+    def share(self, x) -> np.ndarray:
         """What it leaves of the ground's strength at places x along the ground, m; a number if it is the same everywhere."""
         return 1.0
 
-    def pressure(self, v_n):
+    def pressure(self, v_n) -> np.ndarray:
         """What it adds across a face that leads with v_n >= 0, m/s; Pa."""
         return 0.0
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from rft.media.base import check_ranges
 from rft.premise import Premise
 from rft.vertical.effects.base import GroundEffect
@@ -31,7 +33,7 @@ class GrainInertia(GroundEffect):
     def __post_init__(self):
         check_ranges(self, strength=(0, 1e6), density=(0, 1e5))
 
-    def pressure(self, v_n):
+    def pressure(self, v_n) -> np.ndarray:
         return self.strength * self.density * v_n * v_n
 
     @property
