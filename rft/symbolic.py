@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     import sympy as sp
 
+    from rft.bodies import Chain
+
     Formula = tuple[sp.Matrix, tuple[sp.Symbol, ...]]
 
 
@@ -69,14 +71,14 @@ def links(lengths, seen_from: int) -> list[Link]:
     return made
 
 
-def in_units_of(length, A) -> Any:
+def in_units_of(length, A) -> sp.Matrix:
     """A with its rows of translation in units of which the body has so many."""
     import sympy as sp
 
     return sp.diag(exact(length), exact(length), 1) * A
 
 
-def quarter_turn() -> Any:
+def quarter_turn() -> sp.Matrix:
     """A quarter turn to the left."""
     import sympy as sp
 
@@ -133,6 +135,13 @@ def viscous_chain(lengths=(1, 1, 1), ratio=2, link: int | None = 2) -> Formula:
     parts = [exact(x) / body for x in lengths]
     drag = [(x, ratio * x, ratio * x**3 / 12) for x in parts]
     return chain_connection(lengths, drag, "mean" if link is None else f"link-{link}")
+
+
+def viscous_body(body: Chain, ratio) -> Formula:
+    """As `viscous_chain`, of a chain of its own length and in its own frame."""
+    link = None if body.frame == "mean" else int(body.frame.removeprefix("link-"))
+    A, alpha = viscous_chain(body.lengths, ratio, link)
+    return in_units_of(body.length, A), alpha
 
 
 def no_slip_snake(lengths=(1, 1, 1), frame: str = "mean") -> Formula:

@@ -8,21 +8,20 @@ import pytest
 from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
 
 import rft
-from geomech import connection
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
-from geomech.systems import Solver, Swimmer
+from geomech.systems import Solver, Swimmer, base
 
 GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
 
 @pytest.fixture
 def fits(monkeypatch):
-    counts, fit = [], connection.fit
-    monkeypatch.setattr(connection, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
+    counts, fit = [], base.fit
+    monkeypatch.setattr(base, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
     return counts
 
 

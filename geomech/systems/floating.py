@@ -31,7 +31,7 @@ class FloatingChain(Momentum):
         self.of_links("masses", 1e-9, 1e9)
         self.of_links("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float) -> Any:
+    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
         """Masses are parts of the whole."""
         lengths = [number(x) for x in self.lengths]
         masses = [number(x) for x in self.masses] or lengths

@@ -112,7 +112,7 @@ class Framed:
     def with_solver(self, **changes) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(**changes)) if changes else self
 
-    def symbolic(self) -> Any:
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         raise ValueError(f"no formula in the {NAME} frame, which is a field of numbers: take another frame")
 
     def in_frame(self, frame: str) -> System:

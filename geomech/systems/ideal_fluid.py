@@ -39,7 +39,7 @@ class IdealFluidSwimmer(Momentum):
         self.of_links("masses", 1e-9, 1e9)
         self.of_links("inertias", 1e-6, 1e6)
 
-    def inertia(self, number=float) -> Any:
+    def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
         """In units of pi rho times the square of the body's length, per unit depth."""
         body, aspect = sum(number(x) for x in self.lengths), number(self.aspect)
         a = [number(x) / body / 2 for x in self.lengths]

@@ -26,7 +26,7 @@ from rft.loads import QUADRATURE, element_load, rule_for
 from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent
 from rft.media.base import require_law
 from rft.newton import ELEMENTS_TOGETHER
-from rft.symbolic import in_units_of, viscous_chain
+from rft.symbolic import viscous_body
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
@@ -191,13 +191,11 @@ class Swimmer(Plain):
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
         return {"xi": s.xi.tolist(), **told}
 
-    def symbolic(self) -> Any:
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         plain = type(self.body) is rft.Chain and self.body.modes is None
-        if not self.linear or not plain or type(self.medium) is not rft.Viscous:
+        if not (self.linear and plain and type(self.medium) is rft.Viscous):
             raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
-        link = self.body._link_of(self.body.frame)
-        A, alpha = viscous_chain(self.body.lengths, self.medium.ratio, None if link is None else link + 1)
-        return in_units_of(self.length, A), alpha
+        return viscous_body(self.body, self.medium.ratio)
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
         """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""

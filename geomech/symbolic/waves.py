@@ -51,7 +51,7 @@ class Waves:
                 return [*map(int, powers), turns]
         return None
 
-    def reduced(self, entry) -> Any:
+    def reduced(self, entry) -> sp.Expr:
         """The entry in lowest terms, or as it is."""
         try:
             return self.told(*self.value(entry))
@@ -97,7 +97,7 @@ class Waves:
             raise Outside
         return math.prod((z**k for z, k in zip(self.z, powers)), start=self.field.one)
 
-    def told(self, value, odd: int):
+    def told(self, value, odd: int) -> sp.Expr:
         """The value as a fraction of products of sums of sines and cosines."""
         if not value:
             return sp.Integer(0)

@@ -1,9 +1,4 @@
-"""Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
-
-A, alpha = system.symbolic()            # or rft.symbolic.viscous_chain(lengths, ratio), with symbols
-A = symbolic.simplified(A, alpha)
-print(symbolic.latex(symbolic.ccf(A, alpha)))
-"""
+"""Brackets, CCFs, LaTeX and numbers of connections given as sympy matrices."""
 
 from __future__ import annotations
 
@@ -12,7 +7,7 @@ from typing import Any
 
 import sympy as sp
 
-from geomech.waves import Waves
+from geomech.symbolic.waves import Waves
 
 
 def bracket(X: sp.Matrix, Y: sp.Matrix) -> sp.Matrix:
