@@ -145,6 +145,7 @@ def test_cost_is_a_metric(system):
 
 
 def test_the_cart_drives_as_by_hand():
+    np.testing.assert_allclose(DifferentialDrive().velocity([0, 0], [1.0, 0.0]), [0.25, 0, -0.5], atol=1e-15)
     cart = DifferentialDrive(0.03, 0.15)
     xi = cart.velocity([5.0, -40.0], [[1, 1], [-1, 1], [1, 0]])
     np.testing.assert_allclose(xi, [[0.03, 0, 0], [0, 0, 0.4], [0.015, 0, -0.2]], atol=1e-15)
