@@ -6,7 +6,7 @@ table from an experiment. It should be odd and homogeneous in alphadot, so that 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -47,12 +47,13 @@ class Connection:
 
         return display.connection(self)
 
-    def to_xarray(self, unit: str = "BL"):
+    def to_xarray(self, unit: str = "BL", shapes: Sequence[str] = ()):
         """A Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`. unit: of lengths, "BL"
-        or "m". ImportError without the package xarray."""
+        or "m". shapes: names of the shape variables, where these are no joint angles. ImportError without the package
+        xarray."""
         from geomech.output import datasets
 
-        return datasets.connection(self, unit)
+        return datasets.connection(self, unit, shapes)
 
     @cached_property
     def field(self) -> Field:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -47,12 +48,12 @@ class Field:
 
         return display.field(self)
 
-    def to_xarray(self, name: str = "ccf", unit: str = "BL"):
-        """A DataArray; of three components it is taken for a CCF, with its units. unit: of lengths, "BL" or "m".
-        ImportError without the package xarray."""
+    def to_xarray(self, name: str = "ccf", unit: str = "BL", shapes: Sequence[str] = ()):
+        """A DataArray; of three components it is taken for a CCF, with its units. unit: of lengths, "BL" or "m". shapes: names
+        of the shape variables, where these are no joint angles. ImportError without the package xarray."""
         from geomech.output import datasets
 
-        return datasets.field(self, name, unit)
+        return datasets.field(self, name, unit, shapes)
 
     @property
     def joints(self) -> int:
@@ -127,8 +128,9 @@ def as_axes(axes) -> tuple[np.ndarray, ...]:
     return arrays
 
 
-def inside(axes, alpha) -> np.ndarray:
-    """alpha (..., d) as an array, or ValueError naming the first angle that leaves the grid of these axes."""
+def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
+    """alpha (..., d) as an array, or ValueError naming the first angle that leaves the grid of these axes, by one of
+    ``names`` where these are given."""
     alpha = real_array("alpha", alpha)
     if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
         raise ValueError(f"alpha must be finite and of shape (..., {len(axes)}), got {alpha.shape}")
@@ -137,8 +139,9 @@ def inside(axes, alpha) -> np.ndarray:
         slack = 1e-9 * (axis[-1] - axis[0])
         if low < axis[0] - slack or high > axis[-1] + slack:
             worst = low if axis[0] - low > high - axis[-1] else high
+            name = names[k] if names else f"alpha_{k + 1}"
             raise ValueError(
-                f"alpha_{k + 1} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
+                f"{name} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
                 "widen the extent or lower the amplitude"
             )
     return alpha

@@ -12,11 +12,12 @@ from geomech import connection, curvature
 from geomech import scene as scenes
 from geomech.coordinates import change_velocity
 from geomech.gaits import Circle, Fourier, Wave
+from geomech.output import mat, netcdf
 from geomech.scene import Scene
 from geomech.study import sweep
 from geomech.study.bench import Study
 from geomech.study.offer import tiers
-from geomech.systems import Swimmer
+from geomech.systems import Swimmer, Table
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"
@@ -271,3 +272,17 @@ def test_a_wave_is_swept_and_asked_for(tmp_path):
 def test_waves_that_make_no_gait_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
         Wave(**wrong)
+
+
+@pytest.mark.parametrize("ending", ["nc", "mat"])
+def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
+    scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(grid=5, extent=0.6, phases=16)
+    study = Study(scene)
+    save = {"nc": netcdf.save_connection, "mat": mat.save_connection}[ending]
+    save(tmp_path / f"modes.{ending}", study)
+    again = Table(tmp_path / f"modes.{ending}")
+    assert again.shape_labels == (("m_1", "rad"), ("m_2", "rad"))
+    save(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
+    assert Table(tmp_path / f"twice.{ending}").shape_labels == again.shape_labels
+    with pytest.raises(ValueError, match="m_1 = .* lies outside"):
+        Study(Scene(again, Circle(amplitude=9.0))).refuse_outside()

@@ -126,6 +126,10 @@ def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
             assert {"A", "fit_residual", "speed"} == set(mine) or {"ccf"} == set(mine)
             for name in mine:
                 xarray.testing.assert_identical(mine[name], data[name])
+    modes = Swimmer(rft.Viscous(2.0), rft.Chain(modes=((1.0, 0.5), (0.2, -0.9))))
+    moved = Study(Scene(modes, GAIT).with_numerics(grid=7, phases=16))
+    for data in (moved.to_xarray(), moved.fitted.to_xarray(shapes=["m_1", "m_2"])):
+        assert [data[f"alpha_{k}"].long_name for k in (1, 2)] == ["shape variable m_1", "shape variable m_2"]
     sweeps.save(tmp_path / "b.nc", study.scene, swept)
     with xarray.open_dataset(tmp_path / "b.nc") as data:
         xarray.testing.assert_identical(swept.to_xarray(), data.load())

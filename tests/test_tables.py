@@ -4,12 +4,14 @@ import dataclasses
 import io
 import json
 import pickle
+import shutil
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
+from registry import SYSTEMS
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
@@ -502,3 +504,15 @@ def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path
     savemat(tmp_path / "a.mat", {**found, "more": np.zeros(10**6)}, do_compression=True)
     with pytest.raises(SceneError, match="is damaged, cut short, or no MATLAB file"):
         tables.load(tmp_path / "a.mat")
+
+
+def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
+    shutil.copy(SYSTEMS["table"].file, tmp_path / "t.nc")
+    text = '# my table\n[system]\nkind = "table"\nfile = "{}"\n[gait]\nkind = "circle"\n'
+    (tmp_path / "s.toml").write_text(text.format("t.nc"))
+    made = scenes.load(tmp_path / "s.toml")
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "scene.toml").write_text(scenes.toml(made))
+    assert scenes.load(tmp_path / "results" / "scene.toml").system == made.system
+    whole = scenes.parse(text.format(tmp_path / "t.nc"), "s.toml")
+    assert scenes.toml(whole) == whole.text  # comments and all

@@ -14,11 +14,11 @@ from geomech.output.netcdf import (
     COMPONENTS,
     UNITS,
     Variable,
-    angle_of,
     angles_of,
     attributes,
     of_ccf,
     of_connection,
+    shapes,
     variables,
 )
 from geomech.study.bench import Study
@@ -46,30 +46,36 @@ def dataset(found: Iterable[Variable], coordinates: Mapping, attrs: Mapping | No
     )
 
 
-def of_shapes(axes: Sequence[np.ndarray]) -> dict:
-    """Coordinates of components, joints and shapes."""
+def of_shapes(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -> dict:
+    """Coordinates of components, joints and shapes. labels: (name, unit) of each shape variable."""
     rows = {"component": (list(COMPONENTS), {}), "joint": (np.arange(1, len(axes) + 1, dtype="i4"), {})}
-    names = enumerate(zip(angles_of(axes), axes))
-    return {**rows, **{name: (axis, {"units": "rad", "long_name": angle_of(k)}) for k, (name, axis) in names}}
+    told = {v.name: (v.values, {"units": v.units, "long_name": v.long_name}) for v in shapes(axes, labels)}
+    return {**rows, **told}
+
+
+def _called(axes, names: Sequence[str]) -> dict:
+    """`of_shapes` of shape variables of these names, or of joint angles."""
+    return of_shapes(axes, [(name, "rad") for name in names or angles_of(axes)])
 
 
 def of_study(study: Study):
     """As the file of `geomech connection`: A, its fit residual, the CCF and what else that has."""
-    return dataset(variables(study), of_shapes(study.fitted.axes), attributes(study))
+    coordinates = of_shapes(study.fitted.axes, study.scene.system.shape_labels)
+    return dataset(variables(study), coordinates, attributes(study))
 
 
-def connection(fitted: Connection, unit: str):
+def connection(fitted: Connection, unit: str, names: Sequence[str] = ()):
     """A, its fit residual and the rms of xi. unit: of lengths, "BL" or "m"."""
-    return dataset(of_connection(fitted, unit), of_shapes(fitted.axes), {"sign_of_A": "xi = + A alphadot"})
+    return dataset(of_connection(fitted, unit), _called(fitted.axes, names), {"sign_of_A": "xi = + A alphadot"})
 
 
-def field(values: Field, name: str, unit: str):
+def field(values: Field, name: str, unit: str, names: Sequence[str] = ()):
     """A DataArray; with rows x, y and theta it is a CCF, in its units."""
     lead = values.values.shape[: -values.joints]
     if lead == (3,):
-        return dataset([of_ccf(values, unit, name)], of_shapes(values.axes))[name]
+        return dataset([of_ccf(values, unit, name)], _called(values.axes, names))[name]
     dimensions = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
-    return dataset([Variable(name, dimensions, values.values, "", "")], of_shapes(values.axes))[name]
+    return dataset([Variable(name, dimensions, values.values, "", "")], _called(values.axes, names))[name]
 
 
 def displacements(table: Displacements):

@@ -30,9 +30,13 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
     entries = dict(zip(ENTRIES, factor * fitted.A.reshape(6, *fitted.A.shape[2:])))
     s = scene.system
+    names = [name for name, _ in s.shape_labels]
+    meaning = "alpha_k is the heading of link k+1 minus that of link k, link 1 the tail"
+    if names != ["alpha_1", "alpha_2"]:
+        meaning = f"alpha1 is {names[0]}, alpha2 {names[1]}"
     about = {
         "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": s.unit, "interpolation": fitted.degree,
-        "conventions": f"xi = {sign} A alphadot; alpha_k is the heading of link k+1 minus that of link k, link 1 the tail",
+        "shapes": names, "conventions": f"xi = {sign} A alphadot; {meaning}",
     }  # fmt: skip
     arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, **rest}.items()}
     with whole_file(path) as part:

@@ -14,6 +14,7 @@ from geomech.harmonics import Harmonics
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study.bench import Study
+from geomech.tables.netcdf import SHAPE
 
 COMPONENTS = ("x", "y", "theta")
 UNITS = {"BL": "body length", "m": "m"}
@@ -124,9 +125,13 @@ def angles_of(axes) -> tuple[str, ...]:
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
 
 
-def angle_of(k: int) -> str:
-    """What alpha_k+1 is."""
-    return f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
+def shapes(axes, labels) -> list[Variable]:
+    """The axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an angle between links."""
+    found = []
+    for k, (name, axis, (label, unit)) in enumerate(zip(angles_of(axes), axes, labels)):
+        joint = f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
+        found.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
+    return found
 
 
 def about(scene: Scene) -> dict:
@@ -163,10 +168,9 @@ def _coordinates(file, fitted, labels) -> None:
     variable._Encoding = "ascii"
     file.createDimension("joint", len(fitted.axes))
     file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
-    for k, (name, axis) in enumerate(zip(angles_of(fitted.axes), fitted.axes)):
+    for name, dimensions, axis, units, long_name in shapes(fitted.axes, labels):
         file.createDimension(name, len(axis))
-        label, unit = labels[k]
-        _variable(file, name, axis, (name,), unit, angle_of(k) if label == name else f"shape variable {label}")
+        _variable(file, name, axis, dimensions, units, long_name)
 
 
 def _variable(file, name, values, dimensions, units, long_name) -> None:

@@ -7,6 +7,7 @@ import json
 import math
 import textwrap
 import tomllib
+from pathlib import Path
 
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
@@ -21,13 +22,21 @@ from geomech.systems.swimmer import PARTS, Swimmer
 
 
 def toml(scene: Scene | Intruding) -> str:
-    """The text it was read from where that still holds by itself, comments and all; else a new one, in which a medium that
-    came from a file stands. SceneError if it has a part that no scene file can name."""
+    """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
+    which a medium that came from a file stands, and other files with their folders. SceneError if it has a part that no
+    scene file can name."""
     intruder = isinstance(scene, Intruding)
-    whole = scene.text if intruder else checked_scene(scene).text and not scene.files
+    whole = scene.text if intruder else checked_scene(scene).text and not (scene.files or _beside(scene.text))
     if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
     return _text(scene.tables() if intruder else _anew(scene))
+
+
+def _beside(text: str) -> bool:
+    """Whether a scene's text names a file by its place beside the scene's own."""
+    tables = tomllib.loads(text)
+    files = [tables.get(place, {}).get("file", "") for place in ("gait", "system")]
+    return any(file and not Path(file).is_absolute() for file in files)
 
 
 def table(name: str, values: dict) -> str:

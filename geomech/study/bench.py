@@ -141,7 +141,9 @@ class Study:
         system, n = self.scene.system, self.scene.numerics
         gait = self.scene.gait if gait is None else gait
         field, every = axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        in_groups(lambda some: inside(field, gait.cycle(n.phases, some)[0])[:, 0], every, system.at_once(n.phases))
+        names = [name for name, _ in system.shape_labels]
+        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], names)[:, 0]
+        in_groups(shapes, every, system.at_once(n.phases))
 
     def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""

@@ -70,6 +70,7 @@ class Table(Plain):
     frame = property(lambda self: self.held.frame)
     mirror = property(lambda self: self.held.mirror)
     linear = property(lambda self: self.held.harmonics is None)
+    shape_labels = property(lambda self: tuple((name, "rad") for name in self.held.shapes))
 
     def in_frame(self, frame: str) -> Table:
         raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")

@@ -31,7 +31,7 @@ class Stored:
     harmonics: the odd harmonics of xi beside A, where the file has them. even: (3, N_1, ...), rms of
     xi(alphadot) + xi(-alphadot), if that is not 0. length: of the body, in ``unit``, "BL" or "m".
     frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
-    the file."""
+    the file. shapes: names of the shape variables, alpha_k where none are told."""
 
     connection: Connection
     harmonics: Harmonics | None = None
@@ -43,6 +43,7 @@ class Stored:
     order: str = "ndgrid"
     said: tuple[str, ...] = ()
     sha256: str = ""
+    shapes: tuple[str, ...] = ()
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -122,6 +123,13 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
             f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad: convert it if these are degrees"
         )
     return axis
+
+
+def checked_names(told, plain: list[str]) -> tuple[str, ...]:
+    """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
+    words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
+    good = words and all(x.isprintable() and 0 < len(x) <= 60 and "$" not in x for x in told)
+    return tuple(told if good else plain)
 
 
 def numbers(name: str, values) -> np.ndarray:

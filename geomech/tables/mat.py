@@ -15,7 +15,17 @@ import numpy as np
 
 from geomech.connection import Connection
 from geomech.tables import matlab
-from geomech.tables.base import LARGEST_ANGLE, ORDERS, SIGNS, Stored, checked_axis, detected_sign, numbers, rms
+from geomech.tables.base import (
+    LARGEST_ANGLE,
+    ORDERS,
+    SIGNS,
+    Stored,
+    checked_axis,
+    checked_names,
+    detected_sign,
+    numbers,
+    rms,
+)
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
@@ -49,7 +59,8 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     own = (about["length"], about["unit"]) if stated else (1.0, "BL")
     frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
     turned = plain if sign == "+" else Connection(axes, -A, residual, plain.speed, degree)
-    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256)
+    shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
+    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256, shapes)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import io
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
 from geomech.connection import Connection
 from geomech.harmonics import Harmonics
-from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, numbers, rms
+from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, checked_names, numbers, rms
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
 UNITS = {"body length": "BL", "m": "m"}
 ANGLES = ("rad", "radian", "radians")
+SHAPE = "shape variable "  # before the name of one that is no angle between links
 
 
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
@@ -30,10 +32,14 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
             file = netcdf_file(io.BytesIO(raw), mmap=False)
             found = {name: (tuple(v.dimensions), np.array(v[:])) for name, v in file.variables.items()}
             units = {name: _text(getattr(v, "units", b"")) for name, v in file.variables.items()}
+            names = {name: _text(getattr(v, "long_name", b"")) for name, v in file.variables.items()}
             told = {name: value for name, value in vars(file).items() if not name.startswith("_")}
     except Exception:
         raise ValueError(f"is damaged or cut short: {SOURCE}") from None
-    return _stored(found, units, told, sign, sha256)
+    stored = _stored(found, units, told, sign, sha256)
+    shapes = [f"alpha_{k + 1}" for k in range(len(stored.connection.axes))]
+    called = [names[x].removeprefix(SHAPE) if names[x].startswith(SHAPE) else x for x in shapes]
+    return replace(stored, shapes=checked_names(called, shapes))
 
 
 def _what_else(raw: bytes) -> str:

@@ -68,10 +68,10 @@ def figure(
 
 
 def quantity(name: str, unit: str = "") -> str:
-    """For an axis: the name with its unit in brackets, a Greek letter with an index drawn as one."""
+    """For an axis: the name with its unit in brackets, a letter with an index drawn as one."""
     letter, _, index = name.partition("_")
-    if letter in GREEK and index.isalnum():
-        name = rf"$\{letter}_{{{index}}}$"
+    if index.isalnum() and (letter in GREEK or len(letter) == 1):
+        name = rf"$\{letter}_{{{index}}}$" if letter in GREEK else f"${letter}_{{{index}}}$"
     return f"{name} ({unit})" if unit else name
 
 
