@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from geomech.output import report
 from geomech.study import sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.systems import Swimmer
 from rft import BodyInertia, GrainInertia
 
 CHAIN = """[medium]
@@ -152,6 +154,18 @@ def test_sweeps_give_it(tmp_path):
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         assert data.speed.attrs["units"] == "m s-1" and data.frequency.attrs["units"] == "Hz"
         np.testing.assert_allclose(data.speed, np.hypot(data.displacement[:, 0], data.displacement[:, 1]) * 2.5)
+    run, seen = Swimmer.run, []
+    with mock.patch.object(
+        Swimmer, "run", lambda self, alpha, *rest: seen.append(len(alpha)) or run(self, alpha, *rest)
+    ):
+        plain = sweep.sweep(scenes.parse(CHAIN), {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]})
+        each = len(seen), sum(seen)
+        assert plain["displacement"].shape == (3, 2, 3) and plain["estimate"].shape == (3, 2)
+        seen.clear()
+        one = sweep.sweep(scenes.parse(CHAIN), {"gait.amplitude": [0.5, 1.0]})
+    assert (len(seen), sum(seen)) == each  # what is fast and slow moves alike, and is solved once
+    np.testing.assert_array_equal(plain["displacement"], [one["displacement"]] * 3)
+    np.testing.assert_allclose(plain["speed"][:, 1], one["speed"][1] * np.array([0.4, 0.8, 1.6]))
     timeless = sweep.sweep(scenes.parse(CHAIN.replace("frequency = 2.5", "")), {"gait.amplitude": [0.5]})
     assert "speed" not in timeless
 

@@ -18,7 +18,8 @@ def explain(scene: Scene | Intruding) -> str:
     system = checked_scene(scene).system
     first, *told = system.told()
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
-    lines = [f"{scene.name}: {first}, {gait} gait", *told]
+    timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
+    lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
     lines.append(f"engine: {system.engine} {system.because}")
     lines.append("tiers: " + ", ".join(tiers(system)))
     return "\n".join([*lines, *_lost(system)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -76,11 +76,12 @@ def sweep(
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
+    solved = tuple(1 if name in _idle(scene, names) else n for name, n in zip(names, shape))
     if not (partial is None or (isinstance(partial, (str, Path)) and str(partial))):
         raise SceneError(f"partial must be the path of a file, got {short(partial)}")
     partial = partial and Path(partial)
     told, doubtful = progress or (lambda fraction: None), uncertainty.uncertain(scene.system)
-    with _Rows(partial, question(scene, values), int(np.prod(shape))) as rows:
+    with _Rows(partial, question(scene, values), int(np.prod(solved))) as rows:
         while len(rows) < rows.total:
             k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
             first = _scene_at(tables, scene, names, points[k])
@@ -93,7 +94,8 @@ def sweep(
     if doubtful:
         at = lambda point: _scene_at(tables, scene, names, point)
         flat = np.column_stack([flat, _doubts(at, points, amplitudes, lambda done: told(0.4 + 0.6 * done))])
-    flat = flat.reshape(*shape, -1)
+    flat = flat.reshape(*solved, -1)
+    flat = np.broadcast_to(flat, (*shape, flat.shape[-1]))
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
     errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
@@ -101,6 +103,12 @@ def sweep(
         errors |= {"medium_error": flat[..., 5], "medium_error_heading": flat[..., 6]}
     results = {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
     return Swept({**results, **_speeds(scene, results)}, scene)
+
+
+def _idle(scene: Scene, names: Iterable[str]) -> list[str]:
+    """The parameters that change no displacement: the frequency, where no effect has one."""
+    timed = [f"{section}.frequency" for section in ("gait", "physical")]
+    return [name for name in names if name in timed and scene.system.frequency is None]
 
 
 def _speeds(scene: Scene, results: dict) -> dict:
@@ -134,7 +142,7 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
 
 def _grid(scene: Scene, over: Mapping[str, list[float]]):
     """(tables of the scene, names of the parameters, their values, points of those other than the amplitude), the
-    amplitude last; SceneError if they make no sweep."""
+    amplitude last; of what changes no displacement the points have the first value. SceneError if they make no sweep."""
     checked_scene(scene)
     if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
         raise SceneError(
@@ -151,7 +159,9 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
         at = _scene_at(tables, scene, names, corner)  # refuse before computing
         if uncertainty.uncertain(at.system):
             uncertainty.sigma_points(at)
-    return tables, names, values, list(itertools.product(*outer))
+    idle = _idle(scene, names)
+    some = [values[k][:1] if k in idle else values[k] for k in names if k != AMPLITUDE]
+    return tables, names, values, list(itertools.product(*some))
 
 
 def _list(name: str, values) -> list[float]:
