@@ -1,5 +1,6 @@
 """The laws behind effects, each against a closed form, its own equation or a far finer computation."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -33,6 +34,19 @@ from rft.loads import element_load
 from rft.sides import parts, sided
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+
+
+@dataclasses.dataclass(frozen=True)
+class Power:
+    """Drag that grows with a power of the speed, three times as much across."""
+
+    power: float
+
+    def traction(self, v_t, v_n, eps=0.0):
+        drag = (np.sqrt(v_t**2 + v_n**2 + eps**2) + 1e-300) ** (self.power - 1)
+        return drag * v_t, 3.0 * drag * v_n
+
+
 SANDFISH = scenes.load("sandfish-loose")
 
 
@@ -382,5 +396,13 @@ def test_a_sled_far_heavier_than_the_drag_stays_where_it_is():
 
 
 def test_a_sled_takes_no_viscous_medium():
-    with pytest.raises(ValueError, match="a towed sled takes a medium without viscous drag, got Viscous"):
+    with pytest.raises(
+        ValueError, match="a towed sled takes a medium without viscous drag, dry as itself, got Viscous"
+    ):
         body_velocity(Viscous(2.0), Chain(), [0.1, 0.2], [1.0, 0.0], effects=(TowedSled(pull=0.1),))
+    for power in (0.4, 1.0):  # of a law without closed form
+        with pytest.raises(
+            ValueError, match="a towed sled takes a medium without viscous drag, dry as itself, got Power"
+        ):
+            folded([TowedSled(pull=0.1)], Power(power), Chain())
+    assert "sled" in folded([TowedSled(pull=0.1)], Power(0.0), Chain()).contacts

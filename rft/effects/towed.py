@@ -9,7 +9,7 @@ import numpy as np
 from rft.bodies.base import Kinematics
 from rft.contact import Averages, Contact, Model
 from rft.effects.base import Effect
-from rft.media.base import check_ranges, is_linear, require, viscous_terms
+from rft.media.base import check_ranges, power_of, require
 from rft.media.coulomb import Coulomb
 
 
@@ -21,7 +21,7 @@ class TowedSled(Effect):
     the sled behind the tail.
 
     It lies on the surface, so that the body's depth does not matter to it. Dry media only,
-    for beside viscous drag friction would depend on the unit of time.
+    for beside drag that grows with speed friction would depend on the unit of time.
     """
 
     pull: float
@@ -37,8 +37,8 @@ class TowedSled(Effect):
 
     def apply(self, model: Model) -> Model:
         medium = model.medium
-        dry = not is_linear(medium) and not any(viscous_terms(medium) or ())
-        require(dry, f"a towed sled takes a medium without viscous drag, got {type(medium).__name__}")
+        name = type(medium).__name__
+        require(power_of(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}")
         sled = Contact(Averages(Coulomb()), self.behind, stations=(0.0,), buried=False, factors=(self,))
         return model.touching("sled", sled)
 

@@ -133,16 +133,22 @@ def is_linear(medium: Medium) -> bool:
 
 def is_rate_independent(medium: Medium) -> bool:
     """Whether it does not matter how fast a gait is run: drag grows with the same power of the speed in all directions."""
+    return power_of(medium) is not None
+
+
+def power_of(medium: Medium) -> float | None:
+    """The power of the speed that drag grows with in all directions: 0 dry, 1 viscous; None if there is no one power."""
     if is_closed(medium):
-        return not (medium.dry and any(medium.viscous))
+        return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
     speeds = np.logspace(-3, 1, 5)[:, None]
     with np.errstate(all="ignore"):
         f = np.stack(np.broadcast_arrays(*medium.traction(speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))))
     size = np.sqrt((f**2).sum((0, 2)))
     if not np.isfinite(size).all() or not size.all():
-        return False
+        return None
     form, growth = f / size[:, None], size[1:] / size[:-1]
-    return bool(np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max())
+    alike = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
+    return round(float(np.log10(growth.mean())), 6) + 0.0 if alike else None
 
 
 def real_array(name: str, x) -> np.ndarray:
