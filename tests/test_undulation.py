@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import rft
 from figures import fig09c_efficiency, fig10_neuromechanics
 from geomech import scene as scenes
-from geomech.gaits import Circle, Sine
+from geomech.gaits import Circle, Sine, Wave
 from geomech.output import plots
 from geomech.reconstruct import displacement
+from geomech.scene import Scene
 from geomech.study import undulation
 from geomech.study.bench import Study
+from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
     Backbone,
@@ -445,3 +448,37 @@ def test_activation_is_refused_without_a_wave():
         undulation.activation(scenes.load("butterfly-glass"))
     with pytest.raises(ValueError, match="amplitude > 0"):
         undulation.activation(waving(1.0, amplitude=0.0))
+
+
+def test_a_wave_of_joint_angles_performs_too():
+    """The wavelength and curvature of a long chain of the same waves, by sums over its links; speeds in its own unit."""
+    wave = Wave(amplitude=0.7, waves=1.3, joints=6, frequency=2.0)
+    links = np.arange(70_000)  # 10,000 body lengths, a whole number of waves
+    alpha = 0.7 * np.cos(0.4 + 2 * np.pi * 1.3 * links / 7)
+    straight = np.abs(np.exp(1j * np.cumsum(alpha)).mean())
+    np.testing.assert_allclose(wave.wavelength(), straight / 1.3, rtol=1e-8)
+    np.testing.assert_allclose(wave.relative_curvature(), np.abs(alpha).mean() * 7 / 1.3, rtol=1e-3)
+    sine = Sine(amplitude=0.01, waves=1.3, elements=100)
+    small = Wave(amplitude=2 * np.pi * 0.01 * 2 * np.sin(np.pi * 0.013), waves=1.3, joints=99)
+    np.testing.assert_allclose(small.relative_curvature(), sine.relative_curvature(), rtol=2e-3)
+    np.testing.assert_allclose(small.wavelength(), sine.wavelength(), rtol=1e-5)
+    chain = rft.Chain((1,) * 7, length=0.4)
+    scene = Scene(Swimmer(rft.Viscous(2.5), chain), wave).with_numerics(phases=32)
+    done = undulation.performance(scene, [0.4, 0.7])
+    net = scene.cycle(amplitudes=[0.4, 0.7]).net
+    np.testing.assert_allclose(done["speed"], 2.0 * np.hypot(net[:, 0], net[:, 1]))
+    np.testing.assert_allclose(done["efficiency"], done["speed_body_lengths"] / 2.0 / wave.wavelength([0.4, 0.7]))
+    np.testing.assert_allclose(done["arc_efficiency"], done["progress"] * 1.3)
+    assert (done["cost_of_transport"] > 0).all() and (np.diff(done["progress"]) > 0).all()
+    back = undulation.performance(scene.changed(gait=dataclasses.replace(wave, waves=-1.3)), [0.4, 0.7])
+    np.testing.assert_allclose(back["efficiency"], done["efficiency"], rtol=1e-6)
+    for changes in ({"gait": dataclasses.replace(wave, offset=0.1)}, {"gait": dataclasses.replace(wave, waves=0.0)}):
+        with pytest.raises(ValueError, match="a wave about the straight body"):
+            undulation.performance(scene.changed(**changes), [0.4])
+    for body in (
+        rft.Chain((1, 1, 1, 2, 1, 1, 1)),
+        rft.Chain((1,) * 7, modes=np.eye(6).tolist()),
+        rft.Backbone(elements=7),
+    ):
+        with pytest.raises(ValueError, match="links are of equal length"):
+            undulation.performance(scene.changed(body=body), [0.4])

@@ -50,6 +50,22 @@ class Wave(Series):
         phase = 2 * np.pi * self.waves * np.arange(1, self.joints + 1) / (self.joints + 1)
         return np.cos(phase)[:, None], -np.sin(phase)[:, None]
 
+    def wavelength(self, amplitudes=None) -> np.ndarray:
+        """lambda over the body's length (...,), of an endless chain of equal links without offset: the arc length of a
+        wave, 1 / waves, times the mean cosine of headings, which swing as a sine: J_0 of their amplitude."""
+        from scipy.special import j0
+
+        links = self.joints + 1
+        swing = self._sizes(amplitudes) / (2 * np.sin(np.pi * abs(self.waves) / links))
+        return np.abs(j0(swing)) / abs(self.waves)
+
+    def relative_curvature(self, amplitudes=None) -> np.ndarray:
+        """Mean of |joint angle| over a wave and a link's length, times the wave's arc length (...,); without offset."""
+        return 2 / np.pi * self._sizes(amplitudes) * (self.joints + 1) / abs(self.waves)
+
+    def _sizes(self, amplitudes) -> np.ndarray:
+        return np.abs(real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes))
+
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """p at which the sine y = sin, of largest slope ``slope``, has run the share u / 2 pi of its length per wave.

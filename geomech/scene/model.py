@@ -83,10 +83,14 @@ class Scene(Told):
 
 def _check_joints(system: System, gait: Gait) -> None:
     if gait.joints != system.joints:
-        raise ValueError(
-            f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but [body] has {system.joints}: give the body "
-            "one link more than the gait has joints, or as many modes, or another gait"
+        whose, cure = (
+            "[body]",
+            "give the body one link more than the gait has joints, or as many modes, or another gait",
         )
+        if not hasattr(system, "body"):
+            whose, cure = f"the {system.kind}", "give it another gait"
+        told = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {whose} has {system.joints}"
+        raise ValueError(f"{told}: {cure}")
 
 
 def checked_scene(scene) -> Scene:

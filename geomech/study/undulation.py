@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from geomech.errors import real_array, short
-from geomech.gaits import Sine
+from geomech.gaits import Sine, Wave
 
 if TYPE_CHECKING:
     from geomech.scene.model import Scene
@@ -17,7 +17,8 @@ MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: 
 
 
 def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
-    """Over a cycle of the scene's sine wave, for amplitudes A / lambda (B,), each (B,) but the velocity:
+    """Over a cycle of the scene's travelling wave, a `Sine` for amplitudes A / lambda (B,) or a `Wave` of the joint angles of
+    a chain of equal links for amplitudes in rad (B,), each (B,) but the velocity:
 
     progress: net distance, body lengths. efficiency: that over the wavelength. Sec. III B and the caption of Fig. 9(c)
     define it so and show an optimum near the animal; here it has none, it grows with the amplitude. arc_efficiency:
@@ -27,12 +28,12 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per rad. Where the swimmer has a
     frequency, in the scene's own unit, body lengths or m, besides: distance, net, per cycle; speed, a second;
     speed_body_lengths, body lengths a second; velocity_per_second: (B, N, 3), unit/s and rad/s.
-    ValueError if the gait is no sine.
+    ValueError if the gait is no such wave.
 
     The elements are chords of the wave: 40 of them a wave leave errors of 2 % at A / lambda = 0.2, but above 0.4 enough
     to feign an optimum of efficiency and slip. Refine before believing one.
     """
-    gait = _sine(scene, "performance")
+    gait = _travelling(scene)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1:
         raise ValueError(f"amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
@@ -51,13 +52,27 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
         "progress": progress,
         "wavelength": wavelength,
         "efficiency": progress / wavelength,
-        "arc_efficiency": progress * gait.waves,
+        "arc_efficiency": progress * abs(gait.waves),
         "relative_curvature": gait.relative_curvature(amplitudes),
         "cost_of_transport": energy / np.maximum(progress, 1e-300),
         "slip": spent.slip.mean(-1),
         "velocity": run.xi / np.array([length, length, 1.0]),
         **timed,
     }
+
+
+def _travelling(scene: Scene) -> Sine | Wave:
+    """The scene's gait, which has a wavelength."""
+    gait, body = getattr(scene, "gait", None), getattr(getattr(scene, "system", None), "body", None)
+    if not isinstance(gait, Wave):
+        return _sine(scene, "performance")
+    if gait.waves == 0 or gait.offset != 0 or any(gait.centre):
+        raise ValueError(
+            "performance is that of a wave about the straight body: give it waves, no offset and no centre"
+        )
+    if len({*getattr(body, "lengths", ())}) != 1 or body.modes is not None:
+        raise ValueError("performance is that of a chain whose links are of equal length, moved joint by joint")
+    return gait
 
 
 def _sine(scene: Scene, what: str) -> Sine:
