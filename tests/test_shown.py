@@ -191,3 +191,20 @@ def test_plots_draw_where_they_stand(study, table):
         assert one() is second and pyplot.gcf() is figure
         pyplot.close("all")
     assert "matplotlib.pyplot" in sys.modules
+
+
+def test_speeds_and_what_the_medium_does_are_shown_too():
+    sand = rft.Granular(C=1.5, gamma0=0.22, covariance=((0.02, 0.001), (0.001, 0.002)))
+    gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
+    made = Study(Scene(Swimmer(sand, UNEVEN), gait, Numerics(phases=32))).study([0.5, 1.0], ["direct"])
+    data = made.to_xarray()
+    for key, units in (
+        ("speed", "m s-1"), ("speed_body_lengths", "body length s-1"), ("turning_rate", "rad s-1"),
+        ("medium_error", "body length"), ("medium_error_heading", "rad"),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(data[key].sel(tier="direct"), made[key]["direct"])
+        assert data[key].units == units and (data[key] != 0).all()
+    assert data.attrs["frequency"] == 2.5
+    cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", made._repr_html_())
+    assert cells[7:10] == ["medium (BL)", "medium, heading (rad)", "speed (m/s)"]
+    assert float(cells[19]) == pytest.approx(made["speed"]["direct"][0], rel=1e-3)

@@ -79,7 +79,8 @@ def field(values: Field, name: str, unit: str, names: Sequence[str] = ()):
 
 
 def displacements(table: Displacements):
-    """displacement (tier, amplitude, component) and its errors (tier, amplitude)."""
+    """displacement (tier, amplitude, component) and its errors (tier, amplitude); where there is a frequency speeds, and
+    where the medium is uncertain what that does, alike."""
     names, unit = table.tiers, UNITS[table.scene.system.unit]
     each = lambda key: np.array([table.errors(key)[name] for name in names])
     poses = np.array([table[name] for name in names], float).reshape(len(names), len(table["amplitude"]), 3)
@@ -91,10 +92,24 @@ def displacements(table: Displacements):
         Variable("estimate", over, each("estimate"), "body length", "estimated error of the position"),
         Variable("estimate_heading", over, each("estimate_heading"), "rad", "estimated error of the heading"),
     ]
+    found += [Variable(key, over, each(key), units, said) for key, units, said in _besides(unit) if key in table]
     amplitude = np.array(table["amplitude"], float), {"long_name": table.gait.amplitude_label}
     coordinates = {"tier": (names, {}), "amplitude": amplitude, "component": (list(COMPONENTS), {})}
     attrs = {"title": f"Net displacement per cycle of the scene {table.scene.name}", "frame": table.scene.frame}
+    if "frequency" in table:
+        attrs |= {"frequency": float(table["frequency"]), "frequency_unit": "Hz"}
     return dataset(found, coordinates, attrs)
+
+
+def _besides(unit: str) -> list[tuple[str, str, str]]:
+    """(key, units, what it is) of what tables of some scenes have besides."""
+    return [
+        ("speed", f"{unit} s-1", "net distance times frequency"),
+        ("speed_body_lengths", "body length s-1", "net distance in body lengths times frequency"),
+        ("turning_rate", "rad s-1", "heading times frequency"),
+        ("medium_error", "body length", "one standard deviation of the position by the medium's covariance"),
+        ("medium_error_heading", "rad", "one standard deviation of the heading by the medium's covariance"),
+    ]
 
 
 def swept(results: Swept):

@@ -73,12 +73,15 @@ def study(bench: Study) -> str:
 def displacements(table: Displacements) -> str:
     """A row an amplitude and tier."""
     unit, rows = table.scene.system.unit, []
-    each = [table.errors(key) for key in ("estimate", "estimate_heading")]
+    told = {"estimate": "error (BL)", "estimate_heading": "error of heading (rad)", "medium_error": "medium (BL)"}
+    told |= {"medium_error_heading": "medium, heading (rad)", "speed": f"speed ({unit}/s)"}
+    there = {key: name for key, name in told.items() if key in table}
+    each = [(table.errors(key), ".4g" if key == "speed" else ".1e") for key in there]
     for k, amplitude in enumerate(table["amplitude"]):
         for name in table.tiers:
-            errors = (f"{e[name][k]:.1e}" for e in each)
+            errors = (f"{values[name][k]:{style}}" for values, style in each)
             rows.append((amplitude, name, *(float(x) + 0.0 for x in np.round(table[name][k], 12)), *errors))
-    head = ("amplitude", "tier", f"x ({unit})", f"y ({unit})", "heading (rad)", "error (BL)", "error of heading (rad)")
+    head = ("amplitude", "tier", f"x ({unit})", f"y ({unit})", "heading (rad)", *there.values())
     return page(f"Net displacement per cycle of {table.scene.name}", head, rows)
 
 
