@@ -23,7 +23,7 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.output import mat, netcdf, plots
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
-from geomech.study import accuracy, estimate
+from geomech.study import accuracy, choose, estimate
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from rft.media import CATALOGUE
@@ -516,3 +516,18 @@ def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
     assert scenes.load(tmp_path / "results" / "scene.toml").system == made.system
     whole = scenes.parse(text.format(tmp_path / "t.nc"), "s.toml")
     assert scenes.toml(whole) == whole.text  # comments and all
+
+
+def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
+    scene = Scene(Table(made[0] / "a.nc"), GAIT).with_numerics(phases=64)
+    monkeypatch.setattr(accuracy, "KNOBS", [k for k in accuracy.KNOBS if k.label == "direct: phases"])
+    found = accuracy.study(scene, runs=1)
+    amplitudes = np.array(found["amplitudes"])
+    own = scene.system.own_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
+    assert found["own_error"] == own and 1e-4 < own < 0.1
+    assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {True}
+    assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
+    assert f"the table's own, {own:.1e} BL" in accuracy.table(found)
+    monkeypatch.setattr(choose, "MOST_PHASES", 256)
+    with pytest.raises(SceneError, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
+        choose.cheapest(scene, [0.5], 1e-6)

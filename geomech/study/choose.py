@@ -71,9 +71,10 @@ def cheapest(
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         found = " and ".join(f"{n} {name}" for name, n in settings.items())
+        finer = "lower [numerics] regularisation and tolerance" if system.solver else "take a finer table"
         raise SceneError(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
-            "raise --tol, or lower [numerics] regularisation and tolerance"
+            f"raise --tol, or {finer}"
         )
     return answer("direct", poses, error, settings)
 
