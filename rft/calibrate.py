@@ -77,6 +77,10 @@ class Fit:
     residuals: np.ndarray
     end_caps: float
 
+    def __repr__(self) -> str:
+        told = ", ".join(f"{n} {v:.4g} +- {e:.2g}" for n, v, e in zip(self.names, self.values, self.errors))
+        return f"Fit({self.law}: {told}; {self.data.psi.size} rows, rms {self.rms:.3g} N)"
+
     @property
     def rms(self) -> float:
         """Root mean square of the residuals of all rows that weigh something, N."""

@@ -72,7 +72,7 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
     require(finite and psi.size > 0, "angles, forces and weights must be finite numbers, one at least")
     require(bool((weight >= 0).all() and weight.any()), "weights must be 0 or more, and not all 0")
     require(
-        np.abs(psi).max() > LIKE_RADIANS,
+        not 0 < np.abs(psi).max() <= LIKE_RADIANS,
         f"psi_deg reaches only {np.abs(psi).max():.3g}: angles look like radians, give degrees from 0 to 90",
     )
     angle = np.arctan2(np.abs(np.sin(np.radians(psi))), np.abs(np.cos(np.radians(psi))))
