@@ -394,6 +394,11 @@ def test_the_picture_shows_data_law_band_and_residuals():
 
 def test_a_fit_shows_itself_in_a_line_and_one_angle_settles_nothing():
     told = repr(fit("granular", noisy(size=0.01)))
-    assert told.startswith("Fit(granular: C 1.781 +- 0.014") and "gamma0 0.24" in told and len(told) < 150 and "\n" not in told
+    assert (
+        told.startswith("Fit(granular: C 1.781 +- 0.014")
+        and "gamma0 0.24" in told
+        and len(told) < 150
+        and "\n" not in told
+    )
     with pytest.raises(ValueError, match="^(?!.*radians)"):
         fit("granular", rod_drag([0.0], [0.47], [0.0]))

@@ -90,6 +90,13 @@ def test_the_law_of_the_readme_runs_as_it_stands_there(tmp_path, capsys, monkeyp
     assert code == 0
     assert err.count("\n") == 1
     assert "power has no closed form" in err and "gauss:24" in err and "five times" in err
+    for amplitudes, wanted in (("0.5", 0), ("2.6", 2)):  # said once by a search that asks often, and beside an error
+        args = "displacement", "power.toml", "--plugin", "power.py", "--amplitudes", amplitudes
+        code, out, err = (
+            told(capsys, *args, "--tol", "1e-2") if wanted == 0 else told(capsys, *args, "--methods", "path")
+        )
+        assert (code, err.count("\n"), err.count("no closed form")) == (wanted, 1, int(wanted == 0))
+    code, out, err = told(capsys, *command.split(), "--json", "--methods", "direct")
     module = {}
     exec(law, module)
     shear = Swimmer(module["Power"](0.4), Chain())

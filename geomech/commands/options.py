@@ -7,6 +7,7 @@ import functools
 import inspect
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Optional
@@ -14,8 +15,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.errors import SceneError, check_angle, named
-from geomech.files import note, refuse_inputs, whole_file
+from geomech.errors import Note, SceneError, check_angle, named
+from geomech.files import refuse_inputs, whole_file
 
 
 def scene_names() -> list[str]:
@@ -210,7 +211,7 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
     long to be begun without --yes."""
     cost.check(scene.name, yes)
     for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
-        note(f"{scene.name}: {line}")
+        warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
     if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
         terminal.tell(f"{scene.name}: {cost}")
 

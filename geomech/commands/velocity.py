@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import warnings
 from typing import Annotated
 
 import typer
 
 from geomech.commands.options import JsonOption, SceneArgument, numbers, scene_with_gait
-from geomech.errors import named
-from geomech.files import note
+from geomech.errors import Note, named
 
 
 def velocity(
@@ -21,7 +21,7 @@ def velocity(
     """Body velocity for one shape and its rate of change, with its residual and status."""
     scene, asked = scene_with_gait(name), (("--alpha", alpha), ("--alphadot", alphadot))
     for line in scene.system.notes:
-        note(f"{scene.name}: {line}")
+        warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
     with named(scene.name):
         out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
     if as_json:
