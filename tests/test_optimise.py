@@ -70,6 +70,18 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
     assert uneven > 0
 
 
+def test_slopes_through_a_table_are_those_of_differences():
+    table = Study(geomech.load("three-link-glass").with_numerics(grid=11, harmonics=7)).table("harmonic")
+    loops, p = some_loop()
+    net, found = Phases(loops, table.velocity)(p).net
+    far = lambda q: displacement(table.velocity(*loops.cycle(q)))
+    for seed in range(3):
+        way, h = np.random.default_rng(seed).normal(size=p.shape), 1e-5
+        rise = (far(p + h * way) - far(p - h * way)) / (2 * h)
+        assert (found * way).sum((1, 2)) == pytest.approx(rise, rel=1e-4, abs=1e-6)
+    assert net == pytest.approx(far(p))
+
+
 @pytest.mark.parametrize(
     "aim",
     [
@@ -343,3 +355,18 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
     with pytest.raises(SceneError, match="outside the field that the scene has"):
         checked(scene, "efficiency", within=3.0)
+
+
+@pytest.mark.parametrize(
+    "wrong", ["x", b"1", [1.0], {"a": 1}, object(), 1j, np.nan, True, np.eye(2), 10**400], ids=repr
+)
+def test_wrong_types_are_refused(wrong):
+    for name in ("aim", "direction", "harmonics", "within", "starts", "rate", "power", "progress"):
+        if (name, wrong if isinstance(wrong, str) else "") == ("direction", "x"):
+            continue
+        aim = "speed" if name in ("rate", "power") else "displacement"
+        with pytest.raises(ValueError, match=".") as caught:
+            optimise(viscous(), **{"aim": aim, name: wrong})
+        assert "\n" not in str(caught.value)
+    with pytest.raises(ValueError, match="Scene"):
+        optimise(wrong, "displacement")

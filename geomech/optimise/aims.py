@@ -32,7 +32,7 @@ class Aim:
 
     def __post_init__(self):
         choose("--for", self.name, AIMS)
-        if self.direction:
+        if not (isinstance(self.direction, str) and self.direction == ""):
             choose("--direction", self.direction, DIRECTIONS)
             if self.name == "turning":
                 raise SceneError("--direction is that of a displacement: turning takes none, drop it")

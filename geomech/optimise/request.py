@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from geomech.connection import evaluate
-from geomech.errors import SceneError, named, number
+from geomech.errors import SceneError, check_angle, named, number
 from geomech.gaits import Sine
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
 from geomech.optimise.loops import Loops
 from geomech.optimise.undulations import Undulations
-from geomech.scene.model import Scene
+from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
 from geomech.systems.base import Premise, System
 
@@ -23,6 +23,7 @@ JOINTS = 12  # more make more numbers than a search without a model of them can 
 PHASES = 128  # of a cycle in the search
 ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
 NEAR, FINISH, RUNS = 100, 16, 12  # steps of the search in tables, by the direct tier, and of gaits run as a whole
+CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
 DEGREES = 1e-3  # by which the degree of the power may scatter
 
 
@@ -82,7 +83,9 @@ class Request:
         scene, loops = self.scene, self.loops
         numbers = int(np.prod(loops.shape))
         each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
-        jobs = cost.direct(scene, scene.gait, 3 + self.starts, max(scene.numerics.phases, PHASES))
+        jobs = cost.direct(
+            scene, scene.gait, 3 + (2 if self.looks_up else self.starts), max(scene.numerics.phases, PHASES)
+        )
         if self.looks_up:
             jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
             climbs, steps = min(2, self.starts), FINISH
@@ -90,7 +93,8 @@ class Request:
             climbs, steps = self.starts, RUNS if self.whole else NEAR
         gaits = int(climbs * steps * TRIES * each)
         jobs += cost.direct(scene, scene.gait, gaits, loops.phases, each, checked=False)
-        return cost.price(jobs)
+        found = cost.price(jobs)
+        return found._replace(seconds=found.seconds + CLIMB * self.starts)
 
     @property
     def extent(self) -> float:
@@ -103,15 +107,16 @@ def checked(
     starts: int = 1, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
     """The request, or SceneError, one line, for one that makes no sense."""
-    with named(scene.name):
+    with named(checked_scene(scene).name):
         number("--starts", starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
-        wanted = Aim(aim, direction or "", system.length, **limits)
+        towards = "" if direction is None else direction
+        wanted = Aim(aim, towards, system.length, **limits)
         if wanted.timed:
             if system.lacks & Premise.RATE_INDEPENDENT:
                 system.refuse("speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
-                wanted = Aim(aim, direction or "", system.length, rate=_own_rate(scene))
+                wanted = Aim(aim, towards, system.length, rate=_own_rate(scene))
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not wanted.straight:
             raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
@@ -145,6 +150,8 @@ def _loops(scene: Scene, harmonics: int | None, within: float | None) -> Loops |
     if within is None:
         within = min(max(n.extent, float(np.abs(gait.cycle(PHASES)[0]).max())), edge)
     number("--within", within, 1e-6, 100)
+    if system.joint_angles:
+        check_angle("a limit of joints", within)
     if within > edge * (1 + 1e-9):
         raise SceneError(f"--within {within:g} lies outside the field that the scene has: at most {edge:g}")
     return Loops(system.joints, harmonics, min(float(within), edge), max(PHASES, 16 * harmonics))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from geomech import metric
+from geomech.connection import check_knobs
 from geomech.errors import named
 from geomech.files import note
 from geomech.gaits import Gait
@@ -45,6 +46,7 @@ def optimise(
 
 def search(request: Request, progress: Callable | None = None) -> Optimum:
     """`optimise` of a request that is checked."""
+    check_knobs(1, progress)
     with named(request.scene.name):
         return _Search(request, progress).optimum()
 
@@ -54,6 +56,7 @@ class _Search:
 
     def __init__(self, request: Request, progress: Callable | None):
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
+        self.done = 0
         climbs = request.starts + min(FINISHED, request.starts) if request.looks_up else request.starts
         self.expected = climbs * TRIES * (RUNS if request.whole else FINISH)
 
@@ -127,9 +130,10 @@ class _Search:
         return p
 
     def _tell(self) -> None:
-        self.expected = max(self.expected, 1.1 * self.count)
+        self.done += 1
+        self.expected = max(self.expected, 1.1 * self.done)
         if self.progress:
-            self.progress(min(1.0, self.count / self.expected))
+            self.progress(self.done / self.expected)
 
     def _different(self, found: list[np.ndarray]) -> list[tuple[np.ndarray, int]]:
         kept: list[list] = []
