@@ -20,7 +20,7 @@ from geomech.study.bench import Study
 from geomech.systems import Swimmer
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
-from rft.bodies import Serpenoid
+from rft.bodies import ConstantCurvature, Serpenoid
 
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))
 ODD = Chain((0.7, 1.4, 0.9), length=0.3, frame="link-1")
@@ -263,16 +263,19 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     assert "answers that differ" in optima.text(found)
 
 
-def serpenoid():
-    return Scene(
-        Swimmer(SAND, Serpenoid(elements=8, waves=1.0)), Circle(amplitude=5.0), Numerics(phases=64, extent=7.0, grid=9)
-    )
+def serpenoid(body=None):
+    body = Serpenoid(elements=8, waves=1.0) if body is None else body
+    return Scene(Swimmer(SAND, body), Circle(amplitude=5.0), Numerics(phases=64, extent=7.0, grid=9))
 
 
-def test_modes_of_a_serpenoid_body():
-    found = optimise(serpenoid(), "efficiency", harmonics=2)
+@pytest.mark.parametrize(
+    "body", [Serpenoid(elements=8, waves=1.0), ConstantCurvature(elements=8)], ids=["modes", "arcs"]
+)
+def test_bodies_of_few_shape_variables(body):
+    found = optimise(serpenoid(body), "efficiency", harmonics=2)
     assert found.value > 1.02 * found.start.value
     assert found.best.length == found.best.work
+    assert np.abs(found.gait.cycle(500)[0]).max() <= 7.0
 
 
 def test_waves_of_a_long_body():
@@ -370,3 +373,21 @@ def test_wrong_types_are_refused(wrong):
         assert "\n" not in str(caught.value)
     with pytest.raises(ValueError, match="Scene"):
         optimise(wrong, "displacement")
+
+
+def test_the_loop_on_the_map(stroke, cheap, tmp_path):
+    """For displacement it follows the zero line, for efficiency the path's length holds it back, and a limit is a limit."""
+    from geomech.output import plots
+    from geomech.output.plots.optimum import along, held
+
+    share = lambda found, kind: (held(found, along(found)) == kind).mean()
+    assert share(stroke, "zero") > 0.95
+    assert share(cheap, "length") > 0.4
+    assert share(cheap, "zero") > 0.2
+    short = optimise(viscous(), within=1.2, harmonics=3)
+    assert share(short, "limit") > 0.15
+    field = along(stroke)
+    assert field.values[0, 15, 15] == pytest.approx(0.0204, abs=2e-4)  # against the sense of the CCF's x
+    for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1), "three.png")):
+        plots.save(plots.optimum_figure(found), tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 10_000

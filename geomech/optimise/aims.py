@@ -66,8 +66,8 @@ class Aim:
     def _displacement(self, b: Brought) -> tuple[float, np.ndarray]:
         (x, y, _), (dx, dy, _) = b.net
         if not self.direction:
-            size = np.hypot(x, y) + TINY
-            return size / self.length, (x * dx + y * dy) / size / self.length
+            size = np.hypot(x, y)
+            return size / self.length, (x * dx + y * dy) / (size + TINY) / self.length
         value, slopes = self.along(b)
         return abs(value) / self.length, (-1.0 if value < 0 else 1.0) * slopes / self.length
 

@@ -61,7 +61,7 @@ class Request:
     def degree(self) -> float:
         """Of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; ValueError if there is no such."""
         if self.power is None:
-            raise ValueError(f"--for {self.aim.name} asks for power, and a {self.system.kind} has none")
+            raise ValueError(f"--for {self.aim.name} asks for power, which the {self.system.kind} does not tell")
         if self.system.steps:
             return 1.0 if self.system.kinks else 2.0
         rng = np.random.default_rng(0)
