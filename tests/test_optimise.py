@@ -245,6 +245,9 @@ def test_loops_that_are_one():
     assert not series.same(p, -p, mirror=False)
     assert not series.same(p, other)
     assert not series.same(p, 1.1 * p)
+    flat = loops.of(Ellipse(semi_axes=(1.0, 0.0)))
+    assert not series.same(flat, 0.5 * flat)  # a part of a curve is not the curve, either way
+    assert not series.same(0.5 * flat, flat)
     gait = loops.gait(p)
     t = np.linspace(0, 6, 7)
     assert loops.gait(series.shifted(p, 1.3)).shape(t) == pytest.approx(gait.shape(t + 1.3), abs=1e-12)
