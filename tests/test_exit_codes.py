@@ -14,6 +14,10 @@ SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths
 
 INTRUDER = """[medium]\nname = "poppy-seeds-close"\nzeta = 1.1\n[intruder]\nkind = "half-cylinder"\nradius = 0.02\nwidth = 0.03
 [motion]\nkind = "drag"\ndepth = 0.01\ndirection_deg = 20\n[numerics]\nelements = 30\n"""
+WALKER = """[medium]\nzeta = 0.3\ngrazing_deg = 5\n[robot]\nkind = "wheel"\nmass = 0.5\naxle = 0.01
+legs = { kind = "round-rod", radius = 0.04, width = 0.05 }\n[gait]\nfrequency = 2
+[numerics]\nsteps = 8\nelements = 8\nduration = 1
+"""
 
 # What each command takes beside its scene. A new one needs its row.
 COMMANDS = {
@@ -32,13 +36,14 @@ COMMANDS = {
     "symbolic": [],
     "stress": ["--beta", "30", "--gamma", "-50", "--plot", "out.svg"],
     "intrude": ["-o", "out.csv", "--plot", "out.svg"],
+    "walk": ["-o", "out", "--animate", "out.gif"],
     "scenes": [],
     "keys": [],
 }
 # Where it is no scene with a gait.
 SUBJECT = {
     "scenes": [], "keys": [], "symbolic": ["differential-drive"],
-    "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"],
+    "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"], "walk": ["walker.toml"],
 }  # fmt: skip
 SOLVING = [name for name in COMMANDS if name not in ("explain", *SUBJECT)]
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
@@ -54,6 +59,7 @@ def ended(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(SMALL)
     (tmp_path / "intruder.toml").write_text(INTRUDER)
+    (tmp_path / "walker.toml").write_text(WALKER)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def run(*args):
@@ -65,7 +71,7 @@ def ended(tmp_path, monkeypatch, capsys):
             left.value.code,
             said.out,
             said.err,
-            {p.name for p in tmp_path.iterdir()} - {"small.toml", "intruder.toml"},
+            {p.name for p in tmp_path.iterdir()} - {"small.toml", "intruder.toml", "walker.toml"},
         )
 
     yield run
@@ -112,10 +118,20 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
         return
     what = {"calibrate": "drag", "stress": "medium"}.get(name, "scene")
     refused(ended(name, "nothing", *COMMANDS[name]), f"{what}: 'nothing' is unknown")
-    may_do_without = ("run", "accuracy", "connection", "displacement", "calibrate", "stress", "intrude", "optimize")
+    may_do_without = (
+        "run",
+        "accuracy",
+        "connection",
+        "displacement",
+        "calibrate",
+        "stress",
+        "intrude",
+        "optimize",
+        "walk",
+    )
     for k in range(0, len(COMMANDS[name]), 2):
         option = COMMANDS[name][k]
-        if option in ("-o", "--plot", "--harmonics") and name in may_do_without:
+        if option in ("-o", "--plot", "--harmonics", "--animate") and name in may_do_without:
             continue  # may be left out, or has a second option beside it
         if option == "--cycles":
             refused(

@@ -3,5 +3,5 @@ here; `geomech.commands.options` has what they share."""
 
 COMMANDS = (
     "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "optimize",
-    "calibrate", "stress", "intrude", "explain", "symbolic", "scenes", "keys",
+    "calibrate", "stress", "intrude", "walk", "explain", "symbolic", "scenes", "keys",
 )  # fmt: skip

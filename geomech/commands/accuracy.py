@@ -17,15 +17,17 @@ def accuracy(
     yes: YesOption = False,
 ):
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
-    scene, for the number of elements or triangles."""
-    from geomech.output import plots
-    from geomech.scene import Intruding, inputs, load
+    scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
+    from geomech.output import plots, walks
+    from geomech.scene import Intruding, WalkerScene, inputs, load
     from geomech.study import accuracy as study
-    from geomech.study import intrusion
+    from geomech.study import intrusion, walking
 
     scene = load(name)
     if isinstance(scene, Intruding):
         study, draw = intrusion, plots.elements_figure
+    elif isinstance(scene, WalkerScene):
+        study, draw = walking, walks.accuracy_figure
     else:
         scene, draw = loaded(name), plots.work_precision_figure
     with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"accuracy of {scene.name}") as bar:

@@ -180,6 +180,10 @@ def amplitude_kind(scene) -> str | None:
 def parameter_kind(scene, parameter: str) -> str | None:
     """Of `numbers`: what a scene's parameter is (`geomech.study.sweep`), None if it is an angle in rad."""
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
+    if hasattr(scene, "robot"):
+        of = {"robot": scene.robot.legs, "gait": scene.gait, "medium": scene.medium}.get(section)
+        angle = key in getattr(of, "angles", ())
+        return None if angle else "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
     if parameter == "gait.amplitude":
         return amplitude_kind(scene)
     system = scene.system
@@ -218,9 +222,13 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
 
 def scene_with_gait(name: str):
     """The scene of that name; SceneError for one without a gait."""
-    from geomech.scene import Scene, load
+    from geomech.scene import Scene, WalkerScene, load
 
     scene = load(name)
+    if isinstance(scene, WalkerScene):
+        raise SceneError(
+            f"{name}: a robot that walks has no shape space: give it to 'geomech walk', 'sweep' or 'accuracy'"
+        )
     if not isinstance(scene, Scene):
         raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
     return scene
@@ -242,11 +250,21 @@ def loaded(name: str, grid: int | None = None, extent: float | None = None, medi
 
 def loaded_intruder(name: str):
     """The intruder scene of that name; SceneError for one with a gait."""
-    from geomech.scene import Scene, load
+    from geomech.scene import Scene, WalkerScene, load
 
     scene = load(name)
-    if isinstance(scene, Scene):
+    if isinstance(scene, (Scene, WalkerScene)):
         raise SceneError(f"{name}: a scene with a gait has no [intruder]: see 'geomech scenes' for those that have")
+    return scene
+
+
+def loaded_walker(name: str):
+    """The scene of that name; SceneError for one without a robot."""
+    from geomech.scene import WalkerScene, load
+
+    scene = load(name)
+    if not isinstance(scene, WalkerScene):
+        raise SceneError(f"{name}: a scene without a [robot] does not walk: see 'geomech scenes' for those that do")
     return scene
 
 

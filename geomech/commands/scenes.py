@@ -14,15 +14,19 @@ def scenes(
 ):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
-    from geomech.scene import builtin_names, intruder_names, load
+    from geomech.scene import builtin_names, intruder_names, load, walker_names
     from geomech.scene.write import medium_toml
     from rft.vertical import VERTICAL
 
     if show is not None:
-        name = choose("--show", show, [*builtin_names(), *intruder_names(), *rft.CATALOGUE])
+        name = choose("--show", show, [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE])
         print(medium_toml(name, rft.CATALOGUE[name]) if name in rft.CATALOGUE else load(name).text, end="")
         return
-    for title, names in (("", builtin_names()), ("\nintruder scenes, for 'geomech intrude'", intruder_names())):
+    for title, names in (
+        ("", builtin_names()),
+        ("\nintruder scenes, for 'geomech intrude'", intruder_names()),
+        ("\nscenes of walking robots, for 'geomech walk'", walker_names()),
+    ):
         if title:
             print(title)
         for scene_name in names:
@@ -30,6 +34,6 @@ def scenes(
     print("\nmedia for [medium] name = ...")
     for medium_name, entry in rft.CATALOGUE.items():
         print(f"{medium_name:24} {entry.source}")
-    print("\nmedia of intruder scenes, and for 'geomech stress'")
+    print("\nmedia of intruder and walker scenes, and for 'geomech stress'")
     for medium_name, entry in VERTICAL.items():
         print(f"{medium_name:24} {entry.source}")

@@ -30,8 +30,10 @@ def sweep(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Net displacement over a grid of the scene's parameters. What is done is kept if interrupted, and taken up again."""
+    """Net displacement, or speed of a robot that walks, over a grid of the scene's parameters. What is done is kept if
+    interrupted, and taken up again."""
     from geomech.output import plots, sweeps
+    from geomech.scene import WalkerScene, load
     from geomech.study import kept
     from geomech.study import sweep as sweeping
     from geomech.study.tables import of_pose
@@ -45,13 +47,17 @@ def sweep(
     check_netcdf(out)
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
-    scene = loaded(name)
+    walks = isinstance(load(name), WalkerScene)
+    scene = load(name) if walks else loaded(name)
+    if walks:
+        from geomech.output import walk_sweeps as sweeps
+        from geomech.study import walking as sweeping
     axes = {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
     partial = sweeping.partial(scene, axes, out)
     check_outputs(scene, out, plot, partial)
     with kept.alone(out):
         with terminal.progress(f"sweep of {scene.name}") as bar:
-            allow(scene, sweeping.cost(scene, axes), yes)
+            allow(scene, (sweeping.cost_of_sweep if walks else sweeping.cost)(scene, axes), yes)
             if kept.is_second(out, partial):
                 note(
                     f"another sweep to {out} is unfinished: what is done of it stays, this one keeps its own in {partial}"
@@ -66,6 +72,9 @@ def sweep(
                 error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
             raise
         partial.unlink(missing_ok=True)
+    if walks:
+        print(f"{sweeps.told(results)}, in {out}")
+        return
     net = of_pose(results["displacement"])["net_distance"]
     told = f"{net.size} points, net distance per cycle {net.min():.6g} to {net.max():.6g} {scene.system.unit}"
     if (speed := results.get("speed")) is not None:

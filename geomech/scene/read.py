@@ -27,11 +27,13 @@ from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
+    from geomech.scene.walker import WalkerScene
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 LARGEST = 10_000_000  # bytes of a scene file
 INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
+WALKERS = "walkers"  # and of robots that walk
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +59,11 @@ def intruder_names() -> list[str]:
     return _names(_folder() / INTRUDERS)
 
 
+def walker_names() -> list[str]:
+    """Names of the scenes of walking robots that ship with the package."""
+    return _names(_folder() / WALKERS)
+
+
 def _names(folder) -> list[str]:
     return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
 
@@ -65,20 +72,21 @@ def _folder():
     return resources.files("geomech.scene") / "builtin"
 
 
-def load(scene: str | Path) -> Scene | Intruding:
-    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder]; SceneError, one line, if it is
-    not one."""
+def load(scene: str | Path) -> Scene | Intruding | WalkerScene:
+    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot];
+    SceneError, one line, if it is not one."""
     if not isinstance(scene, (str, Path)):
         raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
     names = builtin_names()
     if str(scene) in names:
         return parse((_folder() / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
-    if str(scene) in intruder_names():
-        return parse((_folder() / INTRUDERS / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
+    for folder, some in ((INTRUDERS, intruder_names()), (WALKERS, walker_names())):
+        if str(scene) in some:
+            return parse((_folder() / folder / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
     path = Path(scene)
     try:
         if path.suffix != ".toml" and not path.exists():
-            choose("scene", str(scene), names + intruder_names())
+            choose("scene", str(scene), names + intruder_names() + walker_names())
         text = read_text(path, LARGEST)
     except SceneError:
         raise
@@ -105,15 +113,15 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     return scene.changed(medium=_medium(f"{scene.name}: [medium]", tables["medium"]), files=files)
 
 
-def inputs(scene: Scene | Intruding) -> list[Path]:
+def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system, or
     of an intruder scene's parts."""
-    parts = () if hasattr(scene, "intruder") else (checked_scene(scene).gait, scene.system)
-    own = [] if scene.name in builtin_names() + intruder_names() else [scene.name]
+    parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
+    own = [] if scene.name in builtin_names() + intruder_names() + walker_names() else [scene.name]
     return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
-def parse(text: str, name: str = "scene") -> Scene | Intruding:
+def parse(text: str, name: str = "scene") -> Scene | Intruding | WalkerScene:
     """The scene of a TOML text; SceneError if it is not one."""
     if not isinstance(text, str):
         raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
@@ -124,10 +132,14 @@ def parse(text: str, name: str = "scene") -> Scene | Intruding:
     return from_tables(tables, name, text)
 
 
-def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Intruding:
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Intruding | WalkerScene:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
+    if "robot" in tables:
+        from geomech.scene import walker
+
+        return walker.from_tables(tables, name, text)
     if {"intruder", "motion"} & {*tables}:
         from geomech.scene import intruder  # which reads tables with what is here
 

@@ -16,20 +16,21 @@ from geomech.scene.intruding import Intruding
 from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
+from geomech.scene.walker import WalkerScene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.said import name_in
 from geomech.systems.swimmer import PARTS, Swimmer
 
 
-def toml(scene: Scene | Intruding) -> str:
+def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
     which a medium that came from a file stands, and other files with their folders. SceneError if it has a part that no
     scene file can name."""
-    intruder = isinstance(scene, Intruding)
-    whole = scene.text if intruder else checked_scene(scene).text and not (scene.files or _beside(scene.text))
+    other = isinstance(scene, (Intruding, WalkerScene))
+    whole = scene.text if other else checked_scene(scene).text and not (scene.files or _beside(scene.text))
     if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return _text(scene.tables() if intruder else _anew(scene))
+    return _text(scene.tables() if other else _anew(scene))
 
 
 def _beside(text: str) -> bool:
@@ -134,4 +135,6 @@ def _value(x) -> str:
     """As TOML; its strings and lists are JSON's, its numbers Python's."""
     if isinstance(x, list):
         return f"[{', '.join(map(_value, x))}]"
+    if isinstance(x, dict):
+        return f"{{ {', '.join(f'{key} = {_value(y)}' for key, y in x.items())} }}"
     return json.dumps(x, ensure_ascii=False) if isinstance(x, (str, bool)) else repr(x)

@@ -37,7 +37,10 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     """The tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
     "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
-    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical"):
+    if len(parts) == 3 and parts[:2] == ["robot", "legs"]:  # a table inside a table
+        inner = changed({"robot": tables["robot"]["legs"]}, f"robot.{parts[2]}", value)
+        return {**tables, "robot": {**tables["robot"], "legs": inner["robot"]}}
+    if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical", "robot"):
         old = tables.get(parts[0], {}).get(parts[1])
         tables = {**tables, parts[0]: {k: v for k, v in tables.get(parts[0], {}).items() if k != _twin(parts[1])}}
         value = int(value) if isinstance(old, int) and not isinstance(old, bool) and value == int(value) else value
@@ -81,7 +84,7 @@ def sweep(
         raise SceneError(f"partial must be the path of a file, got {short(partial)}")
     partial = partial and Path(partial)
     told, doubtful = progress or (lambda fraction: None), uncertainty.uncertain(scene.system)
-    with _Rows(partial, question(scene, values), int(np.prod(solved))) as rows:
+    with Rows(partial, question(scene, values), int(np.prod(solved))) as rows:
         while len(rows) < rows.total:
             k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
             first = _scene_at(tables, scene, names, points[k])
@@ -149,7 +152,7 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
             f"over must be values by parameter, such as {{'gait.amplitude': [0.5, 1.0]}}, got {short(over)}"
         )
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
-    values = {k: _list(k, over[k]) for k in names}
+    values = {k: listed(k, over[k]) for k in names}
     total = int(np.prod([len(v) for v in values.values()])) if names else 0
     if not 0 < total <= LARGEST:
         raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
@@ -164,7 +167,7 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
     return tables, names, values, list(itertools.product(*some))
 
 
-def _list(name: str, values) -> list[float]:
+def listed(name: str, values) -> list[float]:
     array = real_array(name, values)
     if array.ndim != 1 or not np.isfinite(array).all():
         raise SceneError(f"--over {name}: values must be a list of finite numbers, got {short(values)}")
@@ -187,7 +190,7 @@ def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     return {"geomech": __version__, "solver": SOLVER, **own, "scene": scene.text, **parts, "over": over}
 
 
-class _Rows(list):
+class Rows(list):
     """The rows done so far, saved to ``path`` every now and then, and when computing ends for whatever reason."""
 
     def __init__(self, path: Path | None, question: dict, total: int):
@@ -214,7 +217,7 @@ class _Rows(list):
         now = time.monotonic()
         self.due = now + max(SAVE_EVERY, PATIENCE * (now - start))
 
-    def __enter__(self) -> _Rows:
+    def __enter__(self) -> Rows:
         return self
 
     def __exit__(self, kind, error, _) -> None:

@@ -115,12 +115,12 @@ def _moved(outline: Outline, pose, twist):
     """Arms from the origin, heights and velocities of the points (..., N + 1); normals at both ends of the elements."""
     pose, twist = pose[..., None], twist[..., None]
     turn = np.cos(pose[..., 2, :]), np.sin(pose[..., 2, :])
-    r = _turned(outline.points.T, turn)
+    r = _turned(_pair(outline.points), turn)
     v = twist[..., 0, :] + twist[..., 2, :] * r[1], twist[..., 1, :] - twist[..., 2, :] * r[0]
     if outline.bends is None:
-        n = (_turned(outline.normals.T, turn),) * 2
+        n = (_turned(_pair(outline.normals), turn),) * 2
     else:
-        n = tuple(_turned(outline.bends[:, k].T, turn) for k in (0, 1))
+        n = tuple(_turned(_pair(outline.bends[..., k, :]), turn) for k in (0, 1))
     return r, r[1] + pose[..., 1, :], v, n
 
 
@@ -131,8 +131,13 @@ def _triples(name: str, values) -> np.ndarray:
     return values
 
 
+def _pair(vectors):
+    """(x, z) of vectors (..., 2)."""
+    return vectors[..., 0], vectors[..., 1]
+
+
 def _turned(vectors, turn):
-    """(x, z), each (N,), by angles (..., 1) about y."""
+    """(x, z), each (..., N), by angles (..., 1) about y."""
     cos, sin = turn
     return cos * vectors[0] + sin * vectors[1], cos * vectors[1] - sin * vectors[0]
 

@@ -1,0 +1,65 @@
+"""Fig. 12(b), (d) and (f): forward speed of Xplorer against time, its mean speed against the curvature of its legs at 1 to
+4 Hz, and that of SandBot against the air flow through the grains at 2 to 8 rad/s.
+
+The paper gives mass and length of the robots and no other size: those are assumed (the built-in scenes say which), and so is
+the air speed of fluidisation. The trends are claimed, not the numbers; `figures.walking_sensitivity` shows what these hang on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.output.walk_sweeps import curves
+from geomech.scene import load
+from geomech.study import walking
+
+CURVATURES = np.linspace(-1.0, 1.0, 9).tolist()
+FREQUENCIES = [1.0, 2.0, 3.0, 4.0]
+RATES = np.array([2.0, 4.0, 6.0, 8.0])  # rad/s
+AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
+
+
+def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR) -> dict:
+    """walk: of Xplorer as it is built in; legs, flow: as `geomech.study.walking.sweep` gives them."""
+    xplorer, sandbot = load("xplorer"), load("sandbot")
+    over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
+    flows = {"effects.aeration.air_speed": air, "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist()}
+    return {"walk": walking.run(xplorer), "legs": walking.sweep(xplorer, over), "flow": walking.sweep(sandbot, flows)}
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(10.4, 3.1, 3)
+    walk, (ax, legs, flow) = numbers["walk"].walk, axes[0]
+    some = walk.t <= 3.0
+    ax.plot(walk.t[some], walk.twist[some, 0], color="black", lw=0.9)
+    ax.axhline(walk.speed, color="C3", ls="--", lw=1.0)
+    ax.set(xlabel="$t$ (s)", ylabel="forward speed (m/s)", xlim=(0, 3), title="(b) Xplorer, 2 Hz; dashed: mean")
+    for ax, name, unit, scale in ((legs, "legs", "Hz", 1.0), (flow, "flow", "rad/s", 2 * np.pi)):
+        values, second = numbers[name]["over"].values()
+        curves(ax, list(values), numbers[name], [f"{scale * f:.3g} {unit}" for f in second])
+        ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    legs.set(xlabel="leg curvature $R/r$", ylabel="mean speed (m/s)", title="(d) Xplorer")
+    flow.set(xlabel="air speed (m/s)", ylabel="mean speed (m/s)", title="(f) SandBot; open: stuck or sunk")
+    return fig
+
+
+def table(numbers: dict) -> str:
+    """Mean speeds, m/s, and what does not walk."""
+    rows = []
+    for name in ("legs", "flow"):
+        found = numbers[name]
+        values, second = found["over"].values()
+        rows.append(f"{name:8}" + "".join(f"{v:9.3g}" for v in values))
+        for k, v in enumerate(second):
+            cells = zip(found["speed"][:, k], found["status"][:, k])
+            rows.append(
+                f"{v:6.3g}Hz" + "".join(f"{s:8.3f}{' ' if kind == 'walking' else kind[1]}" for s, kind in cells)
+            )
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    main("fig12", compute, draw, table)

@@ -1,0 +1,86 @@
+"""The step-size study of the planar engine: Xplorer's way from rest at 1 and 3 Hz by implicit and by explicit steps.
+
+The law of stress jumps at rest like dry friction and is rounded at a named speed. Explicit steps (Heun's, of order 2 as well)
+chatter across the jump until they resolve the rounding; implicit ones do not care. Below, what is left of the balance of
+energy: work of the motors - loss in the ground - change of the body's energy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from rft.walking import Tripod, Walker
+from rft.walking.planar import State
+from rft.walking.planar_walk import _strides
+
+STEPS = {"implicit": (12, 24, 48, 96, 192, 384), "explicit": (96, 192, 384, 768, 1536, 3072)}
+FINEST = 1536
+FREQUENCIES = (1.0, 3.0)
+
+
+def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
+    """One explicit step."""
+
+    def slope(at: State, where: float):
+        a, motors, ground = robots.forces(at.pose[None], at.twist[None], *robots.turned(np.array([where]), of))
+        return State(at.twist, a[0], motors[0], ground[0])
+
+    first = slope(state, phase)
+    then = State(*(x + dt * y for x, y in zip(state, first)))
+    second = slope(then, phase + dt * robots.gaits[0].frequency)
+    return State(*(x + dt * (y + z) / 2 for x, y, z in zip(state, first, second)))
+
+
+def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
+    """(progress, m; what is left of the balance of energy, of the work) after so many cycles from rest."""
+    scene = load("xplorer")
+    robots = _strides([Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics).robots
+    state = first = robots.placed()
+    count = round(cycles * steps)
+    for k in range(count):
+        phase, dt = k / steps, 1 / (steps * frequency)
+        if how == "implicit":
+            state = robots.step(state, np.array([phase]), phase + 0.5 / steps, np.array([dt]))
+        else:
+            state = heun(robots, state, phase, phase + 0.5 / steps, dt)
+        if not np.isfinite(state.pose).all() or np.abs(state.pose[0, :2]).max() > 10.0:
+            return np.inf, np.inf
+    left = state.work - state.loss - robots.energy(state) + robots.energy(first)
+    return state.pose[0, 0], abs(left[0] / state.work[0])
+
+
+def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
+    """{frequency: {how: (steps, error of the progress over it, what is left of the energy's balance)}}."""
+    out = {}
+    for f in frequencies:
+        truth = way(f, finest, "implicit")[0]
+        out[f] = {how: (n, *np.array([way(f, k, how) for k in n]).T) for how, n in steps.items()}
+        out[f] = {how: (n, np.abs(x / truth - 1), left) for how, (n, x, left) in out[f].items()}
+    return out
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(7.2, 4.8, len(numbers), 2)
+    for column, (f, lines) in zip(axes.T, numbers.items()):
+        for (how, (steps, error, left)), colour in zip(lines.items(), ("C0", "C3")):
+            for ax, values in zip(column, (error, left)):
+                good = np.isfinite(values)
+                ax.loglog(np.array(steps)[good], values[good], "o-", color=colour, lw=1.0, label=how)
+        for ax, what, values in zip(
+            column, ("error of the progress", "energy not accounted for"), lines["implicit"][1:]
+        ):
+            steps = np.array(lines["implicit"][0], float)
+            ax.loglog(steps, values[0] * (steps / steps[0]) ** -2, color="0.6", ls="--", lw=0.8, label="order 2")
+            ax.set(xlabel="steps of a cycle", ylabel=what)
+            ax.grid(True, which="major", lw=0.3, color="0.85")
+        column[0].set_title(f"{f:g} Hz")
+    axes[0, -1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return fig
+
+
+if __name__ == "__main__":
+    main("walking_steps", compute, draw)

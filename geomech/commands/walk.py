@@ -1,0 +1,46 @@
+"""geomech walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from geomech import terminal
+from geomech.commands.options import JsonOption, SceneArgument, YesOption, allow, check_outputs, folder, loaded_walker
+from geomech.files import whole_folder
+
+
+def walk(
+    name: SceneArgument,
+    engine: Annotated[str, typer.Option(metavar="planar|mujoco", help="what computes the motion")] = "planar",
+    as_json: JsonOption = False,
+    out: Annotated[
+        Optional[Path], typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
+    ] = None,
+    animate: Annotated[
+        Optional[Path], typer.Option(metavar="FILE", help="film: .gif, .mp4; strip: .png, .pdf, .svg")
+    ] = None,
+    yes: YesOption = False,
+):
+    """How a robot walks on grains: mean speed with its error, and its way from rest. SI units, pitch in rad, nose down."""
+    from geomech.output import animate as film
+    from geomech.output import walks
+    from geomech.scene import inputs
+    from geomech.study import walking
+
+    scene = loaded_walker(name)
+    walking.refuse_engine(scene, engine)
+    if animate:
+        film.check_format(animate)
+    check_outputs(scene, animate, None)
+    allow(scene, walking.price(scene), yes)
+    with terminal.progress(f"walk of {scene.name}"):
+        found = walking.run(scene, engine)
+    if animate:
+        walks.film(animate, scene, found)
+    if out:
+        with whole_folder(out, inputs(scene)) as place:
+            walks.save(place, scene, found)
+    print(walks.as_json(found) if as_json else walks.told(scene, found))

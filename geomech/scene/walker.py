@@ -1,0 +1,129 @@
+"""Scenes of walking: a robot, the clock of its legs and the grains it walks on, and how their TOML is read."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from geomech.errors import SceneError, choose, named, short
+from geomech.scene.intruder import _intruder, read_medium
+from geomech.scene.intruding import located
+from geomech.scene.read import _build, _kind
+from rft.vertical import SHAPES, PlateStress, StressMap
+from rft.vertical.effects import KINDS as EFFECTS
+from rft.vertical.effects import GroundEffect
+from rft.walking import ROBOTS, Fineness, Robot, Tripod, Walker
+
+TABLES = ("medium", "robot", "gait", "numerics", "effects")
+KINDS = {"aeration", "grain-inertia"}  # of effects
+CURE = "see 'geomech scenes --show xplorer'"
+
+
+@dataclass(frozen=True)
+class WalkerScene:
+    """A stress map, a robot and its gait, and effects on the ground. numerics: how finely. text: its TOML. files: those that
+    the scene names."""
+
+    medium: PlateStress
+    robot: Robot
+    gait: Tripod
+    effects: tuple[GroundEffect, ...] = ()
+    numerics: Fineness = field(default_factory=Fineness)
+    name: str = "scene"
+    text: str = field(default="", repr=False, compare=False)
+    files: tuple[str, ...] = field(default=(), repr=False, compare=False)
+
+    def __post_init__(self):
+        with named(self.name):
+            for what, kind in (("numerics", Fineness), ("name", str), ("text", str)):
+                if not isinstance(getattr(self, what), kind):
+                    raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
+            if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
+                raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
+            object.__setattr__(self, "effects", self.walker.effects)
+            _ = self.robot.leg(self.numerics.elements)
+
+    @property
+    def walker(self) -> Walker:
+        return Walker(self.robot, self.gait, self.medium, self.effects)
+
+    def tables(self) -> dict:
+        """Those of a scene file that reads the same; SceneError for measured drags, which are files of their own."""
+        if not isinstance(self.medium, StressMap):
+            raise SceneError(f"{self.name}: plate drags are CSV files: write the scene that names them by hand")
+        kind = lambda thing, kinds: {"kind": next(k for k, v in kinds.items() if v is type(thing))}
+        robot = kind(self.robot, ROBOTS) | _plain(self.robot)
+        robot["legs"] = kind(self.robot.legs, SHAPES) | _plain(self.robot.legs)
+        tables = {
+            "medium": _plain(self.medium),
+            "robot": robot,
+            "gait": _plain(self.gait),
+            "numerics": _plain(self.numerics),
+        }
+        if self.effects:
+            tables["effects"] = [{"kind": e.kind} | _plain(e) for e in self.effects]
+        return tables
+
+
+def _plain(thing) -> dict:
+    """Its fields, as they stand in a file."""
+    fields = dataclasses.asdict(thing).items()
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in fields if v is not None}
+
+
+def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerScene:
+    """The scene of the tables of a TOML text; SceneError if they make none."""
+    for key in tables:
+        choose(f"{name}: table", key, TABLES)
+    for key in ("medium", "robot", "gait", "numerics"):
+        if not isinstance(tables.get(key, {} if key == "numerics" else None), Mapping):
+            told = "is missing: add it" if key not in tables else "must be a table"
+            raise SceneError(f"{name}: the table [{key}] {told}, {CURE}")
+    files: list[str] = []
+    at = lambda table: located(table, Path(name).absolute().parent, files)
+    with named(name):
+        return WalkerScene(
+            medium=read_medium(f"{name}: [medium]", at(tables["medium"])),
+            robot=_robot(name, tables["robot"], at),
+            gait=_build(f"{name}: [gait]", _gait(name, tables["gait"]), Tripod),
+            effects=tuple(_effects(name, tables.get("effects", []))),
+            numerics=_build(f"{name}: [numerics]", dict(tables.get("numerics", {})), Fineness),
+            name=name,
+            text=text,
+            files=tuple(files),
+        )
+
+
+def _robot(name: str, table: Mapping, at) -> Robot:
+    place, rest = f"{name}: [robot]", dict(table)
+    kind = ROBOTS[_kind(place, rest, "kind", ROBOTS)]
+    del rest["kind"]
+    if not rest.get("legs") or not isinstance(rest["legs"], Mapping):
+        raise SceneError(f"{place} is a robot without legs: add the table [robot.legs], {CURE}")
+    names = [f.name for f in dataclasses.fields(kind)]
+    for key in rest:
+        choose(f"{place} key", key, names)
+    legs = _intruder(f"{name}: [robot.legs]", at(rest.pop("legs")))
+    needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING} - {"legs"}
+    if lacking := sorted(needed - {*rest}):
+        raise SceneError(f"{place} has no {', '.join(lacking)}: add it, {CURE}")
+    with named(place):
+        return kind(legs=legs, **{k: tuple(v) if isinstance(v, list) else v for k, v in rest.items()})
+
+
+def _gait(name: str, table: Mapping) -> dict:
+    if "frequency" not in table:
+        raise SceneError(f"{name}: [gait] has no frequency: add it, in Hz")
+    return dict(table)
+
+
+def _effects(name: str, effects) -> list[GroundEffect]:
+    if not (isinstance(effects, list) and all(isinstance(e, Mapping) for e in effects)):
+        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
+    place, made = f"{name}: [[effects]]", []
+    for table in effects:
+        kind = EFFECTS[_kind(place, dict(table), "kind", KINDS)]
+        made.append(_build(place, {k: v for k, v in table.items() if k != "kind"}, kind))
+    return made

@@ -1,0 +1,229 @@
+"""Questions to scenes of walking robots: how they walk, with the error of the speed; grids of parameters; what accuracy
+costs."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import time
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from geomech import __version__
+from geomech.errors import SceneError, named
+from geomech.scene.read import from_tables
+from geomech.scene.walker import WalkerScene
+from geomech.study import kept
+from geomech.study.cost import BASE, Cost
+from geomech.study.sweep import LARGEST, Rows, changed, listed
+from rft import SOLVER
+from rft.walking import Walk, engine
+
+STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
+TOGETHER = 32  # robots side by side
+SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
+PER_STEP = 3e-3  # s of computing, for a robot by itself,
+MORE = 1e-3  # and for each beside it, measured
+LIMIT = 6  # cycles on the way to the limit cycle, and half as many for each of two errors
+KNOBS = {
+    "steps": (12, 16, 24, 32, 48, 64, 96),
+    "elements": (6, 8, 12, 16, 24, 32),
+    "rounding": (8e-3, 4e-3, 2e-3, 1e-3, 5e-4),
+}
+FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
+ORDERS = {"steps": 2, "elements": 2, "rounding": 1}
+TOLERANCES = 10.0 ** -np.arange(1, 5)
+
+
+class Walked(NamedTuple):
+    """walk: as rft has it. estimate: error of its speed, m/s: what half the steps and half the elements change, and what is
+    left to the limit."""
+
+    walk: Walk
+    estimate: float
+
+
+def walked(scenes: Sequence[WalkerScene], by: str = "planar", settling: bool = False) -> list[Walked]:
+    """Scenes of equal numerics, side by side. settling: a few cycles from rest are enough."""
+    numerics, how, walkers = scenes[0].numerics, engine(by), [s.walker for s in scenes]
+    walks = how.walk(walkers, numerics, SETTLING if settling else None)
+    error = np.array([w.drift for w in walks])
+    for name, fewest in (("steps", 8), ("elements", 4)):
+        coarse = dataclasses.replace(numerics, **{name: max(fewest, getattr(numerics, name) // 2)})
+        there = how.again(walkers, coarse, walks, SETTLING if settling else None)
+        error = error + np.abs([a.speed - b.speed for a, b in zip(there, walks)])
+    return [Walked(w, float(e)) for w, e in zip(walks, error)]
+
+
+def run(scene: WalkerScene, by: str = "planar") -> Walked:
+    """One scene."""
+    with named(scene.name):
+        return walked([scene], by)[0]
+
+
+class Steps(Cost):
+    """What walking costs; balances counts the time steps."""
+
+    def __str__(self) -> str:
+        return f"{self.balances:,} time steps, about {max(1.0, self.seconds):.0f} s of computing"
+
+
+def price(scene: WalkerScene, count: int = 1, settling: bool = False) -> Steps:
+    """Of ``count`` scenes like this one."""
+    cycles = SETTLING if settling else min(scene.numerics.duration * scene.gait.frequency, 2 * LIMIT)
+    steps = (cycles + 2 * LIMIT) * scene.numerics.steps
+    batches = -(-count // TOGETHER)
+    seconds = steps * (batches * PER_STEP + (count - batches) * MORE) * (0.5 + scene.numerics.elements / 32)
+    return Steps(round(steps * count), seconds, BASE)
+
+
+def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progress: Callable | None = None) -> dict:
+    """{"over": {parameter: values}, "speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}: as
+    `geomech.study.sweep.sweep`, which keeps what is done."""
+    tables, values, points = _grid(scene, over)
+    shape, at = tuple(map(len, values.values())), lambda point: _scene_at(tables, scene, list(values), point)
+    with Rows(partial and Path(partial), question(scene, values), len(points)) as rows:
+        while len(rows) < rows.total:
+            scenes = [at(p) for p in points[len(rows) : len(rows) + TOGETHER]]
+            alike = itertools.groupby(scenes, key=lambda s: s.numerics)
+            for one in (w for _, some in alike for w in walked(list(some), settling=True)):
+                kind = float(STATUSES.index(one.walk.status))
+                rows.add([[one.walk.speed, one.estimate, kind, one.walk.cycles, 0.0]])
+            if progress:
+                progress(len(rows) / rows.total)
+    speed, estimate, kinds, cycles, _ = np.moveaxis(np.array(list(rows)).reshape(*shape, 5), -1, 0)
+    status = np.array(STATUSES)[kinds.astype(int)]
+    return {"over": values, "speed": speed, "estimate": estimate, "status": status, "cycles": cycles}
+
+
+def question(scene: WalkerScene, values: Mapping) -> dict:
+    """All that the numbers of a sweep follow from."""
+    parts = {f.name: repr(getattr(scene, f.name)) for f in dataclasses.fields(scene) if f.name not in ("text", "files")}
+    return {
+        "geomech": __version__,
+        "solver": SOLVER,
+        "walks": True,
+        **parts,
+        "over": [[k, list(v)] for k, v in values.items()],
+    }
+
+
+def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
+    """Of `sweep`; SceneError if a point of the grid makes no scene."""
+    tables, values, points = _grid(scene, over)
+    some = [_scene_at(tables, scene, list(values), p) for p in (points[0], points[-1])]
+    return max((price(s, len(points), settling=True) for s in some), key=lambda c: c.seconds)
+
+
+def _grid(scene: WalkerScene, over: Mapping):
+    """(tables of the scene, values by parameter, points); SceneError if a point of the grid makes no scene."""
+    values = {k: listed(k, v) for k, v in over.items()}
+    total = int(np.prod([len(v) for v in values.values()]))
+    if not 0 < total <= LARGEST:
+        raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
+    read = tomllib.loads(scene.text)
+    tables = read if read and from_tables(read, scene.name, scene.text) == scene else scene.tables()
+    points = list(itertools.product(*values.values()))
+    for point in points[:: max(1, len(points) // 200)] + points[-1:]:
+        _scene_at(tables, scene, list(values), point)
+    return tables, values, points
+
+
+def _scene_at(tables: dict, scene: WalkerScene, names, point) -> WalkerScene:
+    for name, value in zip(names, point):
+        tables = changed(tables, name, value)
+    return from_tables(tables, scene.name, scene.text)
+
+
+def partial(scene: WalkerScene, over: Mapping, output: Path) -> Path:
+    """The file that keeps what is done of this sweep to ``output``."""
+    return kept.beside(output, question(scene, _grid(scene, over)[1]))
+
+
+def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
+    """{"scene", "speed", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest"}: error of the speed,
+    m/s, against one as far refined as `FINEST`, for every knob."""
+    how, walkers = engine("planar"), [scene.walker]
+    walks = how.walk(walkers, scene.numerics, SETTLING)
+    again = lambda name, value: how.again(
+        walkers, dataclasses.replace(scene.numerics, **{name: value}), walks, SETTLING
+    )[0]
+    lines, total = [], sum(map(len, KNOBS.values()))
+    for name, settings in KNOBS.items():
+        truth, errors, seconds = again(name, FINEST[name]).speed, [], []
+        for value in settings:
+            start = time.process_time()
+            errors.append(abs(again(name, value).speed - truth))
+            seconds.append(time.process_time() - start)
+            if progress:
+                progress((sum(len(x["value"]) for x in lines) + len(errors)) / total)
+        slope = np.polyfit(np.log(settings), np.log(np.maximum(errors, 1e-15)), 1)[0] * (
+            1 if name == "rounding" else -1
+        )
+        lines.append(
+            {
+                "label": name,
+                "order": ORDERS[name],
+                "value": list(settings),
+                "error": errors,
+                "seconds": seconds,
+                "slope": float(slope),
+            }
+        )
+    return {
+        "scene": scene.name,
+        "speed": walks[0].speed,
+        "lines": lines,
+        "cheapest": [_cheapest(lines, t) for t in TOLERANCES],
+    }
+
+
+def _cheapest(lines, tolerance: float) -> dict:
+    """For each knob the coarsest setting from which on the error is within the tolerance, m/s; None if there is none."""
+    found = {}
+    for line in lines:
+        good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
+        found[line["label"]] = good[0] if good else None
+    return {"tolerance": float(tolerance), **found}
+
+
+def cost(scene: WalkerScene) -> Steps:
+    """Of `study`."""
+    shares = sum(v / scene.numerics.steps for v in (*KNOBS["steps"], FINEST["steps"]))
+    shares += sum(0.5 + v / 32 for v in (*KNOBS["elements"], FINEST["elements"])) + 2 * len(KNOBS["rounding"])
+    one = price(scene, settling=True)
+    return Steps(round(one.balances * shares / 2), one.seconds * shares / 2, BASE)
+
+
+def table(results: dict) -> str:
+    """The coarsest settings by tolerance, as plain text."""
+    names = [line["label"] for line in results["lines"]]
+    rows = [f"speed {results['speed']:.6g} m/s", "error (m/s) " + " ".join(f"{n:>10}" for n in names)]
+    for c in results["cheapest"]:
+        rows.append(f"{c['tolerance']:11.0e} " + " ".join(f"{'-' if c[n] is None else c[n]:>10}" for n in names))
+    return "\n".join(rows)
+
+
+def sentences(results: dict) -> list[str]:
+    """One sentence a knob: from its coarsest setting to the finest, and the measured order."""
+    out = []
+    for line in results["lines"]:
+        e, v = line["error"], line["value"]
+        sizes = f"error of the speed {e[0]:.1e} to {e[-1]:.1e} m/s"
+        out.append(
+            f"{line['label']} {v[0]:g} to {v[-1]:g}: {sizes} (measured order {line['slope']:.1f}; declared: {line['order']})."
+        )
+    return out
+
+
+def refuse_engine(scene: WalkerScene, by: str) -> None:
+    """SceneError unless there is such an engine here."""
+    with named(scene.name):
+        try:
+            engine(by)
+        except ImportError as error:
+            raise SceneError(f"the {by} engine is not installed: {error}") from None

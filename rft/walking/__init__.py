@@ -1,0 +1,21 @@
+"""Walking on grains: robots and their clocks, what computes how they walk, and wheels that are driven at a given slip."""
+
+from rft.walking.engines import ENGINES, Fineness, Walker, engine
+from rft.walking.robot import ROBOTS, Rhex, Robot, Roller, Tripod
+from rft.walking.stride import Walk
+from rft.walking.wheel import Rolling, rolling
+
+__all__ = [
+    "ENGINES",
+    "ROBOTS",
+    "Fineness",
+    "Rhex",
+    "Robot",
+    "Roller",
+    "Rolling",
+    "Tripod",
+    "Walk",
+    "Walker",
+    "engine",
+    "rolling",
+]

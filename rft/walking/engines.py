@@ -1,0 +1,85 @@
+"""What computes how robots walk, by name. An engine is one module and its name here."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from rft.media.base import check_ranges, in_range, require, shown
+from rft.vertical.effects import Aeration, GrainInertia, GroundEffect, checked, pressure, strength
+from rft.vertical.stress import PlateStress
+from rft.walking.robot import Robot, Tripod
+from rft.walking.stride import Walk
+
+
+@dataclass(frozen=True)
+class Walker:
+    """A robot, its clock and its ground. effects: aeration and grain inertia."""
+
+    robot: Robot
+    gait: Tripod
+    stress: PlateStress
+    effects: tuple[GroundEffect, ...] = ()
+
+    def __post_init__(self):
+        for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress)):
+            value = getattr(self, name)
+            require(isinstance(value, kind), f"{name} must be a {kind.__name__}, got {shown(value)}")
+        object.__setattr__(self, "effects", checked(self.effects))
+        for effect in self.effects:
+            good = isinstance(effect, Aeration | GrainInertia)
+            require(good, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
+
+    @property
+    def strength(self) -> float:
+        """Of the ground, times that of its map at zeta = 1."""
+        return self.stress.zeta * float(strength(self.effects, 0.0))
+
+    @property
+    def flux(self) -> float:
+        """lambda rho of the grains' inertia, kg/m^3: a face that leads with v_n feels lambda rho v_n^2 besides."""
+        return float(pressure(self.effects, 1.0))
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """steps: of a cycle. elements: of a leg's outline; the belly has as many. rounding: m/s, below which drag falls off in
+    proportion to speed. duration: s of walking from rest, at most."""
+
+    steps: int = 32
+    elements: int = 12
+    rounding: float = 3e-3
+    duration: float = 10.0
+
+    def __post_init__(self):
+        for name, low, high in (("steps", 8, 10_000), ("elements", 4, 1000)):
+            in_range(name, getattr(self, name), low, high, whole=True)
+            object.__setattr__(self, name, int(getattr(self, name)))
+        check_ranges(self, rounding=(1e-7, 0.1), duration=(1e-3, 1e4))
+
+
+class Engine(Protocol):
+    """A module with these two."""
+
+    def walk(self, walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
+        """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
+        ...
+
+    def again(
+        self, walkers: Sequence[Walker], numerics: Fineness, walks: Sequence[Walk], settling: int | None = None
+    ) -> list[Walk]:
+        """The speeds with other numerics, of walks that are known."""
+        ...
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name; ValueError for one that is not here."""
+    require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}, got {shown(name)}")
+    module = ENGINES[name]
+    require(module is not None, f"the {name} engine is not available here: use --engine planar")
+    return importlib.import_module(module)
+
+
+ENGINES = {"planar": "rft.walking.planar_walk", "mujoco": None}

@@ -1,0 +1,166 @@
+"""Robots of the vertical plane: a rigid body on legs that turn as they are told, and the clock that tells them.
+
+Signs are those of `rft.vertical.loads`: x forwards, z up, angles and rates about the y axis that points away, so a positive
+pitch has the nose down, and a leg that points down and turns at a positive rate drives the body forwards. SI units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from rft.media.base import check_ranges, in_range, real_array, require, shown
+from rft.vertical.outline import LARGEST, Outline, check_metres
+from rft.vertical.shapes import Polygon, Shape
+
+MOST_HIPS = 20
+MASSES = (1e-6, 1e4)  # kg
+INERTIAS = (1e-12, 1e5)  # kg m^2
+FREQUENCIES = (1e-3, 200.0)  # Hz
+
+
+@dataclass(frozen=True)
+class Tripod:
+    """The clock of a leg (RHex): for a share ``duty`` of the cycle it turns by ``sweep``, in the middle of which its angle is
+    ``middle``, for the rest by what a whole turn lacks. 0 is straight down from the body; as it stands, a constant rate.
+
+    frequency: turns a second, Hz. sweep, middle: radians. The legs at a hip are half a cycle apart.
+    """
+
+    frequency: float
+    duty: float = 0.5
+    sweep: float = math.pi
+    middle: float = 0.0
+    angles = ("sweep", "middle")
+
+    def __post_init__(self):
+        low, high = FREQUENCIES
+        told = f"frequency must be a number from {low:g} to {high:g} turns a second (Hz), got {shown(self.frequency)}"
+        try:
+            in_range("frequency", self.frequency, low, high)
+        except ValueError:
+            raise ValueError(told) from None
+        check_ranges(self, duty=(0.01, 0.99), middle=(-math.pi, math.pi))
+        most = 2 * math.pi - 0.01
+        require(
+            not isinstance(self.sweep, str | bytes | bool),
+            f"sweep must be a number from 0.01 to {most:.2f} rad, got {shown(self.sweep)}",
+        )
+        in_range("sweep", self.sweep, 0.01, most)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Phases, of the first half of the cycle, at which a leg of either tripod changes its rate, with both ends."""
+        if abs(self.sweep - 2 * math.pi * self.duty) < 1e-12:
+            return 0.0, 0.5
+        first = min(self.duty, 1.0 - self.duty) / 2
+        return (0.0, first, 0.5) if abs(first - 0.25) < 1e-12 else (0.0, first, 0.5 - first, 0.5)
+
+    def angle(self, phase, of):
+        """Of a leg at ``phase`` (cycles), by the rate that holds at the phase ``of``, on whose side of a kink it is."""
+        turns = np.floor(np.asarray(of) + 0.5)
+        place, there = np.asarray(phase) - turns, np.asarray(of) - turns  # of the second, -0.5 to 0.5
+        half = self.duty / 2
+        slow = self.sweep / self.duty * place
+        fast = np.sign(there) * math.pi + self._fast * (place - np.sign(there) * 0.5)
+        return self.middle + 2 * math.pi * turns + np.where(np.abs(there) <= half, slow, fast)
+
+    def rate(self, of):
+        """rad a cycle, at the phase ``of``."""
+        there = np.asarray(of) - np.floor(np.asarray(of) + 0.5)
+        return np.where(np.abs(there) <= self.duty / 2, self.sweep / self.duty, self._fast)
+
+    @property
+    def _fast(self) -> float:
+        return (2 * math.pi - self.sweep) / (1.0 - self.duty)
+
+
+class Robot:
+    """Base of robots. legs: the outline they share turns about the origin of its frame, or a point ``axle`` above that.
+    mass: kg. inertia: kg m^2, infinite for one that keeps its pitch. hips: x of each from the centre of mass, m."""
+
+    mass: float
+    legs: Shape
+    axle: float
+    apart: ClassVar[tuple[float, ...]]  # phases of the legs at a hip
+    period: ClassVar[float]  # cycles after which the robot looks the same
+
+    def leg(self, elements: int) -> Outline:
+        """The outline of a leg about its hip."""
+        outline = self.legs.outline(elements)
+        return Outline(outline.points - [0.0, self.axle], outline.width, outline.bends) if self.axle else outline
+
+    def belly(self, elements: int) -> Outline | None:
+        """The outline of the body, if it can touch the ground."""
+        return None
+
+    def _check(self) -> None:
+        check_ranges(self, mass=MASSES)
+        require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {shown(self.legs)}")
+        check_metres(self, "axle", low=-LARGEST)
+
+
+@dataclass(frozen=True)
+class Rhex(Robot):
+    """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
+
+    length, height, width: of the box about the centre of mass, m. hip_height: of the hips above it. inertia: that of the box
+    where none is given.
+    """
+
+    mass: float
+    length: float
+    height: float
+    width: float
+    legs: Shape
+    hips: tuple[float, ...]
+    hip_height: float = 0.0
+    inertia: float | None = None
+    axle: float = 0.0
+    apart = (0.0, 0.5)
+    period = 1.0
+
+    def __post_init__(self):
+        self._check()
+        check_metres(self, "length", "height", "width")
+        check_metres(self, "hip_height", low=-LARGEST)
+        hips = real_array("hips", self.hips)
+        require(hips.ndim == 1, f"hips must be a list of x in m, got {shown(self.hips)}")
+        require(
+            0 < len(hips) <= MOST_HIPS, f"a robot without legs: hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}"
+        )
+        within = bool((np.abs(hips) <= self.length).all())
+        require(within, f"hips must be within a body length, {self.length:g} m, of the centre of mass (in m)")
+        object.__setattr__(self, "hips", tuple(map(float, hips)))
+        if self.inertia is None:
+            object.__setattr__(self, "inertia", self.mass * (self.length**2 + self.height**2) / 12)
+        check_ranges(self, inertia=INERTIAS)
+
+    def belly(self, elements: int) -> Outline:
+        x, z = self.length / 2, self.height / 2
+        return Polygon(((-x, -z), (x, -z), (x, z), (-x, z)), self.width).outline(elements)
+
+
+@dataclass(frozen=True)
+class Roller(Robot):
+    """A wheel, or whatever turns, on an axle that is kept level: a mass that moves forwards and up and down, driven by its own
+    weight. mass: of all that the wheel carries."""
+
+    mass: float
+    legs: Shape
+    axle: float = 0.0
+    hips = (0.0,)
+    hip_height = 0.0
+    inertia = math.inf
+    height = 0.0
+    apart = (0.0,)
+    period = 1.0
+
+    def __post_init__(self):
+        self._check()
+
+
+ROBOTS = {"rhex": Rhex, "wheel": Roller}

@@ -1,0 +1,362 @@
+"""Walking robots: the clock, the engine against independent sums, its order and energy, limit cycles, ends, commands."""
+
+import dataclasses
+import json
+import math
+import sys
+import types
+
+import numpy as np
+import pytest
+from scipy.io import netcdf_file
+
+from geomech import cli
+from geomech import scene as scenes
+from geomech.errors import SceneError
+from geomech.scene import WalkerScene
+from geomech.study import walking
+from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
+from rft.vertical.effects import Aeration, GrainInertia, Slope, folded
+from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
+from rft.walking.planar import GRAVITY, State
+from rft.walking.planar_walk import _strides, again, walk
+from rft.walking.stride import from_rest, limit_cycle
+
+SAND = StressMap(zeta=0.3, grazing=math.radians(5))
+ROBOT = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.06), hip_height=-0.004, axle=0.002)
+QUICK = Fineness(steps=16, elements=8, duration=2.0)
+XPLORER = scenes.load("xplorer")
+
+
+def xplorer(curvature=1.0, frequency=2.0, **changes):
+    legs = dataclasses.replace(XPLORER.robot.legs, relative_curvature=curvature)
+    robot = dataclasses.replace(XPLORER.robot, legs=legs, **changes)
+    return Walker(robot, Tripod(frequency), XPLORER.medium)
+
+
+@pytest.mark.parametrize("gait", [Tripod(2.0), Tripod(1.3, 0.4, 1.1, 0.3), Tripod(0.7, 0.7, 2.0, -0.2)])
+def test_the_clock_turns_once_a_cycle_and_sweeps_while_it_stands(gait):
+    phase = np.linspace(-1.3, 2.1, 3401)
+    angle = gait.angle(phase, phase)
+    assert np.abs(np.diff(angle)).max() < 1.001e-3 * max(gait.rate(0.0), gait.rate(0.5))  # no jump, whatever the cycle
+    np.testing.assert_allclose(gait.angle(phase + 1, phase + 1) - angle, 2 * np.pi, atol=1e-12)
+    half = gait.duty / 2 - 1e-12
+    assert gait.angle(half, half) - gait.angle(-half, -half) == pytest.approx(gait.sweep, abs=1e-9)
+    assert gait.angle(0.0, 0.0) == pytest.approx(gait.middle)
+    inside = (phase[1:] + phase[:-1]) / 2
+    same = (np.abs((phase[:-1] + 0.5) % 1 - 0.5) < gait.duty / 2) == (
+        np.abs((phase[1:] + 0.5) % 1 - 0.5) < gait.duty / 2
+    )
+    np.testing.assert_allclose((np.diff(angle) / np.diff(phase))[same], gait.rate(inside)[same], rtol=1e-6)
+    kinks = gait.kinks[1:-1]
+    jumps = [k for k in np.linspace(0.001, 0.499, 499) if abs(gait.rate(k - 6e-4) - gait.rate(k + 6e-4)) > 1e-9]
+    assert all(min(abs(k - x) for x in kinks) < 1.2e-3 for k in jumps)
+
+
+def test_forces_are_the_sum_over_legs_and_belly():
+    """Leg by leg through the public loads; at 30 m/s the rounding is of no account."""
+    effects = (GrainInertia(0.5, 300.0),)
+    walker = Walker(ROBOT, Tripod(1.3, 0.4, 1.1), dataclasses.replace(SAND, grazing=1e-9), effects)
+    robots = _strides([walker], dataclasses.replace(QUICK, rounding=1e-7)).robots
+    pose, twist, phase = np.array([0.3, 0.006, 0.15]), np.array([12.0, -25.0, -40.0]), 0.17
+    angle, rate = robots.turned(np.array([phase]), phase)
+    a, motors, ground = robots.forces(pose[None, None], twist[None, None], angle, rate)
+    ground_now, wrench, motor, into = folded(walker.stress, effects), np.zeros(3), 0.0, 0.0
+    places = [(x, ROBOT.hip_height, at) for x in ROBOT.hips for at in (0.0, 0.5)]
+    parts = [(ROBOT.leg(8), x, z, at) for x, z, at in places] + [(ROBOT.belly(8), 0.0, 0.0, None)]
+    for outline, x, z, at in parts:
+        phi, turn = (
+            (0.0, 0.0)
+            if at is None
+            else (walker.gait.angle(phase + at, phase + at), 1.3 * walker.gait.rate(phase + at))
+        )
+        cos, sin = math.cos(pose[2]), math.sin(pose[2])
+        r = cos * x + sin * z, cos * z - sin * x
+        v = twist[0] + twist[2] * r[1], twist[1] - twist[2] * r[0]
+        found = loads(ground_now, outline, [r[0], pose[1] + r[1], pose[2] + phi], [*v, twist[2] + turn])
+        wrench += [*found.force, found.moment + r[1] * found.force[0] - r[0] * found.force[1]]
+        motor -= found.moment * turn
+        into -= found.force @ v + found.moment * (twist[2] + turn)
+    assert np.abs(wrench).min() > 0.1
+    np.testing.assert_allclose(a[0, 0], wrench / [0.2, 0.2, ROBOT.inertia] - [0, GRAVITY, 0], rtol=1e-6)
+    assert (motors[0, 0], ground[0, 0]) == pytest.approx((motor, into), rel=1e-6)
+
+
+def fall(steps: int, time: float = 0.12) -> tuple[State, State, object]:
+    """Xplorer at 4 Hz for a while from rest."""
+    robots = _strides([xplorer(frequency=4.0)], QUICK).robots
+    state = first = robots.placed()
+    for k in range(steps):
+        half = 4.0 * time / steps
+        state = robots.step(state, np.array([k * half]), (k + 0.5) * half, np.array([time / steps]))
+    return first, state, robots
+
+
+def test_steps_are_of_order_two_and_energy_is_kept_to_that():
+    """Motors' work = loss in the ground + change of the body's energy."""
+    finest = fall(512)[1]
+    errors, audits = [], []
+    for steps in (16, 32, 64):
+        first, last, robots = fall(steps)
+        errors.append(np.abs(last.pose - finest.pose).max() / np.abs(finest.pose).max())
+        audits.append(abs(last.work - last.loss - robots.energy(last) + robots.energy(first))[0] / last.work[0])
+    for values in (errors, audits):
+        slope = -np.polyfit(np.log([16, 32, 64]), np.log(values), 1)[0]
+        assert slope > 1.7, values
+    assert errors[-1] < 2e-3 and audits[-1] < 2e-3
+
+
+def test_what_falls_free_falls_as_galilei_says():
+    robots = _strides([Walker(ROBOT, Tripod(2.0), SAND)], QUICK).robots
+    state = robots.placed()
+    state = state._replace(pose=state.pose + [0, 5.0, 0], twist=np.array([[0.3, 1.0, 0.7]]))
+    for k in range(10):
+        state = robots.step(state, np.array([0.02 * k]), 0.02 * k + 0.01, np.array([0.01]))
+    z = -robots.placed().pose[0, 1]
+    assert state.pose[0, 0] == pytest.approx(0.03, abs=1e-9)
+    assert state.pose[0, 1] + z == pytest.approx(5.0 + 0.1 - GRAVITY * 0.01 / 2, abs=1e-4)
+    assert (state.pose[0, 2], state.work[0], state.loss[0]) == pytest.approx((0.07, 0.0, 0.0))
+
+
+def test_the_limit_cycle_is_that_of_many_strides():
+    walkers = [xplorer(c, f) for c, f in ((1.0, 2.0), (0.3, 3.0))]
+    strides = _strides(walkers, QUICK)
+    _, told, _, _ = from_rest(strides, 12 / strides.frequency)
+    state = State(*(np.stack([rows[2][-1][s] for rows in told]) for s in (slice(1, 4), slice(4, 7), 7, 8)))
+    _, progress, _, periodic, done, ends = limit_cycle(_strides(walkers, QUICK), state)
+    long = [rows[-1][-1, 1] - rows[-2][-1, 1] for rows in told]
+    assert periodic.all() and (ends == "").all() and (done < 8).all()
+    np.testing.assert_allclose(progress, long, rtol=2e-3)
+
+
+def test_robots_side_by_side_walk_as_alone():
+    walkers = [xplorer(1.0, 2.0), xplorer(0.5, 3.0, mass=0.2)]
+    walkers.append(dataclasses.replace(walkers[0], effects=(Aeration(0.1, 0.4), GrainInertia())))
+    together = walk(walkers, QUICK, 2)
+    for w, one in zip(walkers, together):
+        alone = walk([w], QUICK, 2)[0]
+        assert alone.status == one.status
+        np.testing.assert_allclose(one.pose[-1], alone.pose[-1], atol=1e-5)
+        assert one.speed == pytest.approx(alone.speed, abs=2e-4)
+    assert len({round(w.speed, 3) for w in together}) == 3
+
+
+def test_every_end_has_its_status_and_no_nan():
+    still = dataclasses.replace(scenes.load("sandbot").robot, axle=0.0)
+    long = dataclasses.replace(XPLORER.robot, hips=(-0.06,), legs=CLeg(0.05, 0.01))
+    light = dataclasses.replace(XPLORER.robot, mass=0.03, inertia=0.01)  # and slapped by fast legs
+    cases = {
+        "sunk": Walker(XPLORER.robot, Tripod(2.0), StressMap(zeta=0.005)),
+        "stuck": Walker(still, Tripod(0.6), XPLORER.medium),
+        "flipped": Walker(long, Tripod(4.0), XPLORER.medium),
+        "airborne": Walker(light, Tripod(20.0, 0.2, 3.0), XPLORER.medium, (GrainInertia(4.0),)),
+        "walking": Walker(Roller(2.0, Wheel(0.1, 0.1, 12, 0.015, 0.006)), Tripod(1.0, 0.3, 1.0), XPLORER.medium),
+    }
+    for status, walker in cases.items():
+        found = walk([walker], QUICK, 2)[0]
+        assert found.status == status
+        for values in found[:8]:
+            if not isinstance(values, str):
+                assert np.isfinite(values).all(), status
+        more = again([walker], dataclasses.replace(QUICK, steps=12), [found], 2)[0]
+        assert math.isfinite(more.speed)
+
+
+def test_the_estimate_covers_the_error():
+    scene = dataclasses.replace(XPLORER, numerics=QUICK)
+    one = walking.walked([scene], settling=True)[0]
+    truth = again([scene.walker], dataclasses.replace(QUICK, steps=64, elements=32), [one.walk], 2)[0].speed
+    assert abs(one.walk.speed - truth) < one.estimate < 0.15 * truth
+
+
+def test_trends_of_figure_12():
+    """Xplorer is faster at higher frequency, on c-legs than on flat ones, on flat than on reversed ones; SandBot slower with
+    more air, and at last no walker."""
+    shapes, frequencies, coarse = (1.0, 0.0, -1.0), (1.0, 3.0), Fineness(steps=12, elements=6)
+    speed = np.array([w.speed for w in walk([xplorer(c, f) for c in shapes for f in frequencies], coarse, 1)]).reshape(
+        3, 2
+    )
+    assert (np.diff(speed, axis=1) > 0.03).all()
+    assert (np.diff(speed, axis=0) < 0).all()
+    sandbot = scenes.load("sandbot")
+    air = [Aeration(u, 0.25) for u in (0.0, 0.12, 0.24)]
+    found = walk([Walker(sandbot.robot, Tripod(w), sandbot.medium, (a,)) for w in (0.4, 1.2) for a in air], coarse, 1)
+    speed = np.array([w.speed for w in found]).reshape(2, 3)
+    assert (np.diff(speed, axis=1) < -0.01).all() and (speed[1] > speed[0])[:2].all()
+    assert {found[2].status, found[5].status} <= {"sunk", "stuck"}
+
+
+def test_a_wheel_bears_its_load_and_pulls_more_the_more_it_slips():
+    stress, wheel, slip = VERTICAL["poppy-seeds-loose"].stress, Wheel(0.1, 0.08), np.linspace(0.0, 0.8, 5)
+    found = rolling(stress, wheel, 15.0, 2.0, slip)
+    for k, i in enumerate(slip):
+        pose, twist = [0.0, 0.1 - found.sinkage[k], 0.3], [(1 - i) * 0.2, 0.0, 2.0]
+        one = loads(stress, wheel.outline(100), pose, twist)
+        assert (*one.force, -one.moment) == pytest.approx((found.pull[k], 15.0, found.torque[k]), rel=2e-3)
+    assert (np.diff(found.pull) > 0).all() and found.pull[0] < 0 < found.pull[-1]
+    np.testing.assert_allclose(
+        rolling(stress, wheel, 15.0, 50.0, slip).pull, found.pull, rtol=1e-9
+    )  # no rate without inertia
+    slow, fast = (rolling(stress, wheel, 15.0, w, slip, [GrainInertia()]) for w in (0.1, 50.0))
+    np.testing.assert_allclose(slow.sinkage, found.sinkage, rtol=1e-3)
+    assert (fast.sinkage < 0.98 * found.sinkage).all()
+    lugs = rolling(stress, Wheel(0.1, 0.08, 12, 0.01, 0.005), 15.0, 2.0, 0.3)
+    assert lugs.pull > 2 * np.interp(0.3, slip, found.pull)
+    assert np.isnan(rolling(stress, wheel, 1e5, 2.0, 0.3).sinkage)
+    with pytest.raises(ValueError, match="slip must be"):
+        rolling(stress, wheel, 15.0, 2.0, math.nan)
+    with pytest.raises(ValueError, match="has no radius"):
+        rolling(stress, scenes.load("square-rod").intruder, 15.0, 2.0, 0.1)
+
+
+@pytest.fixture
+def geomech(tmp_path, monkeypatch, capsys):
+    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*args):
+        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err
+
+    return run
+
+
+SMALL = XPLORER.text + "\n[numerics]\nsteps = 16\nelements = 8\nduration = 2.0\n"
+
+
+def test_walk_as_a_command(geomech, tmp_path):
+    (tmp_path / "small.toml").write_text(SMALL)
+    code, out, err = geomech("walk", "small.toml", "--json", "-o", "out", "--animate", "walk.png")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert list(found)[:8] == ["speed", "status", "t", "x", "z", "pitch", "cycles", "estimate"]
+    t, x = np.array(found["t"]), np.array(found["x"])
+    assert t[0] == 0 and t[-1] == pytest.approx(2.0) and found["status"] == "walking"
+    late = np.searchsorted(t, [1.0, 2.0 - 1e-9])
+    assert np.diff(x[late])[0] / np.diff(t[late])[0] == pytest.approx(found["speed"], rel=0.01)
+    assert 0 < found["estimate"] < 0.1 * found["speed"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"walk.csv", "walk.json", "walk.txt", "walk.png"}
+    assert (tmp_path / "walk.png").stat().st_size > 10_000
+    table = np.genfromtxt(tmp_path / "out" / "walk.csv", delimiter=",", names=True)
+    work, loss, energy = (np.diff(table[name][late])[0] for name in ("work", "loss", "energy"))
+    assert work - loss == pytest.approx(energy, abs=0.1 * work) and work > 0.1
+    np.testing.assert_allclose(np.gradient(table["x"], table["t"])[5:-5], table["v_x"][5:-5], atol=0.06)
+
+
+def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
+    (tmp_path / "small.toml").write_text(
+        SMALL.replace("steps = 16", "steps = 10").replace("elements = 8", "elements = 6")
+    )
+    over = ["--over", "robot.legs.relative_curvature=1", "--over", "gait.frequency=2,3"]
+    code, out, err = geomech("sweep", "small.toml", *over, "-o", "s.nc", "--plot", "s.png")
+    assert (code, err) == (0, "") and "2 points (2 walking)" in out
+    with netcdf_file(tmp_path / "s.nc", mmap=False) as file:
+        speed = file.variables["speed"][:]
+        assert file.variables["gait_frequency"][:].tolist() == [2, 3] and speed.shape == (1, 2)
+        assert (np.diff(speed, axis=1) > 0).all() and (file.variables["status"][:] == 0).all()
+    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 16), "elements": (4, 6), "rounding": (8e-3, 4e-3)})
+    monkeypatch.setattr(walking, "FINEST", {"steps": 24, "elements": 12, "rounding": 2e-3})
+    code, out, err = geomech("accuracy", "small.toml", "-o", "acc", "--json")
+    assert (code, err) == (0, "")
+    lines = {line["label"]: line for line in json.loads(out)["lines"]}
+    assert list(lines) == ["steps", "elements", "rounding"]
+    assert all(line["error"][-1] < 0.05 for line in lines.values())
+
+
+WRONG = {
+    "kind = \"rhex\"": ("kind = \"rex\"", "did you mean 'rhex'"),
+    "frequency = 2.0 ": ("frequency = 0 ", "frequency must be a number from 0.001 to 200 turns a second (Hz), got 0"),
+    "mass = 0.15 ": ("mass = -1 ", "mass must be a number"),
+    "length = 0.13 ": ("length = 130 ", "length must be a number from 1e-06 to 10 m"),
+    "hips = [-0.05, 0.0, 0.05]": ("hips = []", "a robot without legs"),
+    "height = 0.03 ": ("heigth = 0.03 ", "did you mean 'height'"),
+    "radius = 0.0205 ": ("radius = 20.5 ", "radius must be a number from 1e-06 to 10 m"),
+    "[gait]": ("[gate]", "did you mean 'gait'"),
+    "sweep_deg = 180": ("sweep_deg = 400", "sweep must be a number"),
+    "width = 0.01 ": ("", "width"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("right", WRONG)
+def test_what_makes_no_robot_is_refused_with_one_line(right, geomech, tmp_path):
+    wrong, said = WRONG[right]
+    assert right in SMALL
+    (tmp_path / "bad.toml").write_text(SMALL.replace(right, wrong + " # " if right != "[gait]" else wrong))
+    code, out, err = geomech("walk", "bad.toml")
+    assert (code, out) == (2, "") and err.count("\n") == 1 and err.startswith("error: ") and said in err, err
+
+
+def test_other_refusals(geomech, tmp_path):
+    legless = SMALL[: SMALL.index("[robot.legs]")] + SMALL[SMALL.index("[gait]") :]
+    (tmp_path / "bad.toml").write_text(legless)
+    (tmp_path / "small.toml").write_text(SMALL)
+    for args, said in (
+        (("walk", "bad.toml"), "a robot without legs: add the table [robot.legs]"),
+        (("walk", "small.toml", "--engine", "mujoco"), "the mujoco engine is not"),
+        (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
+        (("walk", "three-link-glass"), "does not walk"),
+        (("walk", "small.toml", "--animate", "film.avi"), "end the name in"),
+        (("walk", "small.toml", "-o", ""), "empty name"),
+        (("displacement", "xplorer", "--amplitudes", "1"), "no shape space"),
+        (("intrude", "xplorer"), "no [intruder]"),
+        (("sweep", "xplorer", "--over", "gait.frequency=0,1", "-o", "s.nc"), "frequency must be"),
+        (("sweep", "xplorer", "--over", "robot.legs.radios=1", "-o", "s.nc"), "radios"),
+        (("sweep", "sandbot", "--over", "effects.aeration.air_speed=0.3", "-o", "s.nc"), "fluidised"),
+    ):
+        code, out, err = geomech(*args)
+        assert (code, out) == (2, "") and err.count("\n") == 1 and said in err, err
+    with pytest.raises(ValueError, match="takes the effects aeration and grain-inertia, not slope"):
+        Walker(ROBOT, Tripod(1.0), SAND, (Slope(0.1),))
+    with pytest.raises(ValueError, match="a robot without legs"):
+        dataclasses.replace(ROBOT, legs=None)
+    with pytest.raises(ValueError, match="engine must be one of"):
+        engine(3)
+
+
+@pytest.mark.parametrize("name", scenes.walker_names())
+def test_a_walker_written_is_the_walker_read(name):
+    scene = scenes.load(name)
+    assert isinstance(scene, WalkerScene) and scenes.toml(scene) == scene.text
+    anew = dataclasses.replace(scene, text="", medium=dataclasses.replace(scene.medium, zeta=0.8))
+    assert scenes.parse(scenes.toml(anew), name) == anew
+    assert scenes.inputs(scene) == []
+    with pytest.raises(SceneError, match="numerics must be Fineness"):
+        dataclasses.replace(scene, numerics=3)
+
+
+def test_an_eccentric_wheel_is_a_leg():
+    rod = dataclasses.replace(ROBOT, legs=RoundRod(0.02, 0.01), axle=0.015)
+    np.testing.assert_allclose(rod.leg(20).points, RoundRod(0.02, 0.01).outline(20).points - [0, 0.015])
+
+
+def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
+    from figures import fig12_walking, walking_sensitivity, walking_steps, wheel
+    from geomech.output import plots
+
+    coarse = Fineness(steps=12, elements=6, duration=1.0)
+    for module in (fig12_walking, walking_sensitivity, walking_steps):
+        monkeypatch.setattr(module, "load", lambda name: dataclasses.replace(scenes.load(name), numerics=coarse))
+    told = types.SimpleNamespace(walk=types.SimpleNamespace(speed=0.1, status="stuck"), estimate=0.01)
+    many = types.SimpleNamespace(walked=lambda some, settling: [told for _ in some])
+    monkeypatch.setattr(walking_sensitivity, "walking", many)
+    made = {
+        fig12_walking: fig12_walking.compute([1.0], [3.0], [4.0], [0.0]),
+        walking_sensitivity: walking_sensitivity.compute(),
+        walking_steps: walking_steps.compute({"implicit": (16, 32), "explicit": (64,)}, 48, (3.0,)),
+        wheel: wheel.compute(slips=4),
+    }
+    for module, numbers in made.items():
+        plots.save(module.draw(numbers), tmp_path / "figure.png")
+        assert (tmp_path / "figure.png").stat().st_size > 10_000
+    assert "1" in fig12_walking.table(made[fig12_walking])
+    sandbot = scenes.load("sandbot")
+    wide = [walking_sensitivity.varied(sandbot, name, 1.4) for name in walking_sensitivity.NAMES]
+    assert all(a != b for a, b in zip(wide, [sandbot, *wide]))
+    assert wide[0].robot.axle == pytest.approx(1.4 * sandbot.robot.axle)
+    (_, _, left), (_, _, chattering) = made[walking_steps][3.0].values()
+    assert left[-1] < 0.02 and (chattering > 0).all()
+    smooth, lugs = made[wheel]["found"].values()
+    assert smooth[60.0].pull[2] < smooth[0.0].pull[2] < lugs[0.0].pull[2] < lugs[60.0].pull[2]
