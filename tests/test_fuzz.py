@@ -1,5 +1,6 @@
 """Thousands of mutated scenes: every one is run, or refused with one clear line."""
 
+import functools
 import re
 
 import numpy as np
@@ -28,6 +29,11 @@ EFFECTS = [
     'kind = "skin-friction"\nforward = 0.1',
 ]  # fmt: skip
 TABLES = ["[medium]", "[body]", "[gait]", "[numerics]", "[[medium]]", "[x]", "[", "]"]
+
+
+@functools.cache
+def text_of(name):
+    return scenes.load(name).text
 
 
 def with_effects(text, rng):
@@ -86,7 +92,7 @@ def outcome(text):
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_scenes_are_run_or_refused(seed):
     rng, names = np.random.default_rng(seed), scenes.builtin_names()
-    texts = [mutated(with_effects(scenes.load(names[rng.integers(len(names))]).text, rng), rng) for _ in range(800)]
+    texts = [mutated(with_effects(text_of(names[rng.integers(len(names))]), rng), rng) for _ in range(800)]
     seen = [outcome(text) for text in texts]
     assert seen.count("run") + seen.count("marched") > 50
     assert seen.count("marched") > 10

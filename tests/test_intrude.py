@@ -153,7 +153,8 @@ def test_a_medium_that_drives_a_motion_on_is_told(geomech, tmp_path):
 def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     scene = scenes.load(name)
     assert isinstance(scene, IntruderScene)
-    code, out, err = geomech("intrude", name, "--json", "-o", "out.csv", "--plot", "out.png")
+    plot = ("--plot", "out.png") if name in ("c-leg", "half-cylinder") else ()  # one that turns, one that does not
+    code, out, err = geomech("intrude", name, "--json", "-o", "out.csv", *plot)
     assert (code, err) == (0, "")
     found = json.loads(out)
     place = ["angle"] if "leg" in name else ["x", "z"]
@@ -167,7 +168,7 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     assert list(rows[0]) == list(found)
     for key, values in found.items():
         assert [float(row[key]) for row in rows] == values
-    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+    assert not plot or (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
     code, out, err = geomech("intrude", name)
     assert (code, err) == (0, "") and "work     -" in out and "power at most" in out
     assert name in geomech("scenes")[1]

@@ -11,10 +11,11 @@ import pytest
 
 from geomech import cli, kinds
 from geomech.errors import SceneError
-from geomech.scene import builtin_names, from_tables, load, parse
+from geomech.scene import builtin_names, from_tables, intruder_keys, intruder_names, load, parse
 from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
 from geomech.scene.read import TABLES
 from rft import CATALOGUE
+from rft.vertical import VERTICAL
 
 EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
 ROOT = pathlib.Path(__file__).parents[1]
@@ -111,7 +112,7 @@ def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
         assert code == 0
         assert re.search(r'law = "power"\n  power +number +- +required +of the speed.*\n.*ratio +number +- +3.0', out)
         made = json.loads(run(capsys, "keys", "--json-schema", "--plugin", str(path))[1])
-        assert {"const": "power"} in [x["properties"].get("law") for x in made["properties"]["medium"]["oneOf"]]
+        assert {"const": "power"} in [x["properties"].get("law") for x in made["$defs"]["gaits"]["medium"]["oneOf"]]
     finally:
         family.pop("power", None)
 
@@ -128,7 +129,7 @@ def tables(name):
     return tomllib.loads(load(name).text)
 
 
-@pytest.mark.parametrize("name", builtin_names())
+@pytest.mark.parametrize("name", builtin_names() + intruder_names())
 def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
     scene = tables(name)
     assert valid(scene)
@@ -140,7 +141,8 @@ def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
                 assert not both(valid, scene, table, k, {**part, key: {"a": 1}})
                 assert not both(valid, scene, table, k, {**part, key: True if key != "reverse" else 1})
             if kind := {"kind", "law", "name"} & {*part}:
-                assert not both(valid, scene, table, k, {x: v for x, v in part.items() if x not in kind})
+                bare = both(valid, scene, table, k, {x: v for x, v in part.items() if x not in kind})
+                assert bare == (table == "medium" and "intruder" in scene)  # then it is the generic set
 
 
 def both(valid, scene, table, k, part):
@@ -199,6 +201,65 @@ def test_the_schema_agrees_with_the_reader(toml, good, valid):
             parse(scene)
 
 
+NINE = "A00 = 1\nA10 = 1\nB11 = 1\nB01 = 1\nBm11 = 1\nC11 = 1\nC01 = 1\nCm11 = 1\nD10 = 1"
+PLATE, STEP = 'kind = "plate"\nlength = 0.1\nwidth = 0.1', 'kind = "drag"\ndepth = 0.1'
+
+
+@pytest.mark.parametrize(
+    ("medium", "intruder", "motion", "more", "good"),
+    [
+        ("", PLATE, STEP, "", True),
+        (NINE, PLATE, STEP, "", True),
+        (NINE.replace("m1", "-1"), PLATE + "\ntilt_deg = 10", STEP, "[numerics]\nelements = 20", True),
+        (NINE.replace("A10 = 1", ""), PLATE, STEP, "", False),
+        (NINE + "\nB-11 = 1", PLATE, STEP, "", False),
+        (NINE + '\nname = "generic"', PLATE, STEP, "", False),
+        ("A00 = 1\nname = 'generic'", PLATE, STEP, "", False),
+        ('name = "glass-3mm"\nzeta = 2\ntension = "cut"\ngrazing_deg = 0', PLATE, STEP, "", True),
+        ('name = "glass-3mm"\ngrazing_deg = 0\ngrazing = 0', PLATE, STEP, "", False),
+        ('name = "glass-0.3mm-loose"', PLATE, STEP, "", False),
+        ('law = "coulomb"', PLATE, STEP, "", False),
+        ("", PLATE + "\ntilt = 1\ntilt_deg = 1", STEP, "", False),
+        ("", 'kind = "polygon"\nwidth = 1\npoints = [[0, 0], [1, 0], [0, 1]]', STEP, "", True),
+        ("", 'kind = "polygon"\nwidth = 1', STEP, "", False),
+        ("", 'kind = "spline"\nwidth = 1\nfile = "a.csv"\npoints = [[0, 0], [1, 0], [0, 1]]', STEP, "", False),
+        ("", PLATE, 'kind = "csv"', "", False),
+        ("", PLATE, STEP, "[numerics]\nphases = 20", False),
+        ("", PLATE, STEP, '[gait]\nkind = "circle"', False),
+        ("", None, STEP, "", False),
+        ("", PLATE, None, "", False),
+    ],
+)
+def test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion, more, good, valid):
+    parts = {"medium": medium, "intruder": intruder, "motion": motion}
+    scene = "\n".join(f"[{name}]\n{part}" for name, part in parts.items() if part is not None) + f"\n{more}"
+    assert valid(tomllib.loads(scene)) == good
+    if good:
+        parse(scene)
+    else:
+        with pytest.raises(SceneError):
+            parse(scene)
+
+
+def test_keys_of_intruders_are_told(capsys):
+    """Each with a type, a unit and a meaning, in the section that it has in a scene file."""
+    whole = run(capsys, "keys")[1]
+    for section, parts in intruder_keys.sections().items():
+        code, out, err = run(capsys, "keys", section)
+        assert (code, err) == (0, "")
+        for part in parts:
+            assert part.title in out and part.title in whole
+            block = out.partition(part.title + "\n")[2].partition("\n\n")[0]
+            for key in part.keys:
+                assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} +\S+ +.*[a-z]", block, re.M), (
+                    key.name
+                )
+                assert key.type != "value" and key.unit, f"{part.title} {key.name}: say it as name (unit): meaning"
+    assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
+    assert re.search(r"\n  B-11 +number +N/cm\^3 +none +of a sine of alpha_z", whole)
+    assert re.search(r"\n  elements +whole number +- +100 ", run(capsys, "keys", "numerics")[1])
+
+
 def test_systems_and_sizes_given_once_are_valid(valid):
     gait = '[gait]\nkind = "circle"\n'
     inside = '[system.medium]\nlaw = "coulomb"\n[system.body]\nkind = "chain"\n'
@@ -212,6 +273,9 @@ def test_systems_and_sizes_given_once_are_valid(valid):
         assert valid(tomllib.loads(scene))
     for medium in ('file = "sand.toml"', 'law = "table"\nfile = "drag.csv"'):
         assert valid(tomllib.loads(f'[medium]\n{medium}\n[body]\nkind = "chain"\n{gait}'))
+    for medium, path in (('file = "sand.toml"', 'kind = "csv"\nfile = "path.csv"'), ('file = "drag.csv"', STEP)):
+        shape = 'kind = "spline"\nfile = "points.csv"\nwidth = 1'
+        assert valid(tomllib.loads(f"[medium]\n{medium}\n[intruder]\n{shape}\n[motion]\n{path}"))
     assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snake"\nlengths = [1, 2]\n{gait}'))
     assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snak"\n{gait}'))
     assert not valid(tomllib.loads('[system]\nkind = "no-slip-snake"\n'))
@@ -226,3 +290,13 @@ def test_named_media_are_shown_as_a_table_that_makes_them(name, capsys):
     said = " ".join(line.lstrip("# ") for line in out.splitlines() if line.startswith("#"))
     assert CATALOGUE[name].source in said
     assert run(capsys, "scenes", "--show", name + "x")[0] == 2
+
+
+@pytest.mark.parametrize("name", VERTICAL)
+def test_media_of_intruders_are_shown_as_a_table_that_makes_them(name, capsys, valid):
+    code, out, err = run(capsys, "scenes", "--show", name)
+    assert (code, err) == (0, "")
+    scene = f"{out}[intruder]\n{PLATE}\n[motion]\n{STEP}\n"
+    assert parse(scene).medium == VERTICAL[name].stress
+    assert valid(tomllib.loads(scene))
+    assert VERTICAL[name].source in " ".join(x.lstrip("# ") for x in out.splitlines() if x.startswith("#"))

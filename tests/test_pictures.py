@@ -192,6 +192,7 @@ def test_modes_are_named_on_the_axes():
             assert [ax.get_xlabel(), ax.get_ylabel()] == expected
         assert bar is None or bar in axes[0].figure.axes[3].get_ylabel()
     assert plots.quantity("alpha_12", "rad") == r"$\alpha_{12}$ (rad)"
+    assert plots.quantity("m_12", "rad") == "$m_{12}$ (rad)"
     assert plots.quantity("drag_ratio", "-") == "drag_ratio (-)"
 
 

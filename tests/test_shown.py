@@ -15,7 +15,7 @@ from registry import SYSTEMS
 import rft
 from geomech.gaits import Circle, Ellipse
 from geomech.output import netcdf, plots, sweeps
-from geomech.scene import Numerics, Scene
+from geomech.scene import Numerics, Scene, load
 from geomech.study import sweep
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
@@ -45,6 +45,12 @@ def table(study):
 @pytest.fixture(scope="module")
 def swept(study):
     return sweep.sweep(study.scene, {"gait.amplitude": [0.5, 1.0, 1.2], "body.length": [0.3, 0.6]})
+
+
+def test_an_intrusion_is_told_in_a_line():
+    told = repr(load("half-cylinder").run())
+    assert told.startswith("Intrusion(11 poses, t 0 to 1 s; force x -") and told.endswith(" W)")
+    assert "nothing" not in told and len(told) < 160
 
 
 def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):

@@ -2,6 +2,7 @@
 
 import ast
 import pathlib
+import re
 
 import mutants
 
@@ -92,5 +93,14 @@ def test_mutants_are_programs_that_differ():
 
 
 def test_a_command_is_the_function_of_its_file():
-    files = {p.stem for p in (ROOT / "geomech" / "commands").glob("*.py")} - {"__init__", "options"}
+    files = {p.stem for p in (ROOT / "geomech" / "commands").glob("*.py")} - {"__init__", "names", "options"}
     assert files == set(COMMANDS)
+
+
+def test_links_within_the_readme_lead_to_a_heading():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    kept = lambda title: re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")  # GitHub's anchors
+    headings = {kept(title) for title in re.findall(r"^#+ (.+)$", re.sub(r"(?ms)^```.*?^```$", "", text), re.M)}
+    links = set(re.findall(r"\]\(#([^)]+)\)", text))
+    assert len(links) > 10
+    assert links <= headings

@@ -19,6 +19,7 @@ from geomech.errors import SceneError
 from geomech.output import sweeps
 from geomech.study import estimate, kept, sweep
 from geomech.study.bench import Study
+from rft import CATALOGUE, Granular
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
@@ -32,6 +33,15 @@ def test_every_point_is_the_scene_there():
     np.testing.assert_allclose(results["estimate"][2, 1], error[0, 0], rtol=1e-6)
     np.testing.assert_allclose(results["estimate_heading"][2, 1], error[0, 1], rtol=1e-6)
     np.testing.assert_allclose(results["displacement"][:, 1, 0], 2 * results["displacement"][:, 0, 0], rtol=1e-9)
+
+
+def test_parameters_of_a_medium_given_by_name_can_be_swept():
+    """As if its law stood in the scene; what is not swept stays that of the name."""
+    named, over = GLASS.text.partition("[medium]"), {"medium.gamma0_deg": [10.0, 20.0], "gait.amplitude": [1.0]}
+    text = named[0] + '[medium]\nname = "glass-0.3mm-close"\n[body]' + named[2].partition("[body]")[2]
+    results = sweep.sweep(scenes.parse(text).with_numerics(phases=32), over)
+    alone = GLASS.changed(medium=Granular(C=CATALOGUE["glass-0.3mm-close"].medium.C, gamma0=np.radians(20.0)))
+    np.testing.assert_allclose(results["displacement"][1, 0], Study(alone).displacement("direct"), rtol=1e-9)
 
 
 def test_effects_and_whole_numbers_can_be_swept():
@@ -66,7 +76,7 @@ def test_sweeps_are_batches(name, monkeypatch):
     """Points that differ in gait and effects are one call of the engine, and each is what it is alone."""
     effect, over = BATCHES[name]
     text = scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 16")
-    fish = scenes.parse(text + effect).with_numerics(phases=64, pieces=12)
+    fish = scenes.parse(text + effect).with_numerics(phases=32, pieces=12)
     if name != "frequency":  # of which all settle
         fish = fish.with_numerics(cycles=1)
     calls, direct = [], estimate.direct

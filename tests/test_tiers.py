@@ -230,7 +230,7 @@ def test_look_up_estimates_cover_the_truth(truths):
 MANY = np.linspace(0.3, 2.0, 201)
 
 
-@pytest.mark.parametrize("every", [100, 1])
+@pytest.mark.parametrize("every", [100, 2])
 @pytest.mark.parametrize("tol", [1e-2, 1e-3, 1e-5])
 def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     answer = cheapest(GLASS, MANY[::every], tol)
@@ -240,7 +240,7 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     off = estimate.apart(np.array(answer[answer["tier"]]), true, 1.0)
     assert off[:, 0].max() <= tol
     assert (off[:, 1] <= answer["estimate_heading"][answer["tier"]]).all()
-    assert (answer["tier"] == "direct") or (every == 1 and tol >= 1e-3)
+    assert (answer["tier"] == "direct") or (every == 2 and tol >= 1e-3)
 
 
 def test_a_table_pays_for_many_amplitudes_and_not_for_few():

@@ -17,6 +17,7 @@ import pytest
 import geomech
 import rft
 from geomech import cli
+from geomech.commands import names
 
 ROOT = pathlib.Path(__file__).parents[1]
 
@@ -109,6 +110,8 @@ def test_help_fits_a_screen(capsys):
         ("geomech displacement three-link-gl", {"three-link-glass", "three-link-glass-close"}),
         ("geomech run sandfish-h", {"sandfish-heavy"}),
         ("geomech sweep --ov", {"--over"}),
+        ("geomech intrude sq", {"square-rod"}),
+        ("geomech keys mo", {"motion"}),
         ("geomech --ver", {"--version"}),
     ],
 )
@@ -118,6 +121,14 @@ def test_a_shell_completes_commands_options_and_scenes(words, found):
         _GEOMECH_COMPLETE="complete_bash", COMP_WORDS=words, COMP_CWORD=str(len(words.split()) - 1),
     )  # fmt: skip
     assert set(completed.split()) == found
+
+
+def test_what_is_completed_can_be_given(capsys):
+    for name in (*names.shown_names(), "half-cylinder", "poppy-seeds-loose", "coulomb", "no-slip-snake"):
+        assert name in names.shown_names() and run(capsys, "scenes", "--show", name)[0] == 0
+    for name in names.medium_names():
+        assert run(capsys, "stress", name, "--beta", "0", "--gamma", "90")[0] == 0
+    assert [run(capsys, "keys", name)[0] for name in names.section_names()] == [0] * len(names.section_names())
 
 
 def test_completion_can_be_shown(monkeypatch, capfd):

@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 
 from geomech import terminal
-from geomech.commands.options import FolderOption, JsonOption, SceneArgument, YesOption, allow, loaded
+from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, allow, loaded
 from geomech.files import whole_folder
 
 
 def accuracy(
-    name: SceneArgument,
+    name: EitherArgument,
     out: FolderOption = Path("accuracy"),
     as_json: JsonOption = False,
     yes: YesOption = False,

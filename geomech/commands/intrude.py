@@ -8,12 +8,12 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, SceneArgument, allow, check_outputs, loaded_intruder
+from geomech.commands.options import IntruderArgument, JsonOption, PlotOption, allow, check_outputs, loaded_intruder
 from geomech.errors import SceneError
 
 
 def intrude(
-    name: SceneArgument,
+    name: IntruderArgument,
     as_json: JsonOption = False,
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
     plot: PlotOption = None,

@@ -7,13 +7,15 @@ from typing import Annotated, Optional
 
 import typer
 
+from geomech.commands.names import section_names
 from geomech.commands.options import PluginOption, load_plugins
 from geomech.errors import SceneError
 
 
 def keys(
     section: Annotated[
-        Optional[str], typer.Argument(metavar="[SECTION]", help="medium, body, gait, ... or all")
+        Optional[str],
+        typer.Argument(metavar="[SECTION]", help="medium, body, gait, ... or all", autocompletion=section_names),
     ] = None,
     json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
     plugin: PluginOption = None,

@@ -15,22 +15,19 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
+from geomech.commands.names import intruder_names, scene_names
 from geomech.errors import Note, SceneError, check_angle, named
 from geomech.files import refuse_inputs, whole_file
 
 
-def scene_names() -> list[str]:
-    """Of the built-in scenes, found without reading any, for a shell that completes them."""
-    folder = Path(__file__).parents[1] / "scene" / "builtin"
-    return sorted(p.stem for p in folder.glob("*.toml"))
+def _scene(names: Callable[[], list[str]]):
+    told = "a built-in name (see 'geomech scenes') or a TOML file"
+    return typer.Argument(metavar="SCENE", help=told, autocompletion=names)
 
 
-SceneArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENE", help="a built-in name (see 'geomech scenes') or a TOML file", autocompletion=scene_names
-    ),
-]
+SceneArgument = Annotated[str, _scene(scene_names)]
+IntruderArgument = Annotated[str, _scene(intruder_names)]
+EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]
 MediumOption = Annotated[

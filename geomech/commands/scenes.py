@@ -6,21 +6,31 @@ from typing import Annotated, Optional
 
 import typer
 
+from geomech.commands.names import shown_names
 from geomech.errors import choose
 
 
 def scenes(
-    show: Annotated[Optional[str], typer.Option(metavar="NAME", help="print this scene's or medium's TOML")] = None,
+    show: Annotated[
+        Optional[str],
+        typer.Option(metavar="NAME", help="print this scene's or medium's TOML", autocompletion=shown_names),
+    ] = None,
 ):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
     from geomech.scene import builtin_names, intruder_names, load, walker_names
-    from geomech.scene.write import medium_toml
+    from geomech.scene.write import medium_toml, vertical_toml
     from rft.vertical import VERTICAL
 
     if show is not None:
-        name = choose("--show", show, [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE])
-        print(medium_toml(name, rft.CATALOGUE[name]) if name in rft.CATALOGUE else load(name).text, end="")
+        shown = [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE, *VERTICAL]
+        name = choose("--show", show, shown)
+        if name in rft.CATALOGUE:
+            print(medium_toml(name, rft.CATALOGUE[name]), end="")
+        elif name in VERTICAL:
+            print(vertical_toml(name, VERTICAL[name]), end="")
+        else:
+            print(load(name).text, end="")
         return
     for title, names in (
         ("", builtin_names()),

@@ -9,6 +9,7 @@ from typing import Annotated, Optional
 
 import typer
 
+from geomech.commands.names import medium_names
 from geomech.commands.options import JsonOption, PlotOption
 from geomech.errors import SceneError
 
@@ -17,7 +18,9 @@ def stress(
     medium: Annotated[
         str,
         typer.Argument(
-            metavar="MEDIUM", help="a name (see 'geomech scenes'), a TOML file or a CSV file of plate drags"
+            metavar="MEDIUM",
+            help="a name (see 'geomech scenes'), a TOML file or a CSV file of plate drags",
+            autocompletion=medium_names,
         ),
     ],
     beta: Annotated[Optional[float], typer.Option(help="tilt of the plate in degrees, 0 lying flat")] = None,

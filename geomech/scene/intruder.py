@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech import summary
 from geomech.errors import SceneError, choose, named, number, short
 from geomech.files import read_text
 from geomech.scene import solid
@@ -49,6 +50,11 @@ class Intrusion(NamedTuple):
     force: np.ndarray
     moment: np.ndarray
     power: np.ndarray
+
+    def __repr__(self) -> str:
+        (x, z), span = self.force.T, summary.span
+        forces = f"force x {span(x)} N, z {span(z)} N; moment {span(self.moment)} N m; power {span(self.power)} W"
+        return f"Intrusion({len(self.t)} poses, t {span(self.t)} s; {forces})"
 
 
 @dataclass(frozen=True)
@@ -174,7 +180,12 @@ def _motion(place: str, table: dict) -> Motion:
 
 @dataclass(frozen=True)
 class _Choices:
-    """What any medium may be given besides its numbers; zeta multiplies what it has."""
+    """What any medium may be given besides its numbers.
+
+    zeta (-): strength of the medium, which multiplies what its other keys say. grazing (rad): between motion and face, over
+    which the stress on the face of a closed body rises, 0 for a jump. tension (-): "keep", or "cut" for no stress on faces
+    that the map pulls on.
+    """
 
     zeta: float = 1.0
     grazing: float = GRAZING
@@ -187,6 +198,8 @@ def read_medium(place: str, table: Mapping) -> PlateStress:
     grazing(_deg), tension. Without any of the first three it is the generic set."""
     own = {f.name for f in dataclasses.fields(_Choices)} | {"grazing_deg"}
     given = {k.replace("-", "m"): v for k, v in table.items() if k not in own}  # B-11 is Bm11
+    if twice := [key for key in COEFFICIENTS if "m" in key and {key, key.replace("m", "-")} <= {*table}]:
+        raise SceneError(f"{place}: {twice[0]} is {twice[0].replace('m', '-')}: keep one")
     for key in given:
         choose(f"{place} key", key, ["name", "file", *COEFFICIENTS, *sorted(own)])
     choices = _build(place, {k: v for k, v in table.items() if k in own}, _Choices)

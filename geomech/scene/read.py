@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -72,9 +72,9 @@ def _folder():
     return resources.files("geomech.scene") / "builtin"
 
 
-def load(scene: str | Path) -> Scene | Intruding | WalkerScene:
-    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot];
-    SceneError, one line, if it is not one."""
+def load(scene: str | Path) -> Scene | Any:
+    """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot]
+    (Any, so that no type checker asks which); SceneError, one line, if it is not one."""
     if not isinstance(scene, (str, Path)):
         raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
     names = builtin_names()
@@ -121,7 +121,7 @@ def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
     return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 
-def parse(text: str, name: str = "scene") -> Scene | Intruding | WalkerScene:
+def parse(text: str, name: str = "scene") -> Scene | Any:
     """The scene of a TOML text; SceneError if it is not one."""
     if not isinstance(text, str):
         raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
@@ -132,7 +132,7 @@ def parse(text: str, name: str = "scene") -> Scene | Intruding | WalkerScene:
     return from_tables(tables, name, text)
 
 
-def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Intruding | WalkerScene:
+def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")

@@ -12,6 +12,7 @@ from pathlib import Path
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
+from geomech.scene.intruder import COEFFICIENTS
 from geomech.scene.intruding import Intruding
 from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
@@ -62,6 +63,14 @@ def medium_toml(name: str, entry) -> str:
     return head + table("medium", _of_kind(entry.medium, *PARTS["medium"]))
 
 
+def vertical_toml(name: str, entry) -> str:
+    """The table of a medium of intruder scenes (`rft.vertical.VerticalEntry`), with its source above."""
+    head = "".join(f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110))
+    told = dataclasses.asdict(entry.stress)
+    values = {**{key.replace("m", "-"): told[key] for key in COEFFICIENTS}, "zeta": told["zeta"]}
+    return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"
+
+
 def tables(scene: Scene) -> dict:
     """The tables of its text, with the numerics of now, where these make the scene; else those written anew."""
     numerics = _numerics(checked_scene(scene))
@@ -70,6 +79,13 @@ def tables(scene: Scene) -> dict:
         if from_tables(read, scene.name, scene.text) == scene:
             return read
     return _anew(scene)
+
+
+def spelled_out(tables: dict, scene: Scene) -> dict:
+    """The scene's tables with the law and its parameters in place of the name of its medium."""
+    if "name" not in tables.get("medium", {}):
+        return tables
+    return {**tables, "medium": _of_kind(scene.system.medium, *PARTS["medium"])}
 
 
 def _anew(scene: Scene) -> dict:

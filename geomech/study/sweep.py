@@ -158,6 +158,8 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
         raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
     outer = [values[k] for k in names if k != AMPLITUDE]
     tables = written.tables(scene)
+    if any(name.startswith("medium.") for name in names):
+        tables = written.spelled_out(tables, scene)
     for corner in _corners(outer):
         at = _scene_at(tables, scene, names, corner)  # refuse before computing
         if uncertainty.uncertain(at.system):

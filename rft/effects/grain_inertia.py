@@ -17,8 +17,9 @@ ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman
 
 @dataclass(frozen=True)
 class GrainInertia(Effect):
-    """A normal force strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C: at high speed the
-    inertia of grains counts; the form is the momentum flux of grains swept up, as in impact laws).
+    """A normal force strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
+
+    At high speed the inertia of grains counts; the form is the momentum flux of grains swept up, as in impact laws.
 
     In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
 

@@ -26,7 +26,10 @@ class Course(NamedTuple):
 
 
 class Motion:
-    """Base of motions: a course for the outline that moves. turns: whether the angle tells where it is, not x and z."""
+    """Base of motions: a course for the outline that moves. turns: whether the angle tells where it is, not x and z.
+
+    samples (-): poses along it, 2 to 100,000.
+    """
 
     samples: int
     turns = False
@@ -41,8 +44,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Drag(Motion):
-    """Along a straight line without turning. depth: of the frame's origin at the start. direction: gamma, radians below the
-    horizontal. attitude: the angle that the body is held at. distance: how far it goes."""
+    """Along a straight line without turning.
+
+    depth (m): of the frame's origin at the start. direction (rad): gamma, below the horizontal. speed (m/s): it changes no
+    force. distance (m): how far it goes. attitude (rad): the angle that the body is held at.
+    """
 
     depth: float
     direction: float = 0.0
@@ -64,8 +70,11 @@ class Drag(Motion):
 
 @dataclass(frozen=True)
 class Penetrate(Motion):
-    """Straight down, or at ``direction`` below the horizontal, from where the outline's lowest point touches the surface
-    until that is ``depth`` below it. attitude: the angle that the body is held at."""
+    """Straight down, or on a slope, from where the outline's lowest point touches the surface.
+
+    depth (m): of the lowest point at the end. direction (rad): below the horizontal. speed (m/s): it changes no force.
+    attitude (rad): the angle that the body is held at.
+    """
 
     depth: float
     direction: float = math.pi / 2
@@ -90,8 +99,11 @@ class Penetrate(Motion):
 
 @dataclass(frozen=True)
 class Rotate(Motion):
-    """About a hub at a fixed height above the surface, which may also move forwards at ``speed``. rate: rad/s, positive as it
-    sweeps a leg backwards that points down. start, stop: angles, 0 where a leg points down."""
+    """About a hub at a fixed height above the surface.
+
+    hub_height (m): of the frame's origin above the surface. rate (rad/s): positive as it sweeps a leg backwards that points
+    down. start, stop (rad): the angle at either end, 0 where a leg points down. speed (m/s): of the hub, forwards.
+    """
 
     hub_height: float
     rate: float = 2 * math.pi

@@ -19,7 +19,7 @@ MOST_POINTS = 2000  # of an outline of one's own
 
 
 class Shape:
-    """Base of bodies: a ``width`` across the plane, and an outline."""
+    """Base of bodies, with an outline. width (m): across the plane."""
 
     width: float
 
@@ -39,7 +39,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Plate(Shape):
-    """A thin plate. tilt: beta in radians, 0 lying flat."""
+    """A thin plate. length (m): in the plane. tilt (rad): beta, 0 lying flat."""
 
     length: float
     width: float
@@ -57,7 +57,7 @@ class Plate(Shape):
 
 @dataclass(frozen=True)
 class RoundRod(Shape):
-    """A cylinder that lies across the plane (Fig. 8(a))."""
+    """A cylinder that lies across the plane (Fig. 8(a)). radius (m): of the cylinder."""
 
     radius: float
     width: float
@@ -68,7 +68,10 @@ class RoundRod(Shape):
 
 @dataclass(frozen=True)
 class HalfCylinder(Shape):
-    """Half of a cylinder, its flat side "down" or "up" (Fig. 8(a)); the frame is at the middle of that side."""
+    """Half of a cylinder (Fig. 8(a)).
+
+    radius (m): of the cylinder. flat (-): where its flat side is, "down" or "up"; the frame is at the middle of that side.
+    """
 
     radius: float
     width: float
@@ -96,7 +99,7 @@ class HalfCylinder(Shape):
 
 @dataclass(frozen=True)
 class SquareRod(Shape):
-    """A square bar that lies across the plane, one side down (Fig. 8(a))."""
+    """A square bar that lies across the plane, one side down (Fig. 8(a)). side (m): of the square."""
 
     side: float
     width: float
@@ -110,9 +113,10 @@ class SquareRod(Shape):
 class CLeg(Shape):
     """A thin leg bent to an arc of a circle; hip and free end are 2 R apart whatever it bends by (Fig. 12(c)).
 
-    radius: R. relative_curvature: R / r, r that of the arc: 1 for half a circle, 0 for a flat leg, negative for a reversed
-    one, within +-1. A positive one bulges backwards as the leg points down, and with the bulge ahead into the grains as it
-    turns at a positive rate; that this is the one that the paper calls positive is assumed.
+    radius (m): R, half the distance from hip to free end. relative_curvature (-): R / r, r that of the arc: 1 for half a
+    circle, 0 for a flat leg, negative for a reversed one, within +-1. A positive one bulges backwards as the leg points down,
+    and with the bulge ahead into the grains as it turns at a positive rate; that this is the one that the paper calls
+    positive is assumed.
     """
 
     radius: float
@@ -137,7 +141,7 @@ class CLeg(Shape):
 
 @dataclass(frozen=True)
 class FlatLeg(Shape):
-    """A thin straight leg of length 2 R. radius: R."""
+    """A thin straight leg of length 2 R. radius (m): R, half of it."""
 
     radius: float
     width: float
@@ -148,7 +152,10 @@ class FlatLeg(Shape):
 
 @dataclass(frozen=True)
 class Wheel(Shape):
-    """A wheel with or without lugs: straight bars that stand off its rim, equally spaced. radius: of the rim."""
+    """A wheel with or without lugs: straight bars that stand off its rim, equally spaced.
+
+    radius (m): of the rim. lugs (-): how many, 0 to 200. lug_height, lug_width (m): of each; none without lugs.
+    """
 
     radius: float
     width: float
@@ -192,7 +199,8 @@ class Wheel(Shape):
 
 @dataclass(frozen=True)
 class Polygon(Shape):
-    """Straight edges between points (x, z) in m; closed: the last is joined to the first, and it has an inside."""
+    """Straight edges between points. points (m): (x, z) of each. closed (-): the last is joined to the first, and it has an
+    inside."""
 
     points: tuple[tuple[float, float], ...]
     width: float
@@ -209,7 +217,10 @@ class Polygon(Shape):
 
 @dataclass(frozen=True)
 class Spline(Shape):
-    """A smooth curve through points (x, z) in m: a cubic spline over the chords' length, closed or open."""
+    """A smooth curve through points, a cubic spline over the chords' length.
+
+    points (m): (x, z) of each. closed (-): the last is joined to the first, and it has an inside.
+    """
 
     points: tuple[tuple[float, float], ...]
     width: float

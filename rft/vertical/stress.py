@@ -76,8 +76,11 @@ class StressMap(PlateStress):
         alpha_z = sum A_mn cos(2 m beta + n gamma) + B_mn sin(2 m beta + n gamma),
         alpha_x = sum C_mn cos(2 m beta + n gamma) + D_mn sin(2 m beta + n gamma),  m in -1, 0, 1 and n in 0, 1.
 
-    The index m = -1 is written m1. What is not given is that of the generic set M0. zeta: strength of the medium over that of
-    its coefficients. Source: Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang and Goldman (2014).
+    A00, A10 (N/cm^3): of a cosine of alpha_z. B11, B01, Bm11 (N/cm^3): of a sine of alpha_z, m = -1 written m1.
+    C11, C01, Cm11 (N/cm^3): of a cosine of alpha_x. D10 (N/cm^3): of a sine of alpha_x.
+
+    What is not given is that of the generic set M0. zeta: strength of the medium over that of its coefficients. Source: Li,
+    Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang and Goldman (2014).
     """
 
     A00: float = 0.206
