@@ -11,17 +11,29 @@ import pytest
 
 from geomech import cli, kinds
 from geomech.errors import SceneError
-from geomech.scene import builtin_names, from_tables, intruder_keys, intruder_names, load, parse
+from geomech.scene import builtin_names, from_tables, intruder_keys, intruder_names, load, parse, solid
 from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
 from geomech.scene.read import TABLES
-from rft import CATALOGUE
+from rft import CATALOGUE, spatial, vertical
 from rft.vertical import VERTICAL
+from rft.vertical.effects import KINDS as GROUND_EFFECTS
 
 EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
+OF_INTRUDERS = {
+    "outline": vertical.SHAPES,
+    "motion": vertical.MOTIONS,
+    "mesh": solid.KINDS,
+    "motion-of-mesh": spatial.MOTIONS,
+    "medium-of-mesh": {"": spatial.Spatial},
+    "ground": GROUND_EFFECTS,
+}
+EVERY_CLASS = [*EVERY, *((table, name, kind) for table, kinds in OF_INTRUDERS.items() for name, kind in kinds.items())]
 ROOT = pathlib.Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize(("table", "name", "kind"), EVERY, ids=[f"{t}-{n or k.__name__}" for t, n, k in EVERY])
+@pytest.mark.parametrize(
+    ("table", "name", "kind"), EVERY_CLASS, ids=[f"{t}-{n or k.__name__}" for t, n, k in EVERY_CLASS]
+)
 def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(table, name, kind):
     """In the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
     keys = keys_of(kind)
@@ -142,7 +154,12 @@ def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
                 assert not both(valid, scene, table, k, {**part, key: True if key != "reverse" else 1})
             if kind := {"kind", "law", "name"} & {*part}:
                 bare = both(valid, scene, table, k, {x: v for x, v in part.items() if x not in kind})
-                assert bare == (table == "medium" and "intruder" in scene)  # then it is the generic set
+                # without a name that of an outline is the generic set; that of a mesh may be told by numbers
+                assert bare == (table == "medium" and "intruder" in scene and not of_mesh(scene))
+
+
+def of_mesh(scene):
+    return scene["intruder"]["kind"] in solid.KINDS
 
 
 def both(valid, scene, table, k, part):
@@ -241,6 +258,47 @@ def test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion
             parse(scene)
 
 
+BALL, ROLL = 'kind = "sphere"\nradius = 0.02', 'kind = "drag"\ndepth = 0.05\nheading_deg = 30'
+
+
+@pytest.mark.parametrize(
+    ("medium", "intruder", "motion", "more", "good"),
+    [
+        ("xi_n = 3e5", BALL, ROLL, "", True),
+        ("density = 1500\ninternal_friction = 0.5", BALL, ROLL, "", True),
+        ("density = 1500", BALL, ROLL, "", False),
+        ("density = 1500\ninternal_friction = 0.5\nxi_n = 3e5", BALL, ROLL, "", False),
+        ('name = "glass-3mm"\nzeta = 2\ntension = "push"\ngrazing_deg = 0', BALL, ROLL, "", True),
+        ("zeta = 2", BALL, ROLL, "", False),
+        ("xi_n = 3e5\nzeta = 2", BALL, ROLL, "", False),
+        ("xi_n = 3e5\ngrazing_deg = 0\ngrazing = 0", BALL, ROLL, "", False),
+        ('name = "glass-0.3mm-loose"', BALL, ROLL, "", False),
+        ('name = "glass-3mm"\nxi_n = 3e5', BALL, ROLL, "", False),
+        ('name = "glass-3mm"\nsurface_friction = 0.2', PLATE, STEP, "", False),
+        ("xi_n = 3e5", PLATE, STEP, "", False),
+        ("xi_n = 3e5", BALL + "\nwidth = 1", ROLL, "", False),
+        ('name = "glass-3mm"', PLATE, ROLL, "", False),
+        ("xi_n = 3e5", 'kind = "mesh"\nshape = "sphere"\nradius = 0.02', ROLL, "", True),
+        ("xi_n = 3e5", 'kind = "mesh"\nshape = "screw"\nradius = 0.02', ROLL, "", False),
+        ("xi_n = 3e5", 'kind = "mesh"\nradius = 0.02', ROLL, "", False),
+        ("xi_n = 3e5", 'kind = "sphere"\nshape = "sphere"\nradius = 0.02', ROLL, "", False),
+        ("xi_n = 3e5", 'kind = "mesh"\nshape = "sphere"\nfile = "a.stl"', ROLL, "", False),
+        ("xi_n = 3e5", BALL, ROLL + "\nattitude_deg = [0, 30, 0]", "[numerics]\ntriangles = 20", True),
+        ("xi_n = 3e5", BALL, ROLL + "\nattitude_deg = 30\nattitude = 1", "", False),
+        ("xi_n = 3e5", BALL, 'kind = "csv"', "", False),
+        ("xi_n = 3e5", BALL, ROLL, "[numerics]\nelements = 20", False),
+        ('name = "glass-3mm"', PLATE, STEP, "[numerics]\ntriangles = 20", False),
+        ("xi_n = 3e5", BALL, ROLL, '[[effects]]\nkind = "slope"\nangle_deg = 5', True),
+        ("", PLATE, STEP, '[[effects]]\nkind = "disturbed-ground"\nplaces = [0.1]\nradius = 0.1\nweakening = 1', True),
+        ("", PLATE, STEP, '[[effects]]\nkind = "disturbed-ground"\nradius = 0.1\nweakening = 1', False),
+        ("", PLATE, STEP, '[[effects]]\nkind = "end-caps"\nhead = 3\nradius = 0.1', False),
+        ("xi_n = 3e5", BALL, None, "", False),
+    ],
+)
+def test_the_schema_agrees_with_the_reader_of_meshes(medium, intruder, motion, more, good, valid):
+    test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion, more, good, valid)
+
+
 def test_keys_of_intruders_are_told(capsys):
     """Each with a type, a unit and a meaning, in the section that it has in a scene file."""
     whole = run(capsys, "keys")[1]
@@ -258,6 +316,11 @@ def test_keys_of_intruders_are_told(capsys):
     assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
     assert re.search(r"\n  B-11 +number +N/cm\^3 +none +of a sine of alpha_z", whole)
     assert re.search(r"\n  elements +whole number +- +100 ", run(capsys, "keys", "numerics")[1])
+    assert re.search(r"\n  triangles +whole number +- +5000 ", run(capsys, "keys", "numerics")[1])
+    of_mesh = run(capsys, "keys", "motion")[1].partition('[motion] kind = "drag" of a mesh\n')[2]
+    assert re.search(r"^  heading +number +rad +0.0 ", of_mesh.partition("\n\n")[0], re.M)
+    assert re.search(r"\n  internal_friction +number +- +none +mu, tan of the angle of repose", whole)
+    assert '[[effects]] kind = "aeration" of an intruder scene\n' in run(capsys, "keys", "effects")[1]
 
 
 def test_systems_and_sizes_given_once_are_valid(valid):
@@ -276,6 +339,8 @@ def test_systems_and_sizes_given_once_are_valid(valid):
     for medium, path in (('file = "sand.toml"', 'kind = "csv"\nfile = "path.csv"'), ('file = "drag.csv"', STEP)):
         shape = 'kind = "spline"\nfile = "points.csv"\nwidth = 1'
         assert valid(tomllib.loads(f"[medium]\n{medium}\n[intruder]\n{shape}\n[motion]\n{path}"))
+        body = 'kind = "mesh"\nfile = "body.stl"\nscale = 0.001\nsmooth = true'
+        assert valid(tomllib.loads(f"[medium]\n{medium}\nzeta = 2\n[intruder]\n{body}\n[motion]\n{path}"))
     assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snake"\nlengths = [1, 2]\n{gait}'))
     assert not valid(tomllib.loads(f'[system]\nkind = "no-slip-snak"\n{gait}'))
     assert not valid(tomllib.loads('[system]\nkind = "no-slip-snake"\n'))

@@ -53,6 +53,14 @@ def test_an_intrusion_is_told_in_a_line():
     assert "nothing" not in told and len(told) < 160
 
 
+def test_an_intrusion_of_a_mesh_is_told_in_a_line():
+    found = load("sphere").changed(triangles=80).run()
+    told = repr(found)
+    assert told.startswith("Passed(11 poses, t 0 to 10 s; force x -") and told.endswith(" W)")
+    assert f"z {found.force[:, 2].min():.3g}" in told and f"y {found.moment[:, 1].min():.3g}" in told
+    assert "nothing" not in told and "\n" not in told and len(told) < 250
+
+
 def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
     system, alpha = study.scene.system, np.zeros((5, 2))
     cycle = study.scene.cycle(phases=32, work=True)

@@ -14,7 +14,8 @@ from geomech.kinds import FAMILIES, unloaded
 from geomech.scene import intruder_keys
 from geomech.scene.key import Key, first, keys_of, meanings, option, properties, table, told
 from geomech.scene.model import Numerics
-from geomech.scene.read import NOT_OF_THE_BODY, TABLES, Physical
+from geomech.scene.read import TABLES
+from geomech.scene.sizes import NOT_OF_THE_BODY, Physical
 from geomech.systems.swimmer import MEDIA, Swimmer
 
 GROUPS = {
@@ -94,29 +95,26 @@ def schema() -> dict[str, Any]:
     shapes = {"frame": {"type": "string", "description": FRAME}, **{k: _any(k, parts) for k, parts in every.items()}}
     swimmer = {"kind": {"const": "swimmer"}, **{name: shapes[name] for name in ("medium", "body", "effects")}}
     shapes["system"]["oneOf"].append(table(SWIMMER, swimmer, ["kind"]))
-    own, other = ({k: {"$ref": f"#/$defs/{group}/{k}"} for k in of} for group, of in _groups(shapes, theirs))
-    both = {k: {"anyOf": [own[k], other[k]]} if k in own and k in other else (own | other)[k] for k in own | other}
+    groups = {"gaits": shapes, **theirs}
+    named = {group: {k: {"$ref": f"#/$defs/{group}/{k}"} for k in of} for group, of in groups.items()}
+    own = named["gaits"]
+    every_name = dict.fromkeys(name for of in named.values() for name in of)
     whole, short = {"required": ["gait"]}, {"required": ["medium", "body", "gait"]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "geomech scene",
         "type": "object",
-        "properties": both,
+        "properties": {k: {"anyOf": [of[k] for of in named.values() if k in of]} for k in every_name},
         "additionalProperties": False,
         "if": {"anyOf": [{"required": ["intruder"]}, {"required": ["motion"]}]},
-        "then": table("", other, ["medium", "intruder", "motion"]),
+        "then": intruder_keys.whole(named),
         "else": {
             **table("", own, []),
             "if": {"required": ["system"]}, "then": whole, "else": short,
             "allOf": [_size_needed(*each) for each in _sizes_needed(every)],
         },
-        "$defs": dict(_groups(shapes, theirs)),
+        "$defs": groups,
     }  # fmt: skip
-
-
-def _groups(shapes: dict, theirs: dict) -> Iterator[tuple[str, dict]]:
-    yield "gaits", shapes
-    yield "intruders", theirs
 
 
 def _shared(kind: str) -> set[str]:

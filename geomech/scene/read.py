@@ -21,6 +21,7 @@ from geomech.scene import slips
 from geomech.scene.frames import framed
 from geomech.scene.medium import with_files
 from geomech.scene.model import Numerics, Scene, checked_scene
+from geomech.scene.sizes import Sizes
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
@@ -30,23 +31,9 @@ if TYPE_CHECKING:
     from geomech.scene.walker import WalkerScene
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
-NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 LARGEST = 10_000_000  # bytes of a scene file
 INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
 WALKERS = "walkers"  # and of robots that walk
-
-
-@dataclasses.dataclass(frozen=True)
-class Physical:
-    """Sizes that a body and its effects share, given once for all that have them.
-
-    length (m): of the body. frequency (1/s): cycles per second. mass (kg): of the body. radius (body lengths): of the body.
-    """
-
-    length: float | None = None
-    frequency: float | None = None
-    mass: float | None = None
-    radius: float | None = None
 
 
 def builtin_names() -> list[str]:
@@ -154,7 +141,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
     seen = tables.get("frame")
     tables, files = with_files({k: v for k, v in tables.items() if (k, v) != ("frame", FITTED)}, name)
-    sizes = _Sizes(name, tables)
+    sizes = Sizes(name, tables)
     gait = _of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
     kind, parts = _system(tables, name, sizes)
     own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
@@ -178,7 +165,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
         )
 
 
-def _system(tables: Mapping, name: str, sizes: _Sizes) -> tuple[type, dict]:
+def _system(tables: Mapping, name: str, sizes: Sizes) -> tuple[type, dict]:
     """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
     they may also be in its own table."""
     table = dict(_located(tables.get("system", {"kind": "swimmer"}), name))
@@ -199,7 +186,7 @@ def _fields(thing) -> dict:
     return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
 
 
-def _swimmer(parts: dict, name: str, sizes: _Sizes) -> dict:
+def _swimmer(parts: dict, name: str, sizes: Sizes) -> dict:
     """The fields of a swimmer but for the solver."""
     for part in parts:
         choose(f"{name}: [system] key", part, PARTS)
@@ -214,51 +201,6 @@ def _swimmer(parts: dict, name: str, sizes: _Sizes) -> dict:
     places = [(f"{name}: [[effects]]", e) for e in effects]
     made["effects"] = tuple(_of_kind(place, e, *PARTS["effects"], sizes.fill) for place, e in places)
     return made
-
-
-class _Sizes:
-    """What stands once for the whole scene: [physical], the frame, and the frequency, which may stand in [gait] as well."""
-
-    def __init__(self, name: str, tables: Mapping):
-        physical, frame, frequency = tables.get("physical", {}), tables.get("frame"), tables["gait"].get("frequency")
-        for key in physical:
-            choose(f"{name}: [physical] key", key, Physical.__dataclass_fields__)
-        self.name, self.given, self.unused = name, dict(physical), {*physical}
-        self.places = {key: f"[physical] {key}" for key in physical} | {"frame": "the scene's frame"}
-        if frame is not None:
-            self.given["frame"] = frame
-            self.unused.add("frame")
-        if frequency is not None:
-            self._check(f"{name}: [gait]", "frequency", frequency)
-            self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
-
-    def timed(self, place: str, table: dict, kind: type) -> dict:
-        """The table of the gait with the frequency, of all there is."""
-        if "frequency" not in self.given or "frequency" not in [f.name for f in dataclasses.fields(kind)]:
-            return table
-        self.unused.discard("frequency")
-        return {**table, "frequency": self.given["frequency"]}
-
-    def _check(self, place: str, key: str, value) -> None:
-        if key in self.given and self.given[key] != value:
-            raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")
-
-    def fill(self, place: str, table: dict, kind: type) -> dict:
-        """The table with the sizes that its class has; SceneError if it says otherwise itself."""
-        names = [f.name for f in dataclasses.fields(kind)]
-        for key, value in self.given.items():
-            if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
-                continue
-            self.unused.discard(key)
-            self._check(place, key, table.get(key, value))
-            table = {**table, key: value}
-        return table
-
-    def all_used(self) -> None:
-        if self.unused:
-            key = sorted(self.unused)[0]
-            place = "" if key == "frame" else "[physical] "
-            raise SceneError(f"{self.name}: {place}{key}: nothing in this scene has one: drop it, or add what has")
 
 
 def _located(table: dict, name: str) -> dict:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech import summary
 from geomech.errors import SceneError, choose, named, number
 from geomech.scene.columns import columns
 from geomech.scene.intruding import Intruding, as_table, checked_tables, located
@@ -35,6 +36,12 @@ class Passed(NamedTuple):
     @property
     def t(self) -> np.ndarray:
         return self.passage.t
+
+    def __repr__(self) -> str:
+        span = summary.span
+        force, moment = (", ".join(f"{a} {span(f)}" for a, f in zip("xyz", x.T)) for x in (self.force, self.moment))
+        told = f"force {force} N; moment {moment} N m; power {span(self.power)} W"
+        return f"Passed({len(self.t)} poses, t {span(self.t)} s; {told})"
 
 
 @dataclass(frozen=True)

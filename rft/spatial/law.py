@@ -80,13 +80,15 @@ def _by_rows(law, n, v) -> np.ndarray:
 class Spatial:
     """A granular medium in three dimensions.
 
-    xi_n: strength, N/m^3, 1 to 1e12: a plate pushed straight down bears 0.875 xi_n |z| (`Spatial.of_grains` has it from
-    density and friction). surface_friction: of grains on the intruder, 0 to 10; the stress along a face is at most that
-    times the one across. tension: what becomes of faces on which the fit pulls: "cut" (no force at all), "keep" (as
-    fitted), or "push" (its across part the other way, as public codes do). grazing: rad, 0 to 0.5: the law jumps where
-    a face begins to lead; stress grows from 0 to its own as the velocity turns by that angle out of the face, so that
-    faces along which the body slides do not bear by rounding, and forces converge with the mesh. The law is one of slow
-    motion in ground that nothing has disturbed. As fitted it pulls in 5 % of all directions of faces that lead. It
+    xi_n (N/m^3): strength, 1 to 1e12: a plate pushed straight down bears 0.875 xi_n |z|. surface_friction (-): of grains on
+    the intruder, 0 to 10; the stress along a face is at most that times the one across. tension (-): what becomes of faces
+    on which the fit pulls: "cut" (no force at all), "keep" (as fitted), or "push" (its across part the other way, as public
+    codes do). grazing (rad): 0 to 0.5, 0 for a jump; stress grows from 0 to its own as the velocity turns by that angle out
+    of the face.
+
+    `Spatial.of_grains` has xi_n from density and friction. The law jumps where a face begins to lead: by grazing, faces along
+    which the body slides do not bear by rounding, and forces converge with the mesh. The law is one of slow motion in ground
+    that nothing has disturbed. As fitted it pulls in 5 % of all directions of faces that lead. It
     dissipates except where a face within 10 degrees of level, looking up, is drawn out forwards and up to 20 degrees
     above the horizontal: there, in 0.05 % of directions, it drives with at most 0.0052 xi_n |z| of stress.
     """

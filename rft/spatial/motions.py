@@ -35,8 +35,12 @@ class Passage(NamedTuple):
 
 @dataclass(frozen=True)
 class Drag(Motion):
-    """Along a straight line without turning. depth: of the origin at the start. direction: rad below the horizontal.
-    attitude: how the body is held, a rotation vector, or an angle about y; rad."""
+    """Along a straight line without turning.
+
+    depth (m): of the origin at the start. direction (rad): below the horizontal. heading (rad): of the motion along the
+    ground, from x towards y. speed (m/s): it changes no force but that of grain inertia. distance (m): how far it goes.
+    attitude (rad): how the body is held, a rotation vector, or an angle about y.
+    """
 
     depth: float
     direction: float = 0.0
@@ -59,8 +63,12 @@ class Drag(Motion):
 
 @dataclass(frozen=True)
 class Penetrate(Motion):
-    """Straight down, or at ``direction`` below the horizontal, from where the lowest point touches the surface until that
-    is ``depth`` below it. attitude: as of `Drag`."""
+    """Straight down, or on a slope, from where the lowest point touches the surface.
+
+    depth (m): of the lowest point at the end. direction (rad): below the horizontal. heading (rad): of the motion along the
+    ground, from x towards y. speed (m/s): it changes no force but that of grain inertia.
+    attitude (rad): how the body is held, a rotation vector, or an angle about y.
+    """
 
     depth: float
     direction: float = math.pi / 2
@@ -85,8 +93,13 @@ class Penetrate(Motion):
 
 @dataclass(frozen=True)
 class Rotate(Motion):
-    """About an ``axis`` through the origin, at a fixed height above the surface, which may also move at ``speed`` along the
-    ``heading``. rate: rad/s. start, stop: angles from the ``attitude``."""
+    """About an axis through the origin, at a fixed height above the surface, which may also move along the ground.
+
+    hub_height (m): of the origin above the surface. axis (-): its direction, of any length but 0. rate (rad/s): of the turn,
+    right-handed about the axis; positive if stop is more than start. start, stop (rad): angles about the axis from the
+    attitude. speed (m/s): of the origin along the ground. heading (rad): of that, from x towards y.
+    attitude (rad): how the body is held, a rotation vector, or an angle about y, before it turns.
+    """
 
     hub_height: float
     axis: tuple[float, ...] = (0.0, 1.0, 0.0)
@@ -127,8 +140,11 @@ class Rotate(Motion):
 
 @dataclass(frozen=True)
 class Path(Motion):
-    """Through given poses. t: s, ascending. x, y, z: m, of the origin. rx, ry, rz: rotation vectors, rad, all or none; from one
-    pose to the next the body turns by less than 2 rad. Velocities and spins are differences of order 2 in the spacing of t."""
+    """Through given poses. Velocities and spins are differences of order 2 in the spacing of t.
+
+    t (s): times, ascending. x, y, z (m): of the origin. rx, ry, rz (rad): rotation vectors, all or none; from one pose to the
+    next the body turns by less than 2 rad.
+    """
 
     t: tuple[float, ...]
     x: tuple[float, ...]

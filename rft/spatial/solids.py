@@ -41,7 +41,10 @@ class Solid:
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """About the origin; its triangles are 20, 80, 320, ..., 327680: the next number from that asked for."""
+    """A ball about the origin; its triangles are 20, 80, 320, ..., 327680, the next number from that asked for.
+
+    radius (m): of the sphere.
+    """
 
     radius: float
 
@@ -56,7 +59,10 @@ class Sphere(Solid):
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """Along y, about the origin: a rod across the plane of x and z."""
+    """A rod along y, about the origin, across the plane of x and z.
+
+    radius (m): of the rod. length (m): along y.
+    """
 
     radius: float
     length: float
@@ -69,7 +75,11 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Screw(Solid):
-    """A right-handed Archimedean screw along x, about the origin: a core with one thread of a smooth profile."""
+    """A right-handed Archimedean screw along x, about the origin, a core with one thread of a smooth profile.
+
+    radius (m): of the thread. core (m): radius of the core, less than that. pitch (m): along x, of a turn of the thread.
+    length (m): along x.
+    """
 
     radius: float
     core: float
@@ -88,9 +98,12 @@ class Screw(Solid):
 
 @dataclass(frozen=True)
 class Leg(Solid):
-    """The c-leg of the vertical plane, extruded across it: hip at the origin, its free end at z = -2 R below. radius: R.
-    relative_curvature: R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead where a
-    positive rate about y sweeps the leg backwards. thickness: of the strip."""
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, its free end at z = -2 R below.
+
+    radius (m): R, half of the distance from hip to free end. width (m): across the plane, along y. thickness (m): of the
+    strip, less than the radius. relative_curvature (-): R / r, -1 to 1, 1 for half a circle with its bulge to -x, ahead
+    where a positive rate about y sweeps the leg backwards.
+    """
 
     radius: float
     width: float
@@ -113,10 +126,14 @@ class Leg(Solid):
 
 @dataclass(frozen=True)
 class MeshFile(Solid):
-    """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame. scale: m to a unit of the file, 0.001 if that is
-    in mm. closed: whether it has an inside, which is then asked for; of an open one either side may lead. smooth: whether
-    its triangles stand for a curved surface, with edges where they meet at more than 40 degrees. More triangles than it has
-    are made of them by cutting each in four; its form stays."""
+    """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
+
+    file (-): its name; in a scene file, from the folder of that. scale (m): a unit of the file, 0.001 if that is in mm.
+    closed (-): whether it has an inside, which is then asked for; of an open one either side may lead. smooth (-): whether
+    its triangles stand for a curved surface, with edges where they meet at more than 40 degrees.
+
+    More triangles than it has are made of them by cutting each in four; its form stays.
+    """
 
     file: str
     scale: float = 1.0

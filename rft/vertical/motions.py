@@ -134,8 +134,10 @@ class Rotate(Motion):
 
 @dataclass(frozen=True)
 class Path(Motion):
-    """Through given poses. t: s, ascending. x, z: m, of the frame's origin. angle: radians, 0 throughout if left out.
-    Velocities are differences of order 2 in the spacing of t."""
+    """Through given poses. Velocities are differences of order 2 in the spacing of t.
+
+    t (s): times, ascending. x, z (m): of the frame's origin. angle (rad): of the body, 0 throughout if left out.
+    """
 
     t: tuple[float, ...]
     x: tuple[float, ...]

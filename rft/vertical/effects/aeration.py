@@ -12,10 +12,11 @@ from rft.vertical.effects.base import GroundEffect
 class Aeration(GroundEffect):
     """Strength times 1 - air_speed / fluidisation; the stress map keeps its shape.
 
-    air_speed: of the air over the bed's whole cross section, upwards, m/s. fluidisation: the air speed from which the ground
-    is fluidised, m/s; that, and anything faster, is refused, for no resistive force theory is known there. Strength that
-    falls linearly with air speed is a finding about alpha_z(0, 90 degrees); that it holds for all angles alike, and that it
-    falls to nothing, is assumed.
+    air_speed (m/s): of the air over the bed's whole cross section, upwards. fluidisation (m/s): the air speed from which the
+    ground is fluidised; that, and anything faster, is refused, for no resistive force theory is known there.
+
+    Strength that falls linearly with air speed is a finding about alpha_z(0, 90 degrees); that it holds for all angles alike,
+    and that it falls to nothing, is assumed.
     """
 
     air_speed: float

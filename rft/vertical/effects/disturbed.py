@@ -15,10 +15,13 @@ MOST_PLACES = 1000
 
 @dataclass(frozen=True)
 class DisturbedGround(GroundEffect):
-    """Strength times 1 - weakening x disturbance, at all depths; disturbance is 1 up to half a ``radius`` (m) along the
-    ground from any of the ``places`` x (m) of earlier intrusions, and falls linearly to 0 at one and a half.
+    """Strength times 1 - weakening x disturbance, at all depths; disturbance is 1 up to half a ``radius`` along the
+    ground from any of the ``places`` of earlier intrusions, and falls linearly to 0 at one and a half.
 
-    weakening: 0 to 1, the share of strength lost in wholly disturbed ground. That grains bear less where something went
+    places (m): x of earlier intrusions. radius (m): along the ground, how far they disturb it, about. weakening (-): 0 to 1,
+    the share of strength lost in wholly disturbed ground.
+
+    That grains bear less where something went
     before is by experiment (paper Sec. IV B); the form and every number are assumed, as is that disturbances do not add up
     or heal. The motion itself does not disturb: places are given.
     """

@@ -18,8 +18,10 @@ class GrainInertia(GroundEffect):
     """A stress strength x density x v_n^2 against the normal of faces that lead with v_n across themselves, at any depth:
     the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
 
-    strength: lambda, no unit; 1 to 4 by grains and body, 1 assumed. density: of the packed grains, kg/m^3; that of loose
-    poppy seeds if left out. The other half of that work, a surface that sinks behind a fast body, is left out.
+    strength (-): lambda, 1 to 4 by grains and body, 1 assumed. density (kg/m^3): of the packed grains; that of loose poppy
+    seeds if left out.
+
+    The other half of that work, a surface that sinks behind a fast body, is left out.
     """
 
     strength: float = 1.0

@@ -14,13 +14,15 @@ REPOSE = math.radians(30.0)  # assumed
 
 @dataclass(frozen=True)
 class Slope(GroundEffect):
-    """The surface rises by ``angle`` (rad; negative: falls) towards +x; x runs along it, z away from it, depth along z.
+    """The surface rises towards +x; x runs along it, z away from it, depth along z.
+
+    angle (rad): by which it rises; it falls if negative. repose (rad): the angle of repose, of which a slope slides by
+    itself; as steep a one, or a steeper, is refused. mass (kg): of the body; gravity adds the force -mass g sin(angle) along
+    the slope at the body's origin, besides that of the grains, of which alone the power is told.
 
     Strength times cos(angle) - sin|angle| / tan(repose) = sin(repose - |angle|) / sin(repose): grains |z| deep can take a
     shear of rho g |z| cos(angle) tan(repose), their own weight along the slope takes rho g |z| sin|angle| of it, and what is
-    left resists the body, in the measure of level ground. That this holds for all directions of motion alike is assumed. A
-    slope of the angle of ``repose`` or more slides by itself and is refused. mass: kg; gravity adds the force
-    -mass g sin(angle) along the slope at the body's origin, besides that of the grains, of which alone the power is told.
+    left resists the body, in the measure of level ground. That this holds for all directions of motion alike is assumed.
     """
 
     angle: float

@@ -1,0 +1,68 @@
+"""Sizes that a scene file gives once for all parts that have them: [physical], the frame and the frequency."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from geomech.errors import SceneError, choose
+
+NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
+
+
+@dataclasses.dataclass(frozen=True)
+class Physical:
+    """Sizes that a body and its effects share, given once for all that have them.
+
+    length (m): of the body. frequency (1/s): cycles per second. mass (kg): of the body. radius (body lengths): of the body.
+    """
+
+    length: float | None = None
+    frequency: float | None = None
+    mass: float | None = None
+    radius: float | None = None
+
+
+class Sizes:
+    """What stands once for the whole scene: [physical], the frame, and the frequency, which may stand in [gait] as well."""
+
+    def __init__(self, name: str, tables: Mapping):
+        physical, frame, frequency = tables.get("physical", {}), tables.get("frame"), tables["gait"].get("frequency")
+        for key in physical:
+            choose(f"{name}: [physical] key", key, Physical.__dataclass_fields__)
+        self.name, self.given, self.unused = name, dict(physical), {*physical}
+        self.places = {key: f"[physical] {key}" for key in physical} | {"frame": "the scene's frame"}
+        if frame is not None:
+            self.given["frame"] = frame
+            self.unused.add("frame")
+        if frequency is not None:
+            self._check(f"{name}: [gait]", "frequency", frequency)
+            self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
+
+    def timed(self, place: str, table: dict, kind: type) -> dict:
+        """The table of the gait with the frequency, of all there is."""
+        if "frequency" not in self.given or "frequency" not in [f.name for f in dataclasses.fields(kind)]:
+            return table
+        self.unused.discard("frequency")
+        return {**table, "frequency": self.given["frequency"]}
+
+    def _check(self, place: str, key: str, value) -> None:
+        if key in self.given and self.given[key] != value:
+            raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")
+
+    def fill(self, place: str, table: dict, kind: type) -> dict:
+        """The table with the sizes that its class has; SceneError if it says otherwise itself."""
+        names = [f.name for f in dataclasses.fields(kind)]
+        for key, value in self.given.items():
+            if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
+                continue
+            self.unused.discard(key)
+            self._check(place, key, table.get(key, value))
+            table = {**table, key: value}
+        return table
+
+    def all_used(self) -> None:
+        if self.unused:
+            key = sorted(self.unused)[0]
+            place = "" if key == "frame" else "[physical] "
+            raise SceneError(f"{self.name}: {place}{key}: nothing in this scene has one: drop it, or add what has")
