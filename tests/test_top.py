@@ -112,6 +112,8 @@ def test_help_fits_a_screen(capsys):
         ("geomech sweep --ov", {"--over"}),
         ("geomech intrude sq", {"square-rod"}),
         ("geomech keys mo", {"motion"}),
+        ("geomech intrude sph", {"sphere"}),
+        ("geomech walk xpl", {"xplorer"}),
         ("geomech --ver", {"--version"}),
     ],
 )

@@ -20,6 +20,11 @@ def intruder_names() -> list[str]:
     return _found("intruders")
 
 
+def walker_names() -> list[str]:
+    """Of the built-in scenes of walking robots."""
+    return _found("walkers")
+
+
 def medium_names() -> list[str]:
     """Of the media of intruder scenes."""
     from geomech.scene.intruder import VERTICAL
@@ -31,7 +36,7 @@ def shown_names() -> list[str]:
     """Of all that 'geomech scenes --show' prints."""
     from geomech.systems.swimmer import MEDIA
 
-    return [*scene_names(), *intruder_names(), *MEDIA, *medium_names()]
+    return [*scene_names(), *intruder_names(), *walker_names(), *MEDIA, *medium_names()]
 
 
 def section_names() -> list[str]:

@@ -15,7 +15,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.names import intruder_names, scene_names
+from geomech.commands.names import intruder_names, scene_names, walker_names
 from geomech.errors import Note, SceneError, check_angle, named
 from geomech.files import refuse_inputs, whole_file
 
@@ -27,6 +27,7 @@ def _scene(names: Callable[[], list[str]]):
 
 SceneArgument = Annotated[str, _scene(scene_names)]
 IntruderArgument = Annotated[str, _scene(intruder_names)]
+WalkerArgument = Annotated[str, _scene(walker_names)]
 EitherArgument = Annotated[str, _scene(lambda: scene_names() + intruder_names())]
 GridOption = Annotated[Optional[int], typer.Option("--grid", help="points per joint, in place of the scene's")]
 PlotOption = Annotated[Optional[Path], typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")]

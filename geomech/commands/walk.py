@@ -8,12 +8,12 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.options import JsonOption, SceneArgument, YesOption, allow, check_outputs, folder, loaded_walker
+from geomech.commands.options import JsonOption, WalkerArgument, YesOption, allow, check_outputs, folder, loaded_walker
 from geomech.files import whole_folder
 
 
 def walk(
-    name: SceneArgument,
+    name: WalkerArgument,
     engine: Annotated[str, typer.Option(metavar="planar|mujoco", help="what computes the motion")] = "planar",
     as_json: JsonOption = False,
     out: Annotated[

@@ -36,7 +36,7 @@ class Ground:
         some = lambda x: x if len(x) == 1 else x[samples]
         return Ground(self.stress, some(self.strength), some(self.flux), some(self.rounding), closed)
 
-    def on(self, parts):
+    def on(self, parts) -> tuple[np.ndarray, np.ndarray]:
         """Stress (x, z) in Pa on `rft.vertical.loads.Parts`, whose rows are this ground's samples."""
         t_x, t_z = self.stress.traction(parts.n, parts.v)
         fast = np.sqrt(parts.speed**2 + self.rounding**2)
@@ -82,7 +82,7 @@ class Outlines:
         cut = (x[samples] for x in (self.points, self.width, self.lengths, self.normals))
         return Outlines(*cut, bends, self.closed)
 
-    def lowest(self, angle):
+    def lowest(self, angle) -> np.ndarray:
         """(B,): height of the lowest point over the origin, turned by angles (B,)."""
         x, z = self.points[..., 0], self.points[..., 1]
         return (np.cos(angle)[:, None] * z - np.sin(angle)[:, None] * x).min(-1)

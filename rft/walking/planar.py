@@ -95,7 +95,7 @@ class Robots:
         pose[:, 1] = -np.min(low, axis=0)
         return State(pose, np.zeros_like(pose), np.zeros(len(self)), np.zeros(len(self)))
 
-    def turned(self, phase, of):
+    def turned(self, phase, of) -> tuple[np.ndarray, np.ndarray]:
         """Angles (B, K) and rates (B, K), rad/s, of the legs at phases (B,), by the rates that hold at ``of``."""
         rates = [g.frequency * g.rate(of + self.at) for g in self.gaits]
         return np.array([g.angle(p + self.at, of + self.at) for g, p in zip(self.gaits, phase)]), np.array(rates)
@@ -105,7 +105,7 @@ class Robots:
         angle, rate = self.turned(phase, phase[0])
         return self.forces(state.pose[None], state.twist[None] + 1e-9, angle, rate)[2][0] > 0.0
 
-    def forces(self, pose, twist, angle, rate):
+    def forces(self, pose, twist, angle, rate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Accelerations (C, B, 3) of bodies (C, B, 3) with legs at (B, K) that turn at (B, K), and power of the motors and
         into the ground, (C, B)."""
         found = [self._of(self.legs, pose, twist, self.hip_x, self.hip_z, angle, rate)]

@@ -59,7 +59,7 @@ class Tripod:
         first = min(self.duty, 1.0 - self.duty) / 2
         return (0.0, first, 0.5) if abs(first - 0.25) < 1e-12 else (0.0, first, 0.5 - first, 0.5)
 
-    def angle(self, phase, of):
+    def angle(self, phase, of) -> np.ndarray:
         """Of a leg at ``phase`` (cycles), by the rate that holds at the phase ``of``, on whose side of a kink it is."""
         turns = np.floor(np.asarray(of) + 0.5)
         place, there = np.asarray(phase) - turns, np.asarray(of) - turns  # of the second, -0.5 to 0.5
@@ -68,7 +68,7 @@ class Tripod:
         fast = np.sign(there) * math.pi + self._fast * (place - np.sign(there) * 0.5)
         return self.middle + 2 * math.pi * turns + np.where(np.abs(there) <= half, slow, fast)
 
-    def rate(self, of):
+    def rate(self, of) -> np.ndarray:
         """rad a cycle, at the phase ``of``."""
         there = np.asarray(of) - np.floor(np.asarray(of) + 0.5)
         return np.where(np.abs(there) <= self.duty / 2, self.sweep / self.duty, self._fast)
