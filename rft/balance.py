@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.backend import check
 from rft.bodies.base import Body, Kinematics, pace
 from rft.bodies.pieces import PIECES
-from rft.effects.base import Effect, broken, engine, folded, pieced
+from rft.effects.base import Effect, Prepared, broken, engine
 from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
 from rft.newton import Balance
 from rft.premise import not_so
@@ -58,6 +59,7 @@ def body_velocity(
     threads: int | None = None,
     effects: Sequence[Effect] = (),
     pieces: int = PIECES,
+    backend: str = "auto",
 ) -> Solution:
     """Body velocity at which the medium's net force and moment on the body vanish.
 
@@ -65,7 +67,8 @@ def body_velocity(
     regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
     off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
     threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
-    listed is not evaluated. pieces: to a body length, into which effects that vary along an element cut it. Raises
+    listed is not evaluated. pieces: to a body length, into which effects that vary along an element cut it.
+    backend: of `rft.backend`. Raises
     ValueError for shapes or values that make no sense, and for a medium that pushes.
     """
     if engine(effects) != "algebraic":
@@ -73,18 +76,19 @@ def body_velocity(
         raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.time_steps")
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require_drag(medium)
+    check(backend)
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = pace(body, alphadot)
     moving = speed > 0
-    body = pieced(body, effects, pieces)
-    problem = Balance.of(folded(effects, medium, body, loads), body, regularisation, tolerance)
+    body, model, rows = Prepared.of(medium, body, effects, loads, pieces)
+    problem = Balance(model, rows, regularisation, tolerance, backend)
     xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
     iterations, stuck = np.zeros(speed.size, int), ~moving
     if moving.any():
-        shape, rate, model = alpha[:, moving], alphadot[:, moving], problem.model.take(moving)
+        shape, rate, model = alpha[:, moving], alphadot[:, moving], model.take(moving)
 
         def motion(index):
             return Kinematics.stacked(list(model.motions(body.motion(shape[:, index], rate[:, index])).values()))

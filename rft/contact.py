@@ -10,13 +10,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Protocol, Self
 
 import numpy as np
 
 from rft.bodies.base import Kinematics
 from rft.loads import element_load, rule_for
-from rft.media.base import Medium, dry_terms, viscous_terms
+from rft.media.base import Medium, dry_terms, is_closed, viscous_terms
 from rft.sides import sided
 
 
@@ -95,6 +96,13 @@ class Averages(PerSample):
     @property
     def rate_independent(self) -> bool:
         return bool(dry_terms(self.medium)) and not any(viscous_terms(self.medium) or ())
+
+    @property
+    def numbers(self) -> tuple | None:
+        """For compiled code: dry terms, viscous coefficients, and whether it is a point's; None where it is no closed form."""
+        if self.rule != "exact" or not is_closed(self.medium):
+            return None
+        return sorted(self.medium.dry, key=lambda term: term[1] == 0.0), self.medium.viscous, False
 
     def __call__(self, v_t, v_n, spin, eps) -> np.ndarray:
         return self.averages(v_t, v_n, spin, eps)
@@ -208,7 +216,15 @@ class Model:
         return loads[0] if len(loads) == 1 else np.concatenate(loads, 2)
 
     def take(self, index) -> Model:
-        """For the samples ``index``."""
+        """For the samples ``index``; itself where nothing differs from sample to sample."""
+        return self if self.alike else self._taken(index)
+
+    @cached_property
+    def alike(self) -> bool:
+        """Whether it holds the same for all samples of a batch."""
+        return self._taken(slice(0, 0)) is self
+
+    def _taken(self, index) -> Model:
         old = tuple(self.contacts.values())
         contacts, terms = _taken(old, index), _taken(self.terms, index)
         if contacts is old and terms is self.terms:

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 
+from rft import backend
 from rft.bodies.base import Body
 from rft.contact import SIDE, Model, rows
 from rft.linear import solve3
 from rft.media.base import is_closed, is_linear
+from rft.numbers import attempt
 from rft.path import follow
-from rft.samples import Samples
-from rft.workers import each, keep_freed_memory, workers
+from rft.samples import Jacobian, Samples, State
+from rft.workers import each, keep_freed_memory, split, workers
 
 LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
@@ -54,6 +55,7 @@ SLOW = (
     Descent(0.3, 0.3, 1e-6, np.inf, 500),
     Descent(1.0, 0.6, 1e-8, np.inf, 3000),
 )
+CROWDED = 0.8  # of samples that go on, below which those that have ended leave the arrays
 DIFFERENCE = 1e-6  # of eps, for the derivative with respect to it
 
 
@@ -66,31 +68,6 @@ class Solved(NamedTuple):
     stuck: np.ndarray
 
 
-@dataclass
-class _State:
-    """Samples under way. Every array has them on its last axis."""
-
-    of: Samples
-    xi: np.ndarray  # (3, B)
-    dx: np.ndarray  # (3, B) the step to try
-    v: np.ndarray  # (3, n, B) element velocities at xi
-    eps: np.ndarray  # the rounding at xi
-    eps_next: np.ndarray  # the rounding to try
-    stride: np.ndarray  # the part of a Newton step to try
-    residual: np.ndarray
-    iterations: np.ndarray
-
-    def take(self, keep: np.ndarray) -> _State:
-        parts = {f.name: getattr(self, f.name) for f in fields(self)}
-        return _State(**{k: x.take(keep) if k == "of" else x[..., keep] for k, x in parts.items()})
-
-    @staticmethod
-    def join(states: list[_State], model: Model) -> _State:
-        parts = {f.name: [getattr(s, f.name) for s in states] for f in fields(_State)}
-        of = Samples.join(parts.pop("of"), model)
-        return _State(of=of, **{k: np.concatenate(x, -1) for k, x in parts.items()})
-
-
 class Balance:
     """How finely to solve the balance of forces of a `rft.contact.Model`; one serves for all time steps.
 
@@ -98,8 +75,8 @@ class Balance:
     are given, and `solve` takes and returns, are true ones. rows: of each contact's elements among all of them.
     """
 
-    def __init__(self, model: Model, rows: list[slice], regularisation: float, tolerance: float):
-        self.model, self.rows, self.regularisation = model, rows, regularisation
+    def __init__(self, model: Model, rows: list[slice], regularisation: float, tolerance: float, backend: str = "auto"):
+        self.model, self.rows, self.regularisation, self.backend = model, rows, regularisation, backend
         self.nodes = model.contacts[SIDE].law.nodes
         medium = model.medium
         lateral = abs(float(medium.traction(0.0, 1.0)[1]))
@@ -124,8 +101,11 @@ class Balance:
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
         for way in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-            if isinstance(way, Descent):
-                self._attempt(todo, way, out, threads)
+            if isinstance(way, Descent) and backend.takes(self.backend, self.model):
+                self._attempt_compiled(todo, way, out, threads)
+            elif isinstance(way, Descent):
+                with backend.counted(self.backend):
+                    self._attempt(todo, way, out, threads)
             else:
                 self._follow(todo, *way, out)
             todo = np.flatnonzero(out.residual > self.limit)
@@ -145,24 +125,26 @@ class Balance:
             return np.where(along > 0, along, across)
         return unit + medium.viscous[0] * np.maximum(scale - 1.0, 0.0)
 
-    def samples(self, index: np.ndarray) -> Samples:
-        """Those of the batch."""
+    def samples(self, index: np.ndarray, compiled: bool = False) -> Samples:
+        """Those of the batch, as compiled code takes their motion or as NumPy does."""
         scale, motion = self.scale[index], self.motion(index)
         motion = motion._replace(v=motion.v / scale)
-        return Samples(index, motion, motion.centre, scale, self.unit[index], self.model.take(index))
+        model = self.model if index.size == self.scale.size else self.model.take(index)
+        given = motion if compiled else Jacobian.of(motion)
+        return Samples(index, given, motion.centre, scale, self.unit[index], model)
 
     def _follow(self, todo, wanted: float, budget: int, out: Solved) -> None:
         """Solve the samples ``todo`` along their curves."""
-        for index in np.array_split(todo, math.ceil(todo.size / self._together(todo))):
+        for index in np.array_split(todo, math.ceil(todo.size / self._together())):
             for i, xi, v, residual, evaluations in follow(self, index, wanted, budget):
                 out.iterations[i] += evaluations
                 solved = residual <= self.limit
                 i = i[solved]
                 out.xi[:, i], out.residual[i], out.stuck[i] = xi[:, solved], residual[solved], self._stuck(v)[solved]
 
-    def _together(self, todo) -> int:
+    def _together(self) -> int:
         """How many samples are solved side by side."""
-        return max(1, ELEMENTS_TOGETHER // (self.motion(todo[:1]).half.shape[0] * self.nodes))
+        return max(1, ELEMENTS_TOGETHER // (self.rows[-1].stop * self.nodes))
 
     def _stuck(self, v: np.ndarray) -> np.ndarray:
         """(B,): whether some element is at rest, from velocities (3, n, B)."""
@@ -171,26 +153,45 @@ class Balance:
 
     def _attempt(self, todo, descent: Descent, out: Solved, threads) -> None:
         """Solve the samples ``todo``, writing to ``out``; each worker keeps its batch full from its share of them."""
-        batch = self._together(todo)
+        batch = self._together()
 
         def work(share, stop):
             queue, state = np.array_split(share, math.ceil(2 * share.size / batch)), None
             while (queue or state is not None) and not stop.is_set():
                 while queue and (state is None or state.of.size <= batch // 2):
                     fresh = self._start(descent, self.samples(queue.pop()))
-                    state = fresh if state is None else _State.join([state, fresh], self.model)
+                    state = fresh if state is None else State.join([state, fresh], self.model)
                 state = self._advance(state, descent, out)
 
-        each(work, np.array_split(todo, workers(threads, todo.size // (2 * batch))))
+        each(work, split(todo, workers(threads, todo.size // (2 * batch))))
 
-    def _start(self, descent: Descent, of: Samples) -> _State:
+    def _attempt_compiled(self, todo, descent: Descent, out: Solved, threads) -> None:
+        """`_attempt` by compiled code, which lets go of the interpreter."""
+        limits = [self.regularisation, self.limit, LARGEST_STEP, SHORTEST, LENGTHEN]
+        batch = 4 * self._together()
+
+        def work(share, stop):
+            for start in range(0, share.size, batch):
+                if stop.is_set():
+                    return
+                index = share[start : start + batch]
+                guess = self.guess[:, index] if descent is WARM else np.zeros((3, 0))
+                done = attempt(self.samples(index, compiled=True), self.rows, descent, limits, guess, self.scaled)
+                out.xi[:, index], out.residual[index], evaluations, slowest = done
+                out.iterations[index] += evaluations
+                out.stuck[index] = (slowest < STUCK_BELOW * self.regularisation) & (not self.linear)
+
+        each(work, split(todo, workers(threads, todo.size // 64)))
+
+    def _start(self, descent: Descent, of: Samples) -> State:
         """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
         size = of.size
         at_rest, worst = np.zeros((3, size)), np.full(size, np.inf)
         first = self.regularisation if self.linear else max(descent.widest, self.regularisation)
         eps = np.full(size, first)
         dx = self.guess[:, of.index] if descent is WARM else self.viscous(of)
-        return _State(of, at_rest, dx, of.motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int))
+        going = np.ones(size, bool)
+        return State(of, at_rest, dx, of.motion.v, eps, eps, np.ones(size), worst, np.zeros(size, int), going)
 
     def viscous(self, of: Samples) -> np.ndarray:
         """(3, B): the solution with kinks rounded off almost without end."""
@@ -224,17 +225,21 @@ class Balance:
         net[:, 1:] *= of.scale
         return load, net
 
-    def _advance(self, s: _State, descent: Descent, out: Solved) -> _State | None:
+    def _advance(self, s: State, descent: Descent, out: Solved) -> State | None:
         """One step of all samples; those that end are written to ``out`` and leave. None when none are left."""
         kept = self._step(s, descent)
         ended = kept & (s.eps <= self.regularisation) & (s.residual <= self.limit)
         ended |= s.iterations >= descent.budget
+        ended &= s.going
         if ended.any():
             self._write(s, ended, out)
-            s = s.take(np.flatnonzero(~ended))
+            s.going = s.going & ~ended
+            left = np.flatnonzero(s.going)
+            if left.size < CROWDED * s.of.size:
+                s = s.take(left)
         return s if s.of.size else None
 
-    def _step(self, s: _State, descent: Descent) -> np.ndarray:
+    def _step(self, s: State, descent: Descent) -> np.ndarray:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
         v = s.v + s.of.motion.carried(s.dx)
         load, net = self._net(s.of, v, s.xi + s.dx, s.eps_next)
@@ -250,7 +255,7 @@ class Balance:
         s.dx = np.where(kept, self._next_step(s, load, net, kept, descent), halved)
         return kept
 
-    def _next_step(self, s: _State, load, net, kept, descent: Descent) -> np.ndarray:
+    def _next_step(self, s: State, load, net, kept, descent: Descent) -> np.ndarray:
         """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
         down = kept & (s.eps > self.regularisation) & (s.residual < descent.loose)
         right = -s.stride * net[:, 0]
@@ -273,7 +278,7 @@ class Balance:
         size2 = (x - s.of.centre[1] * turn) ** 2 + (y + s.of.centre[0] * turn) ** 2 + turn * turn
         return dx * (LARGEST_STEP / np.sqrt(np.maximum(size2, LARGEST_STEP**2)))
 
-    def _write(self, s: _State, ended: np.ndarray, out: Solved) -> None:
+    def _write(self, s: State, ended: np.ndarray, out: Solved) -> None:
         i = s.of.index[ended]
         there = s.eps <= self.regularisation  # a balance with wider rounding is not the one that was asked for
         out.xi[:, i], out.residual[i] = s.xi[:, ended], np.where(there, s.residual, np.inf)[ended]

@@ -67,4 +67,4 @@ def parts(v_n: np.ndarray, spin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     inside = turn > np.abs(v_n)
     left = np.where(inside, (v_n + turn) / 2, np.maximum(v_n, 0.0))
     right = np.where(inside, (v_n - turn) / 2, np.minimum(v_n, 0.0))
-    return np.stack([left, right]), np.where(inside, (1 + v_n / np.where(inside, turn, 1.0)) / 2, v_n > 0), inside
+    return np.array([left, right]), np.where(inside, (1 + v_n / np.where(inside, turn, 1.0)) / 2, v_n > 0), inside

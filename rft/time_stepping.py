@@ -15,11 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.backend import check
 from rft.balance import checked_input
 from rft.bodies.base import Body, Kinematics, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.contact import Model
-from rft.effects.base import Effect, Site, broken, folded, pieced, under_way
+from rft.effects.base import Effect, Prepared, Site, broken, under_way
 from rft.limit_cycle import Approach, HeavyApproach
 from rft.media.base import Medium, in_range, require, require_drag
 from rft.newton import Balance
@@ -27,6 +28,7 @@ from rft.premise import Premise
 from rft.work import Work, done_by
 
 MOST_CYCLES = 60
+MOST_KEPT = 100_000  # elements at all phases, whose motion is kept: some 8 MB
 PAUSE = 1e-9  # of the usual joint speed, below which a phase is a pause and has no scale of its own
 
 
@@ -87,6 +89,7 @@ def time_steps(
     pieces: int = PIECES,
     with_work: bool = False,
     with_path: bool = False,
+    backend: str = "auto",
 ) -> TimeSteps:
     """Body velocities through a gait given over one cycle: alpha, alphadot (..., N, joints), rad and per rad of phase, at
     N >= 8 equally spaced phases. Of order 2 in 1/N.
@@ -96,6 +99,7 @@ def time_steps(
     """
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     require_drag(medium)
+    check(backend)
     require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"time stepping takes 8 phases or more, got alpha {alpha.shape}")
     if cycles is not None:
         in_range("cycles", cycles, 1, 10_000, whole=True)
@@ -105,8 +109,8 @@ def time_steps(
     if cycles is None and broken(effects) & Premise.SE2_SYMMETRIC:
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
-    cut = pieced(body, effects, pieces)
-    problem = Balance.of(folded(effects, medium, cut, loads), cut, regularisation, tolerance)
+    cut, model, rows = Prepared.of(medium, body, effects, loads, pieces)
+    problem = Balance(model, rows, regularisation, tolerance, backend)
     steps = _Steps(problem, cut, halves(body), *shapes, effects)
     found = _round_and_round(steps, phases, cycles, with_work, with_path)
     return _shaped(found, batch, body.length)
@@ -156,7 +160,7 @@ def _moved(pose: np.ndarray, xi: np.ndarray, dt: float) -> np.ndarray:
     """Pose (3, B) after moving with xi (3, B) for dt."""
     half = 0.5 * dt * xi[2]
     z = dt * np.sinc(half / np.pi) * np.exp(1j * (pose[2] + half)) * (xi[0] + 1j * xi[1])
-    return pose + np.stack([z.real, z.imag, dt * xi[2]])
+    return pose + np.array([z.real, z.imag, dt * xi[2]])
 
 
 def _shaped(found: TimeSteps, batch: tuple, length: float) -> TimeSteps:
@@ -190,7 +194,7 @@ class _Steps:
         if self.heavy:  # a heavy body moves while its joints pause
             self.scales = np.broadcast_to(usual, speed.shape)
         self.step, self.pose, self.xi = 0, np.zeros((3, samples)), []
-        self.limit = 0.0
+        self.limit, self.kept = 0.0, []
 
     def foreseen(self):
         """(velocity, pose) at the step to come, the velocity by straight extrapolation."""
@@ -201,19 +205,32 @@ class _Steps:
         before = self.xi[-1] if self.xi else xi
         return xi, _moved(self.pose, (before + xi) / 2, self.dt if self.xi else 0.0)
 
+    def motions(self, k: int) -> dict[str, Kinematics]:
+        """Of every contact's elements at a phase. Those of all phases and cycles are computed at once where they are few."""
+        samples = self.alpha.shape[-1]
+        if self.balance.rows[-1].stop * self.phases * samples > MOST_KEPT:
+            return self.model.motions(self.body.motion(self.alpha[k], self.alphadot[k]))
+        if not self.kept:
+            all_phases = (np.concatenate(list(x), -1) for x in (self.alpha, self.alphadot))
+            whole = self.body.motion(*all_phases)
+            phases = (slice(i * samples, (i + 1) * samples) for i in range(self.phases))
+            self.kept = [self.model.motions(whole.take(phase)) for phase in phases]
+        return self.kept[k]
+
     def next(self, with_work: bool):
         """Take a step: (xi, pose, residual, work) at it."""
         k, first = self.step % self.phases, not self.xi
         guess, pose = self.foreseen()
-        motions = self.model.motions(self.body.motion(self.alpha[k], self.alphadot[k]))
+        motions = self.motions(k)
         if first:
             self.v = {name: np.zeros_like(m.v) for name, m in motions.items()}
         site = Site(0.0 if first else self.dt, pose, motions, self.v)
         if first:
             self.states = [p.begin(site) for p in self.processes]
         model = self._model(site)
+        whole = Kinematics.stacked(list(motions.values()))
         solved = self.balance.solve(
-            Kinematics.stacked(list(motions.values())).take,
+            lambda index: whole if index.size == len(self.scales[k]) else whole.take(index),
             self.scales[k],
             1,
             guess=None if first else guess,

@@ -23,6 +23,11 @@ def workers(threads: int | None, useful: int) -> int:
     return max(1, min(threads or os.cpu_count() or 1, useful))
 
 
+def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
+    """So many shares of the samples."""
+    return np.array_split(samples, count) if count > 1 else [samples]
+
+
 def each(f: Callable, shares: list) -> None:
     """f(share, stop) of each share, side by side: NumPy lets go of the interpreter inside its loops. What is raised here, by
     a signal among others, sets ``stop``, so that no share goes on for more than a step."""

@@ -1,12 +1,17 @@
-"""One thread a process, as many processes as cores for the whole suite, and the truths that are kept."""
+"""One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
 
+import math
 import os
+import time
 
 import pytest
 
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")  # before NumPy loads: the processes share the cores already
 
+from rft import backend, compiled  # noqa: E402
+
+backend.AUTO.worked = -math.inf  # "auto" is NumPy, however long a process has been testing, but for `solved_by`
 TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
 
@@ -64,3 +69,28 @@ def no_lines_of_progress(monkeypatch):
     from geomech import progress
 
     monkeypatch.setattr(progress, "EVERY", 1e9)
+
+
+@pytest.fixture(scope="session")
+def compiled_code(tmp_path_factory):
+    """Compiled descents, made by the first process that asks; the others wait for it."""
+    if not backend.installed():
+        pytest.skip("numba is not installed")
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    try:
+        (folder / "making").mkdir()
+        compiled.make()
+        (folder / "made").touch()
+    except FileExistsError:
+        while not (folder / "made").exists():
+            time.sleep(0.1)
+
+
+@pytest.fixture(params=["numpy", "numba"])
+def solved_by(request, monkeypatch):
+    """Runs a test twice: "auto" is NumPy, and compiled code."""
+    if request.param == "numba":
+        request.getfixturevalue("compiled_code")
+        monkeypatch.setattr(backend.AUTO, "is_ready", True)
+    return request.param

@@ -6,6 +6,7 @@ import golden
 import pytest
 
 
+@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize(
     ("part", "least"),
     [

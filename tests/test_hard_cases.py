@@ -52,12 +52,17 @@ STRANGE_BODIES = {
 }
 
 
+def hard(joints):
+    """Names, alpha and alphadot of all samples of HARD."""
+    problems = [np.broadcast_arrays(*map(np.atleast_2d, make(joints))) for make in HARD.values()]
+    return np.repeat(list(HARD), [len(alpha) for alpha, _ in problems]), *(np.concatenate(x) for x in zip(*problems))
+
+
+@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("medium", MEDIA)
 @pytest.mark.parametrize("body", (BODIES | STRANGE_BODIES).values(), ids=BODIES | STRANGE_BODIES)
 def test_hard_cases(body, medium):
-    problems = [np.broadcast_arrays(*map(np.atleast_2d, make(body.joints))) for make in HARD.values()]
-    cases = np.repeat(list(HARD), [len(alpha) for alpha, _ in problems])
-    alpha, alphadot = (np.concatenate(x) for x in zip(*problems))
+    cases, alpha, alphadot = hard(body.joints)
     solution = body_velocity(MEDIA[medium], body, alpha, alphadot)
     speed = np.linalg.norm(alphadot, axis=-1)
     bad = (solution.status == "unconverged") | ~(solution.residual < 1e-9)
@@ -67,6 +72,7 @@ def test_hard_cases(body, medium):
     assert not bad.any(), set(cases[bad])
 
 
+@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("links", [2, 3, 10, 50, 200])
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "viscous-2", "strong"])
 def test_from_two_to_two_hundred_links(links, medium):

@@ -37,6 +37,5 @@ def accuracy(
         (folder / "accuracy.json").write_text(json.dumps(results, indent=1) + "\n")
         (folder / "accuracy.txt").write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
         fig = draw(results)
-        for ending in ("png", "pdf"):
-            plots.save(fig, folder / f"accuracy.{ending}")
+        plots.save(fig, *(folder / f"accuracy.{ending}" for ending in ("png", "pdf")))
     print(json.dumps(results) if as_json else f"{text}\nfiles in {out}: accuracy.json, .txt, .png, .pdf")

@@ -114,8 +114,7 @@ def steps(top: float) -> list[float]:
 
 
 def _save(fig, stem: Path) -> None:
-    for ending in (".png", ".pdf"):
-        plots.save(fig, stem.with_suffix(ending))
+    plots.save(fig, *(stem.with_suffix(ending) for ending in (".png", ".pdf")))
 
 
 def text_table(title: str, table: dict, scene: Scene) -> str:

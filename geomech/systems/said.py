@@ -6,6 +6,7 @@ import dataclasses
 
 from geomech.errors import short
 from geomech.systems.base import not_so
+from rft.backend import foreign_to
 from rft.bodies import KINDS as BODIES
 from rft.effects import KINDS as EFFECTS
 from rft.media import LAWS
@@ -23,7 +24,9 @@ def told(swimmer) -> list[str]:
         if assumed := effect.assumes(swimmer.medium):
             lines.append(f"     assumes {assumed}")
     off = [name for name in EFFECTS if name not in [e.kind for e in swimmer.effects]]
-    return [*lines, "off, not evaluated: " + (", ".join(off) or "none")]
+    alien = foreign_to(swimmer.medium, swimmer.body, swimmer.effects, swimmer.solver.loads)
+    lines.append("off, not evaluated: " + (", ".join(off) or "none"))
+    return [*lines, f"back end: {swimmer.solver.computed(alien, name_in(LAWS, swimmer.medium))}"]
 
 
 def said(kind: str, thing) -> str:

@@ -172,7 +172,7 @@ class Swimmer(Plain):
         """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. ValueError
         if shape alone does not settle them."""
         self.refuse("body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
-        return rft.body_velocity(self.medium, self.body, alpha, alphadot, **self._settings("tolerance"))
+        return rft.body_velocity(self.medium, self.body, alpha, alphadot, **self._settings("tolerance", "backend"))
 
     sample = solve
 
@@ -203,7 +203,7 @@ class Swimmer(Plain):
 
     def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
         """The gait phase after phase (`rft.time_steps`), unchecked."""
-        asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance")}
+        asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
         return rft.time_steps(self.medium, self.body, alpha, alphadot, **asked)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:

@@ -30,7 +30,7 @@ class Kinematics(NamedTuple):
         """From complex headings, places and velocities (n, B), turning rates (n, B) and half lengths (n, 1)."""
         own = velocity * along.conj()
         lever = 1j * place * along.conj()
-        v = np.stack([own.real, own.imag, turn * half])
+        v = np.array([own.real, own.imag, turn * half])
         return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, 2.0 * half, v)
 
     @property
@@ -43,7 +43,7 @@ class Kinematics(NamedTuple):
         """(2, B): the mean place of the body's length."""
         part = self.half / self.half.sum()
         x, y = self.r_t * self.s + self.r_n * self.c, self.r_n * self.s - self.r_t * self.c
-        return np.stack([(part * x).sum(0), (part * y).sum(0)])
+        return np.array([(part * x).sum(0), (part * y).sum(0)])
 
     def points(self, elements: list[int], ahead: np.ndarray, weight: np.ndarray) -> Kinematics:
         """Of points (k,) that are fixed to some of the elements, so far ahead of their centres, (k, 1) each."""

@@ -66,7 +66,7 @@ class Chain:
         """(name, unit) of each shape variable, for the axes of pictures."""
         return numbered(self.joints, "alpha_{}" if self.modes is None else "m_{}")
 
-    @property
+    @cached_property
     def fractions(self) -> np.ndarray:
         """Link lengths over the body's, shape (n,)."""
         lengths = np.asarray(self.lengths)
@@ -85,9 +85,12 @@ class Chain:
         )
         return int(found[1]) - 1
 
-    def _of_frame(self, x: np.ndarray, frame: str) -> np.ndarray:
-        """The frame's own value from per-link values (n, ...): its link's, or the length-weighted mean."""
-        link = self._link_of(frame)
+    @cached_property
+    def _link(self) -> int | None:
+        return self._link_of(self.frame)
+
+    def _of_link(self, x: np.ndarray, link: int | None) -> np.ndarray:
+        """A frame's own value from per-link values (n, ...): its link's, or the length-weighted mean."""
         return x[link] if link is not None else self.fractions @ x
 
     def _links(self, alpha, alphadot):
@@ -96,10 +99,10 @@ class Chain:
         zero = np.zeros_like(alpha[:1])
         heading = np.concatenate([zero, np.cumsum(alpha, 0)])
         turn = np.concatenate([zero, np.cumsum(alphadot, 0)])
-        heading, turn = (x - self._of_frame(x, self.frame) for x in (heading, turn))
+        heading, turn = (x - self._of_link(x, self._link) for x in (heading, turn))
         half_links = (self.fractions / 2)[:, None] * np.exp(1j * heading)  # complex numbers carry the plane here
         place, velocity = _centres(half_links, zero), _centres(half_links * (1j * turn), zero)
-        return heading, turn, *(x - self._of_frame(x, self.frame) for x in (place, velocity))
+        return heading, turn, *(x - self._of_link(x, self._link) for x in (place, velocity))
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
         """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
@@ -113,7 +116,8 @@ class Chain:
         """
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
-        heading, turn, place, velocity = (self._of_frame(x, frame).reshape(alpha.shape[:-1]) for x in links)
+        link = self._link_of(frame)
+        heading, turn, place, velocity = (self._of_link(x, link).reshape(alpha.shape[:-1]) for x in links)
         place, velocity = self.length * place, self.length * velocity
         h, hdot = (place.real, place.imag, heading), (velocity.real, velocity.imag, turn)
         return np.stack(h, -1), np.stack(hdot, -1)

@@ -12,8 +12,8 @@ import numpy as np
 
 from rft.bodies.base import Body, Kinematics
 from rft.bodies.pieces import PIECES, subdivide
-from rft.contact import Model, PerSample
-from rft.media.base import in_range, require, shown
+from rft.contact import Model, PerSample, rows
+from rft.media.base import in_range, is_frozen, require, shown
 from rft.premise import NONE, SHAPE_ALONE, Premise
 
 MOST_PIECES = 10_000  # to a body length
@@ -99,6 +99,29 @@ class Process(Effect):
         """What is remembered as if the body had moved faster by ``change`` than with xi, (3, B) each, after the last steps,
         of which that at ``site`` was the last; the ground does not notice."""
         return state
+
+
+class Prepared(NamedTuple):
+    """What is solved for: a body as its effects cut it, its model, and where its contacts' elements are (`rft.contact`)."""
+
+    body: Body
+    model: Model
+    rows: list[slice]
+
+    @classmethod
+    def of(cls, medium, body: Body, effects: Sequence[Effect], rule: str, pieces: int) -> Prepared:
+        """Remembered for the last few that cannot change: small batches take no longer to solve than to prepare."""
+        lasting = all(is_frozen(x) for x in (medium, body, *effects))
+        return (_remembered if lasting else _prepared)(medium, body, tuple(effects), rule, pieces)
+
+
+def _prepared(medium, body, effects, rule, pieces) -> Prepared:
+    body = pieced(body, effects, pieces)
+    model, zero = folded(effects, medium, body, rule), np.zeros((body.joints, 1))
+    return Prepared(body, model, rows(model.motions(body.motion(zero, zero))))
+
+
+_remembered = functools.lru_cache(maxsize=32)(_prepared)
 
 
 def folded(effects: Sequence[Effect], medium, body: Body, rule: str = "exact") -> Model:

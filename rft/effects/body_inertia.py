@@ -99,6 +99,11 @@ class Momentum(PerSample):
     def size(self) -> Any:
         return self.rate * self.inertia * self.unit
 
+    @property
+    def numbers(self) -> list:
+        """For compiled code (`rft.backend`): M, shape, past, rate and strength, each a number or (B,)."""
+        return [*self.M.reshape(9, -1), *self.shape, *self.past, self.rate, self.inertia * self.unit]
+
     def __call__(self, xi: np.ndarray) -> np.ndarray:
         momentum = np.concatenate([(np.einsum("ijb,jb->ib", self.M, xi) + self.shape)[:, None], self.M], 1)
         out = self.rate * momentum + _coadjoint(xi[:, None], momentum)

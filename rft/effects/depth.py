@@ -83,5 +83,10 @@ class Multiplied(PerSample):
 
     by: np.ndarray
 
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`)."""
+        return self.by, self.by, self.by
+
     def __call__(self, v_t, v_n, spin) -> tuple[np.ndarray, np.ndarray]:
         return self.by, self.by

@@ -76,6 +76,11 @@ class Weakened(PerSample):
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, shares=(self,))
 
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`)."""
+        return self.left, None
+
     def __call__(self, v_n, spin) -> tuple[np.ndarray, None, None]:
         return self.left, None, None
 

@@ -36,6 +36,11 @@ class _Caps(PerSample):
     medium: Granular
     rate_independent = True
 
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`)."""
+        return list(_CapLaw(self.medium).dry), (0.0, 0.0), True
+
     def __call__(self, v_t, v_n, spin, eps):
         return _CapLaw(self.medium).at(v_t, v_n, eps)
 

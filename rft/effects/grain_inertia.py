@@ -67,6 +67,11 @@ class Flux(PerSample):
 
     beta: np.ndarray | float
 
+    @property
+    def numbers(self):
+        """For compiled code (`rft.backend`)."""
+        return self.beta
+
     def __call__(self, v_t, v_n, spin, eps) -> np.ndarray:
         out = np.zeros((3, 4, *v_n.shape))
         np.multiply(self.beta, squared_speed_load(v_n, spin), out=out[1:])

@@ -39,5 +39,10 @@ class SkinFriction(Effect):
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, factors=(self,))
 
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`): factors along, forwards and backwards, and across."""
+        return self.forward / self.reference, self.backward / self.reference, 1.0
+
     def __call__(self, v_t, v_n, spin) -> tuple[np.ndarray, None]:
         return np.where(v_t >= 0, self.forward / self.reference, self.backward / self.reference), None

@@ -46,5 +46,10 @@ class TowedSled(Effect):
         """The sled's point, of a body whose `Kinematics` is given."""
         return motion.points([0], -(motion.half[:1] + self.distance), np.ones((1, 1)))
 
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`)."""
+        return self.pull, self.pull, self.pull
+
     def __call__(self, v_t, v_n, spin) -> tuple[float, float]:
         return self.pull, self.pull

@@ -56,7 +56,7 @@ class Transient(Process):
         step = SIGN * site.before[SIDE][1], SIGN * velocity, site.dt, _rate(self.travel)
         own = _developed(state, *step)[0]  # to the left in the part that moves left, to the right in the other
         others = 1 - _developed(1 - state[::-1], *step)[0]  # what one side loses another gains in the same way
-        return np.stack([left * own[0] + (1 - left) * others[1], left * others[0] + (1 - left) * own[1]])
+        return np.array([left * own[0] + (1 - left) * others[1], left * others[0] + (1 - left) * own[1]])
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,11 @@ class Developed(PerSample):
 
     def apply(self, model: Model) -> Model:
         return model.changed(SIDE, shares=(self,))
+
+    @property
+    def numbers(self) -> tuple:
+        """For compiled code (`rft.backend`)."""
+        return None, (self.shares, self.before, self.dt, self.rate)
 
     def __call__(self, v_n, spin) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         velocity, _, inside = parts(v_n, spin)

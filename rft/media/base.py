@@ -108,10 +108,18 @@ def require_law(medium: Medium) -> None:
     require(good, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
 
 
+def _drags(medium: TermLaw) -> bool:
+    """Whether all terms of a closed form are drags, and there are some; if not, they may yet be drags together."""
+    every = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
+    return min(every) >= 0.0 and 0.0 < max(every) < np.inf
+
+
 def require_drag(medium: Medium) -> None:
     """Raise ValueError if the medium pushes: if at some velocity, of 48 directions and speeds from 1e-12 to 1e12, its force
     has a part along the motion, not against it, or if it has none at all."""
     require_law(medium)
+    if getattr(type(medium), "traction", None) is TermLaw.traction and _drags(medium):
+        return
     v_t, v_n = TRIED
     with np.errstate(all="ignore"):
         f_t, f_n = medium.traction(v_t, v_n)
@@ -151,6 +159,18 @@ def power_of(medium: Medium) -> float | None:
     return round(float(np.log10(growth.mean())), 6) + 0.0 if alike else None
 
 
+def is_frozen(thing) -> bool:
+    """Whether it stays what it is: a frozen dataclass of what can be a key, which an array of parameters cannot."""
+    parameters = getattr(type(thing), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
+        return False
+    try:
+        hash(thing)
+    except TypeError:
+        return False
+    return True
+
+
 def real_array(name: str, x) -> np.ndarray:
     """x as an array of floats, or ValueError naming it."""
     try:
@@ -169,8 +189,8 @@ def is_number(value) -> bool:
 
 def in_range(name: str, value, low: float, high: float, whole: bool = False) -> None:
     """ValueError naming it unless value is a number, or a whole one, from low to high."""
-    good = is_number(value) and low <= value <= high and (not whole or value == int(value))
-    require(good, f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {shown(value)}")
+    if not (is_number(value) and low <= value <= high and (not whole or value == int(value))):
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {low:g} to {high:g}, got {shown(value)}")
 
 
 def check_ranges(owner, **ranges: tuple[float, float]) -> None:

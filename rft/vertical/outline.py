@@ -9,6 +9,7 @@ import numpy as np
 from rft.media.base import is_number, real_array, require, shown
 
 MOST_ELEMENTS = 5000
+FEW = 500  # elements, of which pairs are compared all at once, without loading a tree
 LARGEST = 10.0  # m; what is larger was likely given in mm
 
 
@@ -107,12 +108,19 @@ def _check_simple(points, closed: bool) -> None:
     require(not i.size, f"elements {i[:1]} and {j[:1]} of the outline cross or touch: order its points along the edge")
 
 
-def _meeting(points, along, closed: bool):
-    """Pairs of elements that meet, but for neighbours. Only those whose middles are close can."""
+def _close(points, reach: float) -> np.ndarray:
+    """(2, k): pairs of points not further apart than ``reach``, the first before the second."""
+    if len(points) <= FEW:
+        away = points[:, None] - points
+        return np.array(np.nonzero(np.triu(np.hypot(away[..., 0], away[..., 1]) <= reach, 1)))
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(points[:-1] + along / 2)
-    i, j = tree.query_pairs(np.hypot(*along.T).max() * (1 + 1e-9), output_type="ndarray").T
+    return cKDTree(points).query_pairs(reach, output_type="ndarray").T
+
+
+def _meeting(points, along, closed: bool):
+    """Pairs of elements that meet, but for neighbours. Only those whose middles are close can."""
+    i, j = _close(points[:-1] + along / 2, np.hypot(*along.T).max() * (1 + 1e-9))
     apart = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
     i, j = i[apart], j[apart]
     a, d, b, e = points[i], along[i], points[j], along[j]

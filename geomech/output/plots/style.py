@@ -94,7 +94,32 @@ def check_format(path: str | Path) -> Path:
 
 
 @styled
-def save(fig, path: str | Path) -> None:
-    """Write a figure; the file appears whole or not at all."""
-    with whole_file(check_format(path)) as part:
-        fig.savefig(part, dpi=STYLE["savefig.dpi"])
+def save(fig, *paths: str | Path) -> None:
+    """Write a figure to files, each of which appears whole or not at all. It is laid out for the first and drawn once for
+    each, where `savefig` lays out and draws twice for each."""
+    canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
+    try:
+        for path in map(check_format, paths):
+            with whole_file(path) as part:
+                fig.dpi = STYLE["savefig.dpi"]
+                _print(fig, path.suffix.lower(), part)
+            fig.set_layout_engine("none")
+    finally:
+        fig.set_layout_engine(engine)
+        fig.set_canvas(canvas)
+        fig.dpi = dpi
+
+
+def _print(fig, ending: str, file: Path) -> None:
+    if ending == ".png":
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        FigureCanvasAgg(fig).print_png(file)
+    elif ending == ".pdf":
+        from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
+        FigureCanvasPdf(fig).print_pdf(file)
+    else:
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+        FigureCanvasSVG(fig).print_svg(file)

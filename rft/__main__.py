@@ -1,0 +1,11 @@
+"""python -m rft: make the compiled code of the solver now, so that no later run has to."""
+
+import sys
+
+from rft import compiled
+
+try:
+    kept = compiled.make()
+except ValueError as error:
+    sys.exit(str(error))
+print(f"compiled code is kept in {compiled.folder()}" if kept else "no folder to keep it in: set NUMBA_CACHE_DIR")

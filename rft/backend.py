@@ -1,0 +1,122 @@
+"""Which code makes the solver's descents: NumPy's batches, or compiled scalar code (`rft.scalar`) where numba is installed
+and a model is nothing but numbers.
+
+Both take the same steps to the same answer, but for rounding. For a hundred samples compiled code is some twenty times as
+fast, for many thousands some six times; but to load it takes half a second, and to make it, once for an installation, some
+fifteen. So "auto" begins with NumPy, and loads the compiled code once NumPy has worked for as long as loading takes. Where
+it is not made yet, a process of lower priority makes it meanwhile; nobody waits for it, and it ends with the command.
+`python -m rft` makes it beforehand.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import functools
+import importlib.util
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from rft.bodies.base import Body
+from rft.contact import Model
+from rft.effects.base import Effect, Site, folded, pieced, under_way
+from rft.media.base import require, shown
+from rft.numbers import foreign
+
+BACKENDS = ("auto", "numpy", "numba")
+TO_LOAD, LONG = 0.5, 3.0  # s of NumPy's work after which the compiled code is loaded, and is made
+
+
+def check(backend: str) -> None:
+    """ValueError for no back end, and for one that is not installed."""
+    if not (isinstance(backend, str) and backend in BACKENDS):
+        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {shown(backend)}")
+    require(
+        backend != "numba" or installed(), "backend = 'numba' takes numba: pip install 'geomech[fast]', or take 'auto'"
+    )
+
+
+@functools.cache
+def installed() -> bool:
+    """Whether numba is."""
+    return importlib.util.find_spec("numba") is not None
+
+
+def takes(backend: str, model: Model) -> bool:
+    """Whether the next descents of a model are compiled ones."""
+    if backend == "numpy" or foreign(model) is not None or not installed():
+        return False
+    return backend == "numba" or AUTO.ready()
+
+
+def foreign_to(medium, body: Body, effects: Sequence[Effect], loads: str):
+    """What of a body's model, with all that its effects bring about while they go on, compiled code does not know; None if
+    nothing."""
+    body = pieced(body, effects, 1)
+    model = folded(effects, medium, body, loads)
+    motions = model.motions(body.motion(*np.zeros((2, body.joints, 1))))
+    held = {name: 0.0 * motion.v for name, motion in motions.items()}
+    first, next_ = (Site(dt, np.zeros((3, 1)), motions, held) for dt in (0.0, 1.0))
+    for process in under_way(effects):
+        state = process.after(process.begin(first), first, held)
+        model = process.at(state, next_).apply(model)
+    return foreign(model)
+
+
+@contextlib.contextmanager
+def counted(backend: str):
+    """Count NumPy's work in the body of the statement, so that "auto" knows when compiled code pays: its own, not what it
+    waits for on a busy machine."""
+    start = time.process_time()
+    yield
+    if backend == "auto":
+        AUTO.worked += time.process_time() - start
+
+
+class Auto:
+    """What "auto" knows in this process. worked: s of NumPy's work."""
+
+    def __init__(self):
+        self.worked, self.maker, self.is_ready = 0.0, None, False
+
+    def ready(self) -> bool:
+        """Whether compiled code lies ready, and has been worth loading."""
+        if self.is_ready or self.worked < TO_LOAD:
+            return self.is_ready
+        if self.maker is not None and self.maker.poll() is None:
+            return False
+        from rft import compiled  # which takes half a second
+
+        self.is_ready = compiled.made()
+        if not self.is_ready and self.maker is None and self.worked > LONG and not _is_child():
+            self.maker = _started()
+        return self.is_ready
+
+
+AUTO = Auto()
+
+
+def _is_child() -> bool:
+    """Whether this is a worker of another process, which has the code made itself."""
+    import multiprocessing
+
+    return multiprocessing.parent_process() is not None
+
+
+def _started():
+    """A process that makes the compiled code, and does not outlive this one."""
+    import subprocess
+
+    code = f"import sys; sys.path[:] = {sys.path!r}; from rft import compiled; compiled.make(5)"
+    nothing = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    maker = subprocess.Popen([sys.executable, "-c", code], **nothing)
+    atexit.register(_end, maker)
+    return maker
+
+
+def _end(maker) -> None:
+    maker.terminate()
+    maker.wait()

@@ -1,0 +1,263 @@
+"""Compiled descents against NumPy's: the same answers for every medium, body and effect; and which of the two is taken."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+import types
+
+import numpy as np
+import pytest
+from registry import BODIES, EFFECTS, MEDIA
+from test_cli import geomech
+from test_hard_cases import GLASS, STRANGE_BODIES, hard
+
+from geomech import scene as scenes
+from geomech.gaits import Ellipse
+from geomech.output.explain import explain
+from geomech.systems import solver
+from rft import Chain, EndCaps, GrainInertia, SkinFriction, TowedSled, backend, body_velocity, compiled, time_steps
+from rft.bodies.base import Kinematics
+from rft.contact import Model
+from rft.samples import Jacobian
+
+BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
+GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
+BOTH = ("numpy", "numba")
+ILL_CONDITIONED = ("a millionth of a link", "twelve")
+
+
+def apart(one, other, alphadot, body):
+    """(...,): how far body velocities differ, over the joints' speed."""
+    speed = np.linalg.norm(alphadot, axis=-1, keepdims=True) + 1e-300
+    return (np.abs(one.xi - other.xi) / [body.length, body.length, 1.0] / speed).max(-1)
+
+
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize("name", BODIES | STRANGE_BODIES)
+def test_the_same_answers(name):
+    """To 1e-10. A link of a millionth, or twelve that lie upon each other, make a balance so badly conditioned at the usual
+    regularisation that its residual leaves the sixth digit open; there at a wider one."""
+    body = (BODIES | STRANGE_BODIES)[name]
+    cases, alpha, alphadot = hard(body.joints)
+    for medium in MEDIA.values():
+        for regularisation in (1e-6, 1e-3)[: 1 + (name in ILL_CONDITIONED)]:
+            given = {"regularisation": regularisation}
+            plain, fast = (body_velocity(medium, body, alpha, alphadot, backend=b, **given) for b in BOTH)
+            assert (plain.status == fast.status).all()
+            assert fast.residual.max() < 1e-9
+            bad = apart(plain, fast, alphadot, body) > 1e-10
+            bad &= name not in ILL_CONDITIONED or regularisation > 1e-6
+            assert not bad.any(), set(cases[bad])
+
+
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_same_marches(name):
+    alpha, alphadot = GAIT.cycle(12, np.array([0.4, 1.0]))
+    effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
+    effects = effects[:1] if name == "end-caps" else effects
+    given = {"effects": effects, "cycles": 2, "with_work": True}
+    plain, fast = (time_steps(GLASS, BODY, alpha, alphadot, backend=b, **given) for b in BOTH)
+    np.testing.assert_allclose(plain.xi, fast.xi, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(plain.pose, fast.pose, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(plain.status, fast.status)
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_parameters_of_each_sample_and_threads():
+    """Effects with a parameter for each sample, in a batch that is cut between threads."""
+    rng = np.random.default_rng(5)
+    alpha, alphadot = rng.uniform(-2, 2, (300, 2)), rng.normal(size=(300, 2))
+    some = rng.uniform(0.05, 1.0, (3, 300))
+    effects = (
+        SkinFriction().having(forward=some[0], backward=some[1]),
+        TowedSled(1.0, 0.3).having(pull=some[2]),
+        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).having(strength=some[0]),
+    )
+    plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
+    assert apart(plain, fast, alphadot, BODY).max() < 1e-10
+    np.testing.assert_array_equal(plain.status, fast.status)
+    alone = body_velocity(
+        GLASS, BODY, alpha[7], alphadot[7], effects=[e.take(slice(7, 8)) for e in effects], backend="numba"
+    )
+    np.testing.assert_allclose(alone.xi, fast.xi[7], rtol=0, atol=1e-15)
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_compiled_once_for_all():
+    """One signature: whatever the model, no call waits for another compilation."""
+    from rft.scalar import attempt
+
+    alpha, alphadot = GAIT.cycle(8)
+    every = [make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name]
+    for medium, effects in (
+        (GLASS, ()),
+        (GLASS, every),
+        *((GLASS, [e]) for e in every),
+        (MEDIA["viscous-2"], every[-1:]),
+    ):
+        time_steps(medium, BODY, alpha, alphadot, effects=effects, cycles=1, backend="numba")
+    body_velocity(GLASS, BODY, np.asfortranarray(alpha), alphadot[:, ::-1], backend="numba")
+    assert len(attempt.signatures) == 1
+
+
+class Sheared:
+    """A law of one's own, without closed form."""
+
+    def traction(self, v_t, v_n, eps=0.0):
+        R = np.sqrt(v_t**2 + v_n**2 + eps**2)
+        return v_t / R, 2 * v_n / R
+
+
+def test_what_stays_with_numpy_and_why():
+    scene = scenes.load("three-link-glass")
+    swimmer = scene.system
+    line = lambda s: next(x for x in s.told() if x.startswith("back end: ")).removeprefix("back end: ")
+    assert line(swimmer).startswith("compiled code after 0.5 s of NumPy")
+    assert line(swimmer) in explain(scene)
+    assert line(scene.with_numerics(backend="numba").system).startswith("compiled code;")
+    assert line(scene.with_numerics(backend="numpy").system) == "NumPy, as asked for"
+    by_rule = line(scene.with_numerics(loads="midpoint:20").system)
+    assert by_rule == "NumPy: compiled code does not know the law granular by quadrature"
+    assert "law Sheared by quadrature" in line(dataclasses.replace(swimmer, medium=Sheared()))
+    for make, _ in EFFECTS.values():  # all that ship are numbers
+        assert line(dataclasses.replace(swimmer, effects=(make(0.1),))).startswith("compiled code")
+    slower = dataclasses.replace(swimmer, effects=(Slower(),))
+    assert line(slower) == "NumPy: compiled code does not know Slower"
+    assert not backend.takes("numba", slower.effects[0].apply(Model.of(GLASS)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Slower(SkinFriction):
+    """An effect of one's own, of which compiled code has no numbers."""
+
+    kind = "slower"
+    numbers = None
+
+    def __call__(self, v_t, v_n, spin):
+        return 0.5 + 0.0 * v_t, None
+
+
+def test_no_numba(monkeypatch):
+    for module in (backend, solver):
+        monkeypatch.setattr(module, "installed", lambda: False)
+    monkeypatch.setattr(backend.AUTO, "is_ready", True)
+    assert not backend.takes("auto", Model.of(GLASS))
+    assert "numba is not installed (pip install 'geomech[fast]')" in explain(scenes.load("three-link-glass"))
+    with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
+        body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend="numba")
+    with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
+        scenes.load("three-link-glass").with_numerics(backend="numba")
+
+
+def test_backends_that_are_none(tmp_path):
+    for wrong in ("cuda", 3, None):
+        with pytest.raises(ValueError, match="backend must be one of auto, numpy, numba, got"):
+            body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend=wrong)
+    (tmp_path / "s.toml").write_text(scenes.load("three-link-glass").text + '[numerics]\nbackend = "Numba"\n')
+    code, out, err = geomech("explain", tmp_path / "s.toml")
+    assert (code, out) == (2, "")
+    assert "backend must be one of auto, numpy, numba, got 'Numba'" in err
+    assert err.count("\n") == 1
+
+
+@pytest.fixture
+def auto(monkeypatch):
+    """What "auto" knows at the start of a process, and what it does: made, started."""
+    fresh, seen = backend.Auto(), types.SimpleNamespace(made=False, started=0, going=True)
+    maker = types.SimpleNamespace(poll=lambda: None if seen.going else 0)
+
+    def started():
+        seen.started += 1
+        return maker
+
+    monkeypatch.setattr(backend, "AUTO", fresh)
+    monkeypatch.setattr(backend, "installed", lambda: True)
+    monkeypatch.setattr(backend, "_started", started)
+    monkeypatch.setattr(compiled, "made", lambda: seen.made)
+    return fresh, seen
+
+
+def test_auto_begins_with_numpy_and_loads_when_that_pays(auto):
+    fresh, seen = auto
+    seen.made, model = True, Model.of(GLASS)
+    assert not backend.takes("auto", model)
+    with backend.counted("auto"):
+        pass
+    assert 0 < fresh.worked < backend.TO_LOAD
+    fresh.worked = backend.TO_LOAD
+    assert backend.takes("auto", model)
+    assert not backend.takes("numpy", model)
+    assert seen.started == 0
+
+
+def test_auto_waits_for_no_compilation(auto):
+    """Another process makes the code; until it has, NumPy goes on."""
+    fresh, seen = auto
+    model, fresh.worked = Model.of(GLASS), 1.0
+    assert not backend.takes("auto", model)
+    assert seen.started == 0  # not worth it yet
+    fresh.worked = 10.0
+    assert [backend.takes("auto", model) for _ in range(3)] == [False] * 3
+    assert seen.started == 1
+    seen.made, seen.going = True, False
+    assert backend.takes("auto", model)
+
+
+def test_a_maker_that_fails_is_not_started_again(auto):
+    fresh, seen = auto
+    fresh.worked, seen.going = 10.0, False
+    assert [backend.takes("auto", Model.of(GLASS)) for _ in range(3)] == [False] * 3
+    assert seen.started == 1
+
+
+def test_the_maker_ends_with_the_command(monkeypatch):
+    """By its own id; nothing is left running."""
+    left = []
+    monkeypatch.setattr(backend.atexit, "register", lambda f, *args: left.append((f, args)))
+    maker = backend._started()
+    ((end, args),) = left
+    assert maker.poll() is None
+    end(*args)
+    assert maker.poll() is not None
+
+
+def test_a_folder_that_cannot_be_written(tmp_path, monkeypatch):
+    """Not even that of a mark."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(compiled, "_mark", lambda: (tmp_path / "file" / "mark", "text"))
+    monkeypatch.setattr("rft.body_velocity", lambda *args, **kwargs: None)
+    assert not compiled.made()
+    assert not compiled.make()
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_made_beforehand():
+    done = subprocess.run([sys.executable, "-m", "rft"], capture_output=True, text=True, env=os.environ)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("compiled code is kept in ")
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_code_of_another_source_or_machine_is_not_taken(monkeypatch, tmp_path):
+    text = compiled._mark()[1]
+    assert compiled.made()
+    assert compiled.STAMP in text
+    (tmp_path / "mark").write_text(text.replace(compiled.STAMP, "0" * 16))
+    monkeypatch.setattr(compiled, "_mark", lambda: (tmp_path / "mark", text))
+    assert not compiled.made()
+
+
+def test_one_matrix_does_what_a_motion_does():
+    """Carrying, the wrench and its tangent, of a body whose elements have points besides, and of some of its samples."""
+    rng = np.random.default_rng(4)
+    body = Chain((0.7, 1.4, 0.9), frame="link-1")
+    links = body.motion(rng.normal(size=(2, 6)), rng.normal(size=(2, 6)))
+    motion = Kinematics.stacked([links, links.points([0, 2], np.array([[-0.2], [0.3]]), np.full((2, 1), 0.4))])
+    xi, load = rng.normal(size=(3, 6)), rng.normal(size=(3, 4, 5, 6))
+    some = Jacobian.join([Jacobian.of(motion.take(np.arange(2))), Jacobian.of(motion).take(np.arange(2, 6))])
+    np.testing.assert_allclose(some.carried(xi), motion.carried(xi), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(some.wrench(load[:, 2]), motion.wrench(load[:, 2]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(some.assembled(load), motion.assembled(load), rtol=0, atol=1e-13)
+    np.testing.assert_array_equal(some.v, motion.v)
