@@ -111,7 +111,7 @@ class Prepared(NamedTuple):
     @classmethod
     def of(cls, medium, body: Body, effects: Sequence[Effect], rule: str, pieces: int) -> Prepared:
         """Remembered for the last few that cannot change: small batches take no longer to solve than to prepare."""
-        lasting = all(is_frozen(x) for x in (medium, body, *effects))
+        lasting = isinstance(rule, str) and type(pieces) is int and all(map(is_frozen, (medium, body, *effects)))
         return (_remembered if lasting else _prepared)(medium, body, tuple(effects), rule, pieces)
 
 
