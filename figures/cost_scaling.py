@@ -130,7 +130,7 @@ def draw(numbers: dict):
         ax.set_xticks(shown, [f"{v:,.0f}" for v in shown])
         ax.minorticks_off()
         ax.grid(True, which="major", lw=0.3, color="0.85")
-    axes[0, 0].legend(loc="center right", bbox_to_anchor=(1.0, 0.62))
+    axes[0, 0].legend(loc="center right", bbox_to_anchor=(1.0, 0.56))
     return fig
 
 
