@@ -29,6 +29,7 @@ from rft import (
     Transient,
     Viscous,
     body_velocity,
+    time_stepping,
     time_steps,
     work_done,
 )
@@ -547,21 +548,28 @@ def test_time_stepping_that_fails_says_so(monkeypatch):
         found.checked()
 
 
-def test_what_does_not_change_is_not_built_again(monkeypatch):
-    """One balance a march and one motion a step, work and several effects included."""
+@pytest.mark.parametrize("kept", [True, False])
+def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
+    """One balance a march, and one motion for all phases and cycles, or one a step where they are too many to keep; the
+    same answer by both."""
+    effects, counts = (Transient(travel=0.05), DisturbedGround(0.05, 0.2), EndCaps(radius=0.05), heavy(1.0)), []
+    usual = time_steps(GLASS, Chain(), *HEAVY.cycle(8), effects=effects, cycles=2, with_work=True)
     made = []
     for owner, what in ((Balance, "__init__"), (Chain, "motion")):
         original = getattr(owner, what)
         counted = lambda *args, f=original, what=what: made.append(what) or f(*args)
         monkeypatch.setattr(owner, what, counted)
-    effects, counts = (Transient(travel=0.05), DisturbedGround(0.05, 0.2), EndCaps(radius=0.05), heavy(1.0)), []
+    if not kept:
+        monkeypatch.setattr(time_stepping, "MOST_KEPT", 0)
     for phases in (8, 16):
         made.clear()
-        time_steps(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
+        found = time_steps(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
         assert made.count("__init__") == 1
         counts.append(made.count("motion"))
-    assert counts[1] - counts[0] == 2 * 8
-    assert counts[0] < 2 * 8 + 10
+        if phases == 8:
+            np.testing.assert_allclose(found.xi, usual.xi, rtol=0, atol=1e-12)
+    assert counts[1] - counts[0] == (0 if kept else 2 * 8)
+    assert counts[0] < (0 if kept else 2 * 8) + 10
 
 
 def test_halves_are_the_whole_body():
