@@ -4,11 +4,10 @@
     study.displacement("direct", amplitudes=[0.5, 1.0])
 
 load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
-Study                                   what follows: connection, CCF, displacements and their errors
+Study, tiers                            what follows: connection, CCF, cost, displacements, their errors
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
-tiers, optimise                         ways to predict a displacement; the gait with the largest
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
-undulation, plots                       swimmers that undulate; figures
+optimise, undulation, plots             the best gait; swimmers that undulate; figures
 
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """

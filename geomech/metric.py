@@ -119,7 +119,11 @@ def fit_norm(
     if len(axes) != 2:
         raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
     unit = directions(2, count)
-    F = _sampled(norm, axes, unit, progress)
+    return of_samples(_sampled(norm, axes, unit, progress), axes, unit, degree, highest=highest)
+
+
+def of_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
+    """As `fit_norm`, of norms F (C, N_1, N_2) of the rates ``unit`` (C, 2) that are known already."""
     basis = _even(np.arctan2(unit[:, 1], unit[:, 0]), highest)
     onto = np.linalg.pinv(basis)
     coefficients = np.tensordot(onto, F, 1)

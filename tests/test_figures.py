@@ -8,7 +8,15 @@ import sys
 import numpy as np
 import pytest
 
-from figures import fig05c_force_law, fig11c_connection, fig11d_ccf, fig11e_displacement, kinks, optimal_gaits
+from figures import (
+    fig05c_force_law,
+    fig11c_connection,
+    fig11d_ccf,
+    fig11e_displacement,
+    frames_area,
+    kinks,
+    optimal_gaits,
+)
 from geomech.scene import load
 from geomech.study.bench import Study
 from rft import Granular
@@ -74,6 +82,19 @@ def test_fig11e(tmp_path):
     # The butterfly is the better gait (Fig. 11(e)): at its published size it outdoes every circle.
     assert plots.net(tables["butterfly"]["direct"])[1] > 1.5 * 0.1378
     assert drawn(fig11e_displacement, numbers, tmp_path)
+
+
+def test_frames_area(tmp_path):
+    """In the minimum-perturbation frame the area is as good as the path; what the connection leaves no frame takes away."""
+    numbers = frames_area.compute(count=2)
+    for gait in numbers.values():
+        distance = [np.hypot(*gait[frame]["direct"][:, :2].T) for frame in frames_area.FRAMES]
+        np.testing.assert_allclose(distance[1:], distance[:1] * np.ones((2, 1)), rtol=1e-5)
+        of_path = frames_area.missed(gait["mean"], "path")
+        apart = {frame: np.abs(frames_area.missed(gait[frame], "area") - of_path)[-1] for frame in frames_area.FRAMES}
+        assert apart["minimum-perturbation"] < 0.25 * min(apart["mean"], apart["link-2"])
+        assert of_path[-1] > 0.01
+    assert drawn(frames_area, numbers, tmp_path)
 
 
 def test_kinks(tmp_path):

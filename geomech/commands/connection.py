@@ -7,7 +7,17 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import ExtentOption, GridOption, PlotOption, SceneArgument, YesOption, check_netcdf, field
+from geomech.commands.options import (
+    BesideOption,
+    ExtentOption,
+    GridOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    beside_field,
+    check_netcdf,
+    field,
+)
 from geomech.errors import SceneError, choose
 
 
@@ -19,6 +29,8 @@ def connection(
     plot: PlotOption = None,
     sign: Annotated[Optional[str], typer.Option(help="of a .mat file: + for xi = + A alphadot (as is), or -")] = None,
     order: Annotated[Optional[str], typer.Option(help="of a .mat file: ndgrid (as is) or meshgrid")] = None,
+    style: Annotated[Optional[str], typer.Option(help="of the plot: quiver or streamlines")] = None,
+    beside: BesideOption = None,
     yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
@@ -32,6 +44,10 @@ def connection(
             choose(option, word, known)
             if out.suffix == ".nc":
                 raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
+    if plot is None and (style or beside):
+        raise SceneError("--style and --beside are those of a figure: say --plot FILE")
+    if style is not None:
+        choose("--style", style, plots.CONNECTION_STYLES)
     study = field(
         name, grid, extent, out, plot, plot is not None or out.suffix == ".mat", yes, harmonics=out.suffix == ".nc"
     )
@@ -43,4 +59,7 @@ def connection(
             note(f"{out} has {SIGNS['+']}; --sign - gives the other")
     if plot:
         system = study.scene.system
-        plots.save(plots.connection_figure(study.fitted, system.unit, system.shape_labels), plot)
+        told = {"labels": system.shape_labels, "style": style or "quiver"}
+        if beside is not None:
+            told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
+        plots.save(plots.connection_figure(study.fitted, system.unit, **told), plot)

@@ -31,6 +31,7 @@ def displacement(
     grid: GridOption = None,
     extent: ExtentOption = None,
     tol: Annotated[Optional[float], typer.Option(help="error in body lengths that the cheapest tier must meet")] = None,
+    effort: Annotated[bool, typer.Option("--cost", help="add path length, work and cost of transport")] = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
     yes: YesOption = False,
@@ -40,21 +41,27 @@ def displacement(
     from geomech.study import cost
     from geomech.study.bench import METHODS, Study
     from geomech.study.choose import cheapest
+    from geomech.study.effort import add_effort, refuse_costless
 
     chosen = [choose("--methods", m.strip(), METHODS) for m in methods.split(",")] if methods is not None else None
     scene = loaded(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     check_outputs(scene, None, plot)
+    if effort:
+        refuse_costless(scene)
     with terminal.progress(f"displacement of {scene.name}") as bar:
+        more = cost.of_effort(scene, len(values)) if effort else []
         if tol is None:
             study = Study(scene)
-            allow(scene, study.cost(values, chosen or study.methods), yes)
+            allow(scene, study.cost(values, chosen or study.methods, more=more), yes)
             table = study.study(values, chosen or study.methods, progress=bar)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
         else:
-            ask = lambda jobs: allow(scene, cost.price(jobs), yes)
+            ask = lambda jobs: allow(scene, cost.price([*jobs, *more]), yes)
             table = cheapest(scene, values, tol, ask=ask)
+        if effort:
+            add_effort(table)
     if plot:
         system, name = scene.system, type(scene.gait).__name__.lower()
         plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)

@@ -56,6 +56,9 @@ CyclesOption = Annotated[int, typer.Option("--cycles", metavar="N", help="cycles
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 
+BesideOption = Annotated[
+    Optional[str], typer.Option("--beside", metavar="FRAME", help="draw another body frame below, on the same scales")
+]
 PluginOption = Annotated[
     Optional[list[Path]],
     typer.Option(
@@ -268,13 +271,14 @@ def loaded_walker(name: str):
 
 def field(
     name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False,
-    harmonics: bool = False,
+    harmonics: bool = False, metric: bool = False,
 ):  # fmt: skip
     """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space.
     with_gait: and the gait, which is refused if it leaves the field. harmonics: with those of the velocity, where it has
-    any beside the connection."""
+    any beside the connection, and the metric, if it has one. metric: it must."""
     from geomech.study.bench import Study
-    from geomech.study.cost import built, price
+    from geomech.study.cost import built, of_metric, price
+    from geomech.study.effort import shared, why_none
     from geomech.tiers import TIERS
 
     scene = loaded(name, grid, extent)
@@ -287,9 +291,28 @@ def field(
         if with_gait:
             study.refuse_outside()
         check_outputs(scene, output, plot)
-        tiers = ["path", *(["harmonic"] if harmonics and "harmonic" in study.lookups else [])]
-        allow(scene, price([built(scene, tier) for tier in tiers]), yes, WORTH_SAYING)
+        parts, jobs = [study.compute_field], [built(scene, "path")]
+        if metric and (reason := why_none(scene.system)):
+            raise SceneError(f"{scene.name}: {reason}")
+        costed = metric or (harmonics and not why_none(scene.system))
+        if costed:
+            parts, jobs = [*parts, study.compute_metric], [*jobs, *of_metric(scene)]
+        if harmonics and "harmonic" in study.lookups:
+            parts.append(lambda progress: study.table("harmonic", progress=progress))
+            jobs += [] if costed and shared(scene.system) else [built(scene, "harmonic")]
+        allow(scene, price(jobs), yes, WORTH_SAYING)
     with terminal.progress(f"field of {scene.name}") as bar:
-        for k, tier in enumerate(tiers):
-            study.table(tier, progress=lambda done: bar((k + done) / len(tiers)))
+        for k, part in enumerate(parts):
+            part(progress=lambda done: bar((k + done) / len(parts)))
     return study
+
+
+def beside_field(study, frame: str, yes: bool):
+    """The study of the same scene in another body frame, with its field computed."""
+    from geomech.study.cost import built, price
+
+    other = study.in_frame(frame)
+    allow(other.scene, price([built(other.scene, "path")]), yes, WORTH_SAYING)
+    with terminal.progress(f"field of {other.scene.name}, frame {frame}") as bar:
+        other.compute_field(bar)
+    return other

@@ -11,10 +11,13 @@ from geomech.connection import Connection
 from geomech.field import Field
 from geomech.files import whole_file
 from geomech.harmonics import Harmonics
+from geomech.metric import Finsler, Metric
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
+from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.tables.netcdf import SHAPE
+from geomech.two_form import TwoForm
 
 COMPONENTS = ("x", "y", "theta")
 UNITS = {"BL": "body length", "m": "m"}
@@ -32,8 +35,9 @@ class Variable(NamedTuple):
 
 def save_connection(path: str | Path, study: Study) -> None:
     """Write A (component, joint, alpha_1, ...), its fit residual, the rms of xi and, for two joints, the CCF with its
-    estimated error and, where xi is not linear in alphadot, its odd harmonics; with units, conventions (`about`) and the
-    scene's text. `Connection.load` and [system] kind = "table" read it. The file appears whole or not at all."""
+    estimated error and, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where something
+    says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it.
+    The file appears whole or not at all."""
     from scipy.io import netcdf_file
 
     found = variables(study)  # computed, before there is a file
@@ -59,6 +63,11 @@ def attributes(study: Study) -> dict:
         "scene": toml(scene),
         "numerics": numerics,
         "interpolation": int(study.fitted.degree),
+        **(
+            {}
+            if (degree := scene.system.power_degree) is None or effort.why_none(scene.system)
+            else {"power_degree": degree}
+        ),
     }
 
 
@@ -70,8 +79,14 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature, unit))
         name = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
         found.append(of_ccf(study.curvature_error, unit, "ccf_error", name))
+    elif len(study.fitted.axes) > 2:
+        found.append(of_pairs(study.two_form, unit))
     if study.scene.system.carried:
         found.append(of_frame(study.scene.system.field.field, unit))
+    if not effort.why_none(study.scene.system):
+        found += of_metric(
+            study.metric, study.scene.system.cost is None
+        )  # before the harmonics, whose velocities it may share
     if "harmonic" in lookups:
         found += of_harmonics(study.table("harmonic"), unit)
     if (even := study.even_part) is not None:
@@ -101,6 +116,14 @@ def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variab
     return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
 
 
+def of_pairs(form: TwoForm, unit: str) -> Variable:
+    """The CCF of all pairs of joints."""
+    units = f"{UNITS[unit]} rad-2 (x, y), rad rad-2 (theta)"
+    pairs = ", ".join(f"{i + 1} {j + 1}" for i, j in form.pairs)
+    said = f"curvature constraint function of joints {pairs}, in this order"
+    return Variable("ccf_pairs", ("pair", "component", *angles_of(form.field.axes)), form.field.values, units, said)
+
+
 def of_frame(pose: Field, unit: str) -> Variable:
     """The pose of a minimum-perturbation frame in the frame that it was made from."""
     units = f"{UNITS[unit]} (x, y), rad (theta)"
@@ -117,6 +140,27 @@ def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     return [
         Variable("harmonics", ("component", "coefficient", *angles), table.coefficients, units, name),
         Variable("harmonics_residual", ("component", *angles), table.residual, units, left),
+    ]
+
+
+def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
+    """M, or the coefficients of a norm and what they leave. power: it is that of drag, not the system's own."""
+    angles, size = angles_of(metric.axes), "drag that of the whole body along itself, lengths those of the body"
+    if isinstance(metric, Metric):
+        if not power:
+            own = "metric M of the system itself: alphadot . M alphadot is what it costs to change shape"
+            return [Variable("metric", ("joint", "other_joint", *angles), metric.M, effort.METRIC, own)]
+        name = f"dissipation metric M, power = alphadot . M alphadot; {size}"
+        units = "axial drag at 1 body length per time x body length x time rad-2"
+        return [Variable("metric", ("joint", "other_joint", *angles), metric.M, units, name)]
+    name = "coefficients of 1, cos(k beta), sin(k beta), k = 2, 4 ..., of F = power^(1 / power_degree) for alphadot = "
+    units = "(axial drag x body length)^(1 / power_degree) rad-1"
+    left = "rms over directions of alphadot of what the coefficients leave of F, |alphadot| = 1"
+    return [
+        Variable(
+            "norm", ("norm_coefficient", *angles), metric.coefficients, units, f"{name}(cos beta, sin beta); {size}"
+        ),
+        Variable("norm_residual", angles, metric.residual, units, left),
     ]
 
 

@@ -18,9 +18,9 @@ from geomech.output import plots
 from geomech.output.netcdf import save_connection
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
-from geomech.study import tables
+from geomech.study import effort, tables
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, price
+from geomech.study.cost import Cost, of_metric, price
 from geomech.study.cost import study as jobs
 from geomech.study.offer import methods
 from geomech.systems import Swimmer
@@ -76,7 +76,13 @@ def cost(scene: Scene) -> Cost:
     """Of `write`; SceneError, before anything is computed, for what it refuses."""
     gaits = _gaits(scene)
     counts, tiers = [len(reachable(scene, gait)) for gait in gaits], methods(scene.system)
-    return price([job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])])
+    with_metric = "path" in tiers and scene.system.joints == 2 and not effort.why_none(scene.system)
+    metric = (
+        [job for job in of_metric(scene) if job.what != "balances" or "harmonic" not in tiers] if with_metric else []
+    )
+    return price(
+        metric + [job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])]
+    )
 
 
 def _gaits(scene: Scene) -> list[Gait]:
@@ -136,9 +142,28 @@ def text_table(title: str, table: dict, scene: Scene) -> str:
         lines.append(
             f"medium: one standard deviation by its covariance, carried on by {' and '.join(rules)} propagation"
         )
+    lines += _effort(title, table, tiers)
     amplitude = re.sub(r"[$\\]", "", table["units"]["amplitude"])
     lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
     return "\n".join([*lines, _times(table), ""])
+
+
+def _effort(title: str, table: dict, tiers: list[str]) -> list[str]:
+    """Path length and work, and the cost of transport by tier, if they were asked for."""
+    if "work" not in table:
+        return []
+    told = lambda x, form: f"{'-' if x is None else format(x, form):>12}"
+    lines = [
+        f"{title}: path length and work of a cycle, and cost of transport: work over that of towing the body as far"
+    ]
+    lines.append("amplitude path length        work" + "".join(f"{m:>12}" for m in tiers))
+    for k, a in enumerate(table["amplitude"]):
+        row = [told(table[key][k], ".6f") for key in ("path_length", "work")]
+        lines.append(f"{a:9.6g}" + "".join(row + [told(table["cost_of_transport"][m][k], ".4g") for m in tiers]))
+    said = [
+        f"{key.replace('_', ' ')}: {table['units'][key]}" for key in ("path_length", "work") if key in table["units"]
+    ]
+    return [*lines, "; ".join(said)]
 
 
 def _blocks(table: dict, length: float, unit: str):

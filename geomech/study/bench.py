@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
 
 from geomech.connection import Connection, even_part
 from geomech.curvature import ccf
@@ -15,14 +16,18 @@ from geomech.errors import SceneError, choose, named, real_array, short
 from geomech.field import Field, inside
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
+from geomech.metric import Finsler, Metric
 from geomech.progress import progress as shown
+from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
-from geomech.study import cost, estimate, tables, uncertainty
+from geomech.study import cost, effort, estimate, tables, uncertainty
 from geomech.study.offer import METHODS, lookups, methods, tiers
 from geomech.study.results import Displacements
+from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import axes
+from geomech.two_form import TwoForm, two_form
 
 
 class Study:
@@ -57,6 +62,15 @@ class Study:
     def turned(self, **numerics) -> Study:
         """The bench of the scene with some of its [numerics] changed; None keeps a value."""
         return Study(self.scene.with_numerics(**numerics), self._tables)
+
+    def in_frame(self, frame: str) -> Study:
+        """The bench of the scene in another body frame; SceneError if there is none of that name, or it is the scene's own."""
+        s = self.scene
+        with named(s.name):
+            if frame == s.frame:
+                raise ValueError(f"the frame is {frame!r} already: name another")
+            system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else s.system.in_frame(frame)
+            return Study(s.changed(system=system), self._tables)
 
     methods = property(lambda self: methods(self.scene.system))
     tiers = property(lambda self: tiers(self.scene.system))
@@ -105,6 +119,39 @@ class Study:
     def fitted(self) -> Connection:
         """The least-squares connection on the scene's grid."""
         return self.table("path")
+
+    @property
+    def two_form(self) -> TwoForm:
+        """The CCF of all pairs of joints, of any number (`geomech.two_form`)."""
+        return self._kept("two-form", TIERS["path"].depends_on, (), lambda: two_form(self.fitted))[0]
+
+    def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
+        """`metric`, telling ``progress`` the fraction done. Where it takes the velocities of the harmonic table, that is
+        made beside it, if it is not there yet."""
+        s = self.scene
+        with named(s.name):
+            return self._kept("metric", effort.DEPENDS_ON, (), lambda: self._made_metric(progress))[0]
+
+    def _made_metric(self, progress: Callable | None) -> Metric | Finsler:
+        system, n, tier = self.scene.system, self.scene.numerics, TIERS["harmonic"]
+        key = tier.looks_up, system, *(getattr(n, name) for name in tier.depends_on)
+        if key in self._tables or not effort.shared(system):
+            return effort.table(system, n, progress)
+        (harmonics, norm), took = timed(lambda: effort.with_harmonics(system, n, progress))
+        self._tables[key] = harmonics, took
+        return norm
+
+    @property
+    def metric(self) -> Metric | Finsler:
+        """What a change of shape costs, on the field's grid (`geomech.metric`): a quadratic form where xi = A alphadot, else
+        a norm. SceneError if the system has none."""
+        return self.compute_metric()
+
+    def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:
+        """Path length and work of a gait, or the scene's own, with their errors: `geomech.study.effort.effort`."""
+        with named(self.scene.name):
+            self.scene.note_turns(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            return effort.effort(self.scene, gait, amplitudes)
 
     @property
     def even_part(self) -> np.ndarray | None:
@@ -191,8 +238,6 @@ class Study:
         """The tables of tiers, built: seconds that each took, whenever that was, and the names of those that were there."""
         seconds, kept = {}, []
         looked_up = [m for m in chosen if not chosen[m].is_direct(self.scene.system)]
-        if looked_up:
-            import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
         for method in sorted(
             looked_up, key=lambda m: chosen[m].looks_up != "connection"
         ):  # the field is the picture, too
@@ -202,11 +247,12 @@ class Study:
                 kept += [name] * there
         return seconds, kept
 
-    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None) -> cost.Cost:
-        """What `study` would take: force balances, seconds on this machine and memory; see `geomech.study.cost`."""
+    def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
+        """What `study` would take, and ``more`` jobs: force balances, seconds on this machine and memory; see
+        `geomech.study.cost`."""
         gait, amplitudes, _ = self._asked(gait, amplitudes, methods)
         with named(self.scene.name):
-            return cost.price(cost.study(self.scene, methods, len(amplitudes), gait))
+            return cost.price([*cost.study(self.scene, methods, len(amplitudes), gait), *more])
 
     def _asked(self, gait, amplitudes, methods):
         """(gait, or the scene's own, amplitudes (B,), tiers by name) of a request; SceneError for what makes none."""

@@ -18,7 +18,7 @@ import numpy as np
 from geomech.errors import SceneError
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
-from geomech.study import estimate, uncertainty
+from geomech.study import effort, estimate, uncertainty
 from geomech.tiers import TIERS
 from geomech.tiers.path import axes
 
@@ -28,6 +28,7 @@ WORTH_SAYING = 5.0  # s
 PILOT = 0.15  # s after which a pilot has seen enough
 FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
 SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
+POWER = 0.15  # of a balance, that its power takes
 CYCLES = 3  # that it takes to reach a limit cycle
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
@@ -59,8 +60,9 @@ class Cost(NamedTuple):
 
 
 class Job(NamedTuple):
-    """Part of a request. what: "balances" solved side by side, "steps" of one cycle of ``group`` samples, or
-    "look-ups" in a tier's table. gait: whose shapes, None for those all over the field. memory: bytes at the peak."""
+    """Part of a request. what: "balances" solved side by side, "steps" of one cycle of ``group`` samples,
+    "powers" of balances, or "look-ups" in a tier's table. gait: whose shapes, None for those all over the field. memory: bytes
+    at the peak."""
 
     what: str
     scene: Scene
@@ -89,7 +91,7 @@ def price(jobs: Sequence[Job]) -> Cost:
         job, count = same[0], sum(j.count for j in same)
         each, cycles = _per_step(job, count) if job.what == "steps" else (_per_sample(job, count), 1)
         seconds += count * cycles * each
-        balances += count * cycles * job.group if job.what != "look-ups" else 0
+        balances += count * cycles * job.group if job.what not in ("look-ups", "powers") else 0
     return Cost(math.ceil(balances), seconds, max((j.memory for j in jobs), default=BASE))
 
 
@@ -163,9 +165,29 @@ def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     return Job("balances", scene, gait if family else None, how.solves(system, n, 1, n.phases), memory=memory)
 
 
+def of_metric(scene: Scene) -> list[Job]:
+    """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
+    system, n = scene.system, scene.numerics
+    if system.stored("metric"):
+        return []
+    if effort.shared(system):
+        table = built(scene, "harmonic")
+        return [table, table._replace(what="powers")]
+    rates = system.joints * (system.joints + 1) // 2 if system.linear else TIERS["harmonic"].directions(system, n)
+    count, numbers = np.prod([len(a) for a in axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
+    return [Job("balances", scene, None, float(count * rates), memory=BASE + 8 * TABLES * float(count * numbers))]
+
+
+def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
+    """Path length and work of ``count`` amplitudes (`effort.effort`)."""
+    return direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
+
+
 def _per_sample(job: Job, count: float) -> float:
-    """Seconds a force balance, or a look-up, takes."""
+    """Seconds a force balance, the power of one, or a look-up, takes."""
     scene = job.scene
+    if job.what == "powers":
+        return POWER * _per_sample(job._replace(what="balances"), count)
     if job.what == "look-ups":
         look = TIERS[job.tier].sample(scene.system, scene.numerics) if count >= 1e5 else None
         return _grown(look, 64, count) if look else 0.0

@@ -106,13 +106,14 @@ class Plain:
     that one beyond a full turn is likely a slip of unit. closed: forces on an element have an exact form, which finer
     loads come near to. notes: lines on what its user may not expect of how it is computed. frequency: cycles per
     second, where its forces depend on it. covariance: (n, n), of parameters of its own that are not known for certain,
-    which `varied` changes; None where all are. cost: None, or a function of alpha and alphadot that gives alphadot^T
-    M(alpha) alphadot where the metric M of `geomech.metric` is not one of drag but, say, of kinetic energy.
+    which `varied` changes; None where all are. power_degree: of its power in alphadot, 2 in a fluid and 1 in sand; None
+    where it has no power (`driven`), or one of no one degree. cost: None, or a function of alpha and alphadot that gives
+    alphadot^T M(alpha) alphadot where the metric M of `geomech.metric` is not one of drag but, say, of kinetic energy.
     """
 
     kind = "system"
     length = 1.0
-    frequency = covariance = None
+    frequency = covariance = power_degree = None
     frame = "mean"
     mirror = linear = kinks = False
     lacks = NONE
@@ -176,6 +177,19 @@ class Plain:
         self.refuse_singular(alpha)
         xi, speed = evaluate(self.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
         return Cycle(xi, displacement(xi), 0.0 * speed, speed, None, 1, 0.0 * speed)
+
+    def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """(xi (..., 3), power (...)): `velocity`, and the rate of work against the medium that moving so takes, in axial
+        drags of the whole body times body lengths a unit of time (`rft.work_done`), for a body ``length`` in any unit.
+        ValueError if nothing says what it takes."""
+        if not hasattr(self, "work"):
+            raise ValueError(f"no power with the {self.kind}: nothing says what a change of shape costs it")
+        xi = self.velocity(alpha, alphadot)
+        return xi, self.work(alpha, alphadot, xi).power / self.length
+
+    def power(self, alpha, alphadot) -> np.ndarray:
+        """What a change of shape costs, (...), as `driven` has it."""
+        return self.driven(alpha, alphadot)[1]
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
         """Poses (cycles N + 1, 3) of the frame, seen from where it is at first, through so many cycles of a gait given by

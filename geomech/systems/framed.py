@@ -6,16 +6,18 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geomech import connection
 from geomech.connection import Connection
-from geomech.coordinates import change_velocity
-from geomech.minimum_perturbation import Frame, minimum_perturbation
+from geomech.coordinates import change_velocity, frame_velocity
 from geomech.systems.base import SHAPE_ALONE, Cycle, System
 from rft import se2
+
+if TYPE_CHECKING:  # it loads SciPy, which a scene in another frame has no need of
+    from geomech.minimum_perturbation import Frame
 
 NAME = "minimum-perturbation"
 
@@ -53,6 +55,8 @@ class Framed:
 
     def _make(self, progress: Callable | None) -> tuple[Frame, Connection]:
         """The frame, and the connection in it: of the same velocities, carried over."""
+        from geomech.minimum_perturbation import minimum_perturbation
+
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         keep = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
@@ -82,6 +86,17 @@ class Framed:
         return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
 
     sample = velocity
+
+    def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """As `Plain.driven`: power is the same in every frame."""
+        xi, power = self.inner.driven(alpha, alphadot)
+        return change_velocity(xi, *self.field(alpha, alphadot)), power
+
+    def work(self, alpha, alphadot, xi) -> Any:
+        """As the inner system's, for xi (..., 3) in this frame."""
+        h, hdot = self.field(alpha, alphadot)
+        inner = np.einsum("...ij,...j->...i", se2.adjoint(h), np.asarray(xi, float) - frame_velocity(h, hdot))
+        return self.inner.work(alpha, alphadot, inner)
 
     def single(self, alpha, alphadot) -> dict:
         found = self.inner.single(alpha, alphadot)

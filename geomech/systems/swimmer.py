@@ -23,12 +23,13 @@ from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
 from rft.effects.base import pieced
 from rft.loads import QUADRATURE, element_load, rule_for
-from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent
+from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
 from rft.media.base import require_law
 from rft.newton import ELEMENTS_TOGETHER
 from rft.symbolic import viscous_body
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
+RATES = Premise.RATE_INDEPENDENT
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
 
 
@@ -84,6 +85,7 @@ class Swimmer(Plain):
     mirror = property(lambda self: is_mirror(self.medium))
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
+    power_degree = property(lambda self: None if self.lacks & RATES else power_of(self.medium) + 1.0)
     held = property(lambda self: sum(e.held for e in self.effects))
     frequency = property(lambda self: next((e.frequency for e in self.effects if hasattr(e, "frequency")), None))
 

@@ -71,17 +71,25 @@ class Table(Plain):
     mirror = property(lambda self: self.held.mirror)
     linear = property(lambda self: self.held.harmonics is None)
     shape_labels = property(lambda self: tuple((name, "rad") for name in self.held.shapes))
+    power_degree = property(lambda self: self.held.power_degree)
 
     def in_frame(self, frame: str) -> Table:
         raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
 
     def stored(self, name: str):
         held = self.held
-        return {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}.get(name)
+        own = {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}
+        return {**own, "metric": held.metric}.get(name)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) looked up; ValueError outside the table's grid."""
         return self.held.table.velocity(alpha, alphadot)
+
+    def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """As `Plain.driven`, where the file tells what moving costs."""
+        if self.held.metric is None:
+            raise ValueError(f"no power with this table: {self.file} does not tell it; make it anew from its scene")
+        return self.velocity(alpha, alphadot), self.held.metric.norm(alpha, alphadot) ** self.power_degree
 
     def single(self, alpha, alphadot) -> dict:
         """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, None if unknown."""

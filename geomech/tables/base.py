@@ -14,6 +14,7 @@ from geomech.errors import SceneError, choose, short
 from geomech.files import read, why
 from geomech.gaits import Circle
 from geomech.harmonics import Harmonics
+from geomech.metric import Finsler, Metric
 from geomech.reconstruct import displacement
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
@@ -29,7 +30,8 @@ class Stored:
     """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
 
     harmonics: the odd harmonics of xi beside A, where the file has them. even: (3, N_1, ...), rms of
-    xi(alphadot) + xi(-alphadot), if that is not 0. length: of the body, in ``unit``, "BL" or "m".
+    xi(alphadot) + xi(-alphadot), if that is not 0. metric: what a change of shape costs, where the file has it, in body
+    lengths, power being its norm to power_degree. length: of the body, in ``unit``, "BL" or "m".
     frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
     the file. shapes: names of the shape variables, alpha_k where none are told."""
 
@@ -44,6 +46,8 @@ class Stored:
     said: tuple[str, ...] = ()
     sha256: str = ""
     shapes: tuple[str, ...] = ()
+    metric: Metric | Finsler | None = None
+    power_degree: float | None = None
 
     @property
     def table(self) -> Connection | Harmonics:

@@ -10,6 +10,7 @@ import numpy as np
 
 from geomech.connection import Connection
 from geomech.harmonics import Harmonics
+from geomech.metric import Finsler, Metric
 from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, checked_names, numbers, rms
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
@@ -92,7 +93,35 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
     if even is not None and even.shape[0] != 3:
         raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
-    return Stored(connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256)
+    metric, power = _metric(found, told, axes, degree)
+    return Stored(
+        connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power
+    )
+
+
+def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:
+    """What a change of shape costs, and the degree of its power; (None, None) of a file that does not tell."""
+    if not {"metric", "norm"} & set(found) or "power_degree" not in told:
+        return None, None
+    power, names, joints = told.get("power_degree"), tuple(f"alpha_{k + 1}" for k in range(len(axes))), len(axes)
+    if np.ndim(power) or np.asarray(power).dtype.kind not in "iuf" or not 0 < power < 100:
+        raise ValueError(f"has a power_degree that makes no sense: {SOURCE}")
+    if "metric" in found:
+        M = numbers("metric", _array(found, "metric", ("joint", "other_joint", *names), axes))
+        if M.shape[:2] != (joints, joints) or not np.allclose(M, M.swapaxes(0, 1), rtol=0, atol=1e-9 * np.abs(M).max()):
+            raise ValueError(
+                f"has a metric of shape {M.shape} where it must be ({joints}, {joints}, ...) and symmetric"
+            )
+        return Metric(axes, M, degree), float(power)
+    rows = numbers("norm", _array(found, "norm", ("norm_coefficient", *names), axes))
+    if joints != 2 or len(rows) % 2 == 0:
+        raise ValueError(f"has a norm of shape {rows.shape} where it must be (an odd number, ...) of two joints")
+    left = (
+        numbers("norm_residual", _array(found, "norm_residual", names, axes))
+        if "norm_residual" in found
+        else 0 * rows[0]
+    )
+    return Finsler(axes, rows, left, degree), float(power)
 
 
 def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:

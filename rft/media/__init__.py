@@ -1,6 +1,6 @@
 """Force laws, one file each, and the catalogue of named media."""
 
-from rft.media.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent
+from rft.media.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, power_of
 from rft.media.catalogue import CATALOGUE
 from rft.media.coulomb import Coulomb
 from rft.media.granular import Granular
@@ -22,4 +22,5 @@ __all__ = [
     "is_linear",
     "is_mirror",
     "is_rate_independent",
+    "power_of",
 ]

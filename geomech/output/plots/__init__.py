@@ -4,17 +4,18 @@ you have a figure of pyplot open, else on a new one, which a notebook shows. Not
 
 from geomech.output.plots.displacements import displacement, displacement_figure, medium_band, net
 from geomech.output.plots.drag import drag_figure
+from geomech.output.plots.figures import ccf_figure, connection_figure, pairs_figure
 from geomech.output.plots.maps import (
     COMPONENTS,
     FINEST,
     HATCHED,
-    ccf_figure,
+    RINGS,
     ccf_map,
     certain,
-    connection_figure,
     draw_gait,
     drawable,
     frame_figure,
+    indicatrices,
     largest,
     shape_space,
     unknown,
@@ -24,7 +25,9 @@ from geomech.output.plots.motion import LINES, filmstrip, stage
 from geomech.output.plots.optimum import optimum_figure, optimum_map
 from geomech.output.plots.plates import penetration_figure, plates_figure
 from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
+from geomech.output.plots.stretched import stretched_figure, stretched_map
 from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
+from geomech.output.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
 from geomech.output.plots.terradynamics import (
     draw_stress,
     elements_figure,
@@ -35,10 +38,56 @@ from geomech.output.plots.terradynamics import (
 )
 
 __all__ = [
-    "COMPONENTS", "FINEST", "HATCHED", "KNOB_MARKER", "LINES", "MARKED", "STYLE", "ccf_figure", "ccf_map", "certain",
-    "check_format", "connection_figure", "displacement", "displacement_figure", "drag_figure", "draw_gait",
-    "draw_stress", "drawable", "elements_figure", "figure", "filmstrip", "frame_figure", "intrusion_figure",
-    "largest", "medium_band", "net", "optimum_figure", "optimum_map", "penetration_figure", "plates_figure",
-    "quantity", "save", "shape_space", "square_of_angles", "stage", "stress_figure", "stress_map", "styled",
-    "unknown", "vector_field", "work_precision", "work_precision_figure",
+    "CCF_STYLES",
+    "COMPONENTS",
+    "CONNECTION_STYLES",
+    "FINEST",
+    "HATCHED",
+    "KNOB_MARKER",
+    "LINES",
+    "MARKED",
+    "RINGS",
+    "STYLE",
+    "ccf_contours",
+    "ccf_figure",
+    "ccf_map",
+    "ccf_surface",
+    "certain",
+    "check_format",
+    "connection_figure",
+    "displacement",
+    "displacement_figure",
+    "drag_figure",
+    "draw_gait",
+    "draw_stress",
+    "drawable",
+    "elements_figure",
+    "figure",
+    "filmstrip",
+    "frame_figure",
+    "indicatrices",
+    "intrusion_figure",
+    "largest",
+    "medium_band",
+    "net",
+    "optimum_figure",
+    "optimum_map",
+    "pairs_figure", "penetration_figure",
+    "plates_figure",
+    "quantity",
+    "save",
+    "shape_space",
+    "square_of_angles",
+    "stage",
+    "streamlines",
+    "stress_figure",
+    "stress_map",
+    "stretched_figure",
+    "stretched_map",
+    "styled",
+    "unknown",
+    "vector_field",
+    "winding",
+    "work_precision",
+    "work_precision_figure",
 ]  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.gaits import Gait
+from geomech.metric import Finsler, Metric
 from geomech.output.plots.style import axes_of, figure, quantity, styled
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding
@@ -19,6 +20,7 @@ ANGLES = (("alpha_1", "rad"), ("alpha_2", "rad"))
 OF_CCF = 1e-12  # the same of a CCF, a derivative
 PHASES = np.linspace(0, 2 * np.pi, 400)  # at which a gait is drawn
 HATCHED = "error above value"
+RINGS = "joint rates of equal cost"
 SHORT = 0.06  # of the map's width: a shorter bit of a line of zeros is no line
 PATCH = 6  # points of one
 FINER = 4  # points of a line for each of the grid
@@ -42,9 +44,10 @@ def vector_field(
     ax=None,
     every: int | None = None,
     labels: Labels = ANGLES,
+    top: float | None = None,
 ):
     """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length. labels: as in
-    `shape_space`."""
+    `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / 13))
     pick = slice(step // 2, None, step)
@@ -56,17 +59,26 @@ def vector_field(
     if np.isnan(size).any():  # beside singular shapes arrows are cut
         cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
         u, v, size = cut * u, cut * v, cut * size
-    top = np.nanmax(size, initial=0.0)
-    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, scale=None if top else 1.0)
-    arrows.set_clim(0.0, top or 1.0)
+    most = np.nanmax(size, initial=0.0)
+    own = {"scale": None if most else 1.0}
+    if top:
+        own = {"scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])), "scale_units": "xy"}
+    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **own)
+    arrows.set_clim(0.0, top or most or 1.0)
+    return row_told(ax, arrows, component, unit, connection, labels)
+
+
+def row_told(ax, arrows, component: int, unit: str, connection: Connection, labels: Labels):
+    """Title, colours and plane of a map of a row of A."""
     of = rf"\mathbf{{A}}^{{{COMPONENTS[component]}}}"
     ax.set_title(f"${of}$: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
-    colorbar.set_label(f"$|{of}|$ ({_unit(component, unit)}/{labels[0][1]})")
+    colorbar.set_label(f"$|{of}|$ ({unit_of(component, unit)}/{labels[0][1]})")
     return shape_space(ax, connection.axes, labels)
 
 
-def _unit(component: int, unit: str) -> str:
+def unit_of(component: int, unit: str) -> str:
+    """Of a component of a displacement."""
     return "rad" if component == 2 else unit
 
 
@@ -86,61 +98,89 @@ def has(field: Field, component: int) -> bool:
 @styled
 def ccf_map(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
-    labels: Labels = ANGLES, legend: bool = True,
+    labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
 ):  # fmt: skip
     """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)), as far as the field goes; the colours
     are centred on zero. One that is nothing but rounding is drawn as nothing.
 
     error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is
     known (`unknown`); there no line of zeros is drawn, and beside them only what parts two signs that are known
-    (`certain`). labels: as in `shape_space`. legend: say below the map what hatching means."""
+    (`certain`). labels: as in `shape_space`. legend: say below the map what hatching means, and rings. metric: drawn as rings
+    (`indicatrices`). top: of the colours, for maps that are compared."""
     from cmcrameri import cm
 
     ax = axes_of(ax)
     field, error = drawable(field), error and drawable(error)
-    values, told = field.values[component], has(field, component)
-    if not told:
+    values, drawn = field.values[component], has(field, component)
+    if not drawn:
         values, error = 0 * values, None
-    top, smooth = largest(values) if told else 1.0, "nearest" if field.masked else "gouraud"
+    top, smooth = top or (largest(values) if drawn else 1.0), "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
-    hidden = None
+    hidden, told = None, []
     if error is not None:
         hidden = unknown(values, error.values[component])
         values = certain(values, error.values[component])
-        _hatch(ax, field, hidden, legend)
+        told += _hatch(ax, field, hidden)
     _zeros(ax, field, values, hidden)
     shape_space(ax, field.axes, labels)
+    if metric is not None:
+        told.append(indicatrices(metric, ax, field.axes))
+    if legend and told:
+        ax.legend(handles=told, loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
     for gait in gaits:
         draw_gait(gait, ax, within=field.axes)
-    if not all(_inside(gait.shape(PHASES), field.axes).all() for gait in gaits):
+    if not all(inside_of(gait.shape(PHASES), field.axes).all() for gait in gaits):
         paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
         ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
-    of = rf"CCF$_{{{COMPONENTS[component]}}}$"
-    ax.set_title(f"{of}: {TITLES[component]}")
-    colorbar = ax.figure.colorbar(image, ax=ax, shrink=0.85, ticks=None if told else [0.0])
-    per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
-    colorbar.set_label(f"{of} ({_unit(component, unit)}/{per})")
+    ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
+    ax.figure.colorbar(image, ax=ax, shrink=0.85, ticks=None if drawn else [0.0]).set_label(
+        ccf_label(component, unit, labels)
+    )
     return ax
 
 
-def _hatch(ax, field: Field, hidden: np.ndarray, legend: bool) -> None:
-    """Patches, with rounded edges, and what they mean."""
+def ccf_name(component: int) -> str:
+    """CCF with its index."""
+    return rf"CCF$_{{{COMPONENTS[component]}}}$"
+
+
+def ccf_label(component: int, unit: str, labels: Labels) -> str:
+    """For a scale: the name with its unit."""
+    per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
+    return f"{ccf_name(component)} ({unit_of(component, unit)}/{per})"
+
+
+def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
+    """Rings around ``count`` x ``count`` shapes: the rates that cost the same, so that a ring is long where, and the way that,
+    shape changes cheaply. All have one scale. Returns what a legend needs."""
+    from matplotlib.lines import Line2D
+
+    spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
+    places = np.stack(np.meshgrid(*spots, indexing="ij"), -1).reshape(-1, 2)
+    rings = metric.indicatrix(places, 72)
+    rings *= 0.46 * min(np.ptp(a) for a in axes) / count / np.nanmax(np.linalg.norm(rings, axis=-1))
+    closed = np.concatenate([rings, rings[:, :1], np.full_like(rings[:, :1], np.nan)], 1) + places[:, None]
+    style = {"color": "black", "lw": 0.7}
+    ax.plot(*closed.reshape(-1, 2).T, **style)
+    return Line2D([], [], marker="o", ls="", mfc="none", mec="black", mew=0.7, ms=6, label=RINGS)
+
+
+def _hatch(ax, field: Field, hidden: np.ndarray) -> list:
+    """Patches, with rounded edges; what a legend needs, if there are any."""
     from matplotlib.patches import Patch
 
     axes, mask = _rounded(field, hidden)
     upright = "||||||"  # lines of symmetry of chains are diagonal
     ax.contourf(*axes, mask.T, levels=[0.5, 2.0], colors="none", hatches=[upright])
-    if legend and hidden.any():
-        means = Patch(facecolor="none", edgecolor="black", lw=0.3, hatch=upright, label=HATCHED)
-        ax.legend(handles=[means], loc="upper center", bbox_to_anchor=(0.5, -0.2))
+    return [Patch(facecolor="none", edgecolor="black", lw=0.3, hatch=upright, label=HATCHED)] * bool(hidden.any())
 
 
 def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> None:
     """The line of zeros, but for hidden patches and for bits too short to be a line."""
     from matplotlib.path import Path
 
-    axes, fine = _finer(field, values)
+    axes, fine = finer(field, values)
     if hidden is not None:
         fine = np.where(_rounded(field, hidden)[1] >= 0.5, np.nan, fine)
     if not np.nanmin(fine, initial=0.0) < 0 < np.nanmax(fine, initial=0.0):
@@ -159,11 +199,11 @@ def _rounded(field: Field, hidden: np.ndarray):
     """As `_finer`, a mask's: above one half inside."""
     from scipy.ndimage import gaussian_filter
 
-    axes, mask = _finer(field, hidden.astype(float), degree=1)
+    axes, mask = finer(field, hidden.astype(float), degree=1)
     return axes, gaussian_filter(mask, 0.7 * FINER, mode="nearest") if len(axes[0]) > len(field.axes[0]) else mask
 
 
-def _finer(field: Field, values: np.ndarray, degree: int = 3):
+def finer(field: Field, values: np.ndarray, degree: int = 3):
     """(axes, values) between the grid's points too, for lines that are smooth; as they are beside singular shapes."""
     from scipy.interpolate import RectBivariateSpline
 
@@ -211,7 +251,7 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None):
     """The gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid."""
     ax, curve = axes_of(ax), gait.shape(PHASES)
-    curve[~_inside(curve, within or ())] = np.nan
+    curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, color=color, lw=1.2)
     ax.plot(*curve[0], "o", color=color, ms=3)
     ahead = np.roll(np.arange(392), -50)  # an eighth of the way, or the next place inside
@@ -222,22 +262,13 @@ def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.nda
     return ax
 
 
-def _inside(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
+def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
     """(P,): which shapes of a curve (P, 2) lie within the axes of a grid, to rounding."""
     inside = np.ones(len(curve), bool)
     for x, axis in zip(curve.T, axes):
         slack = 1e-9 * np.ptp(axis)
         inside &= (x >= axis[0] - slack) & (x <= axis[-1] + slack)
     return inside
-
-
-@styled
-def connection_figure(connection: Connection, unit: str = "BL", labels: Labels = ANGLES):
-    """All three rows of A side by side."""
-    fig, axes = figure(10.8, 3.0, 3, layout="compressed")
-    for component, ax in enumerate(axes[0]):
-        vector_field(connection, component, unit, ax, labels=labels)
-    return fig
 
 
 @styled
@@ -256,15 +287,4 @@ def frame_figure(pose: Field, unit: str = "BL", labels: Labels = ANGLES):
         fig.colorbar(image, ax=ax, shrink=0.85).set_label(f"{name} ({'rad' if component == 2 else unit})")
         ax.set_title(f"{name} of the frame")
         shape_space(ax, pose.axes, labels)
-    return fig
-
-
-@styled
-def ccf_figure(
-    field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None, labels: Labels = ANGLES
-):
-    """All three components of the CCF side by side, with gaits drawn on them."""
-    fig, axes = figure(10.8, 3.2, 3, layout="compressed")
-    for component, ax in enumerate(axes[0]):
-        ccf_map(field, component, gaits, unit, ax, error, labels)
     return fig

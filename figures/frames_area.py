@@ -1,0 +1,66 @@
+"""What the choice of body frame does to the area tier in loose glass: mean, middle-link and minimum-perturbation frame against
+the force balance.
+
+Above: net distance per cycle, by the area under the CCF in each frame and by the force balance, which is the same in all.
+Below: how far the area tier is from the force balance in its own frame, and, dotted, the path tier, which integrates the same
+fitted connection along the gait: no frame takes away what that leaves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech.gaits import Butterfly, Circle
+from geomech.output import plots
+from geomech.scene import load
+from geomech.study.bench import Study
+
+FRAMES = {"mean": "#D55E00", "link-2": "#0072B2", "minimum-perturbation": "#009E73"}
+GAITS = {
+    "circle": (Circle(), 2.0, "radius of the circle (rad)"),
+    "butterfly": (Butterfly(), 1.2, "scale of the butterfly"),
+}
+
+
+def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) -> dict:
+    """{gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body lengths and rad, each in its own frame. The field
+    reaches as far as the gaits."""
+    study = Study(load(scene)).turned(grid=grid, extent=2.7)
+    found: dict = {name: {"amplitude": np.linspace(0, top, count + 1)[1:]} for name, (_, top, _) in GAITS.items()}
+    for frame in FRAMES:
+        bench = study if frame == study.scene.frame else study.in_frame(frame)
+        for name, (gait, _, _) in GAITS.items():
+            a = found[name]["amplitude"]
+            found[name][frame] = {tier: bench.displacement(tier, gait, a) for tier in ("area", "path", "direct")}
+    return found
+
+
+def missed(poses: dict, tier: str) -> np.ndarray:
+    """(B,): distance of a tier's positions from those of the force balance."""
+    return np.hypot(*(poses[tier] - poses["direct"])[:, :2].T)
+
+
+def _handles(*axes) -> list:
+    return [line for ax in axes for line in ax.lines if not line.get_label().startswith("_")]
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(7.4, 5.2, 2, 2)
+    for (name, (_, _, label)), above, below in zip(GAITS.items(), *axes):
+        a = numbers[name]["amplitude"]
+        above.plot(a, np.hypot(*numbers[name]["mean"]["direct"][:, :2].T), color="0.72", lw=4, label="force balance")
+        for frame, colour in FRAMES.items():
+            poses = numbers[name][frame]
+            above.plot(a, np.hypot(*poses["area"][:, :2].T), color=colour, label=f"area, {frame} frame")
+            below.plot(a, missed(poses, "area"), color=colour)
+        below.plot(a, missed(numbers[name]["mean"], "path"), ":", color="black", label="path, any frame")
+        above.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
+        below.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))
+    fig.legend(loc="outside lower center", handles=_handles(axes[0, 0], axes[1, 0]), ncols=3)
+    return fig
+
+
+if __name__ == "__main__":
+    main("frames_area", compute, draw)

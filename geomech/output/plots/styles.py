@@ -1,0 +1,182 @@
+"""Other ways to draw a connection and its CCF: streamlines, contours with the gait's area shaded, surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.field import Field
+from geomech.gaits import Gait
+from geomech.output.plots.maps import (
+    ANGLES,
+    PHASES,
+    TITLES,
+    Labels,
+    ccf_label,
+    ccf_name,
+    draw_gait,
+    drawable,
+    finer,
+    largest,
+    row_told,
+    shape_space,
+    unit_of,
+)
+from geomech.output.plots.style import axes_of, quantity, styled
+
+LINES = 61  # points an axis that streamlines are drawn on
+LEVELS = 6  # contours of either sign
+AREA = 240  # points an axis on which a gait's area is shaded
+MINUS_SIGN = "\N{MINUS SIGN}"
+_WAYS = ("ahead", "backwards"), ("to the left", "to the right"), ("turns left", "turns right")
+PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards, or to either side
+
+
+@styled
+def streamlines(
+    connection: Connection, component: int = 0, unit: str = "BL", ax=None, labels: Labels = ANGLES, top: float | None = None
+):  # fmt: skip
+    """Row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for its
+    size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
+    from matplotlib.colors import Normalize
+
+    ax = axes_of(ax)
+    axes = [np.linspace(a[0], a[-1], min(LINES, 4 * len(a))) for a in connection.axes]
+    row = Field(connection.axes, connection.A[component], connection.degree)
+    if row.masked:
+        axes, values = list(connection.axes), row.values
+    else:
+        values = np.moveaxis(row(np.stack(np.meshgrid(*axes, indexing="ij"), -1)), -1, 0)
+    even = [np.linspace(a[0], a[-1], len(a)) for a in axes]  # to the last digit, as streamplot asks
+    u, v = values
+    size = np.hypot(u, v)
+    most = top or largest(size)
+    if np.nanmax(size, initial=0.0) <= 1e-13 * np.nanmax(np.abs(connection.A), initial=0.0):
+        u, v, size = 0 * u, 0 * v, 0 * size
+    look = {"cmap": "viridis", "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
+    lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
+    return row_told(ax, lines.lines, component, unit, connection, labels)
+
+
+@styled
+def ccf_contours(
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    labels: Labels = ANGLES, top: float | None = None,
+):  # fmt: skip
+    """A component of the CCF as contours, dashed below zero, and the area of each gait shaded by the sign of what it adds to
+    the displacement: CCF times how often, and which way, the gait winds around it. error: shapes where it exceeds the value
+    have no shade. Other arguments as for `ccf_map`."""
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import MaxNLocator
+
+    ax, field = axes_of(ax), drawable(field)
+    axes, values = finer(field, field.values[component])
+    most = top or largest(values)
+    levels = MaxNLocator(2 * LEVELS, steps=[1, 2, 2.5, 5, 10], symmetric=True).tick_values(-most, most)
+    looks = {0: ("0.6", 1.4, "-"), 1: ("0.25", 0.6, "-"), -1: ("0.25", 0.6, "--")}
+    colours, widths, dashes = zip(*(looks[int(np.sign(x)) if abs(x) > 1e-9 * most else 0] for x in levels))
+    lines = ax.contour(*axes, values.T, levels=levels, colors=colours, linewidths=widths, linestyles=dashes)
+    ax.clabel(lines, levels[::2], fmt=lambda x: f"{x:g}".replace("-", MINUS_SIGN), fontsize=6)
+    shape_space(ax, field.axes, labels)
+    signs = set()
+    for gait in gaits:
+        signs |= _shaded(ax, field, component, gait, error)
+        draw_gait(gait, ax, within=field.axes)
+    words = {s: (colour, _WAYS[component][k]) for k, (s, colour) in enumerate(((1, PLUS), (-1, MINUS)))}
+    told = [Patch(facecolor=words[s][0], alpha=0.35, label=words[s][1]) for s in (1, -1) if s in signs]
+    if told:
+        ax.legend(handles=told, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    ax.set_title(f"{ccf_label(component, unit, labels)}: {TITLES[component]}")
+    return ax
+
+
+def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -> set[int]:
+    """Shades the area of a gait, by the sign of CCF times winding number; the signs there are."""
+    x, y = (np.linspace(a[0], a[-1], AREA) for a in field.axes)
+    shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
+    times = winding(gait.shape(PHASES), x, y)
+    if field.masked:
+        return set()
+    density = Field(field.axes, field.values[component], 1)(shapes) * times
+    if error is not None:
+        density[np.abs(density) <= np.abs(times) * Field(error.axes, error.values[component], 1)(shapes)] = 0.0
+    found = {s for s in (1, -1) if (s * density > 0).any()}
+    for s in found:
+        ax.contourf(
+            x, y, (s * density > 0).T, levels=[0.5, 2.0], colors=[PLUS if s > 0 else MINUS], alpha=0.35, zorder=0
+        )
+    return found
+
+
+def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(N, M): how often a closed curve (P, 2) winds around the points of the grid x (N,) by y (M,), counter-clockwise
+    positive: crossings, of either sign, of the line from each point to the right."""
+    (x0, y0), (x1, y1) = curve.T, np.roll(curve, -1, 0).T
+    below, above = y0[:, None] <= y, y1[:, None] <= y
+    k, j = np.nonzero(below != above)
+    at = x0[k] + (y[j] - y0[k]) / (y1[k] - y0[k]) * (x1[k] - x0[k])
+    crossed = np.zeros((len(x) + 1, len(y)), int)
+    np.add.at(crossed, (np.searchsorted(x, at), j), np.where(below[k, j], 1, -1))
+    return np.cumsum(crossed[::-1], 0)[::-1][1:]
+
+
+@styled
+def ccf_surface(
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    labels: Labels = ANGLES, top: float | None = None,
+):  # fmt: skip
+    """A component of the CCF as a surface over shape space, with gaits drawn on it and, on the plane below, their areas shaded
+    by sign as in `ccf_contours`. ax: of projection "3d"; without it one of a new figure."""
+    from cmcrameri import cm
+
+    from geomech.output.plots.style import blank
+
+    ax = blank(4.2, 3.6).add_subplot(projection="3d") if ax is None else ax
+    field = drawable(field)
+    axes, values = finer(field, field.values[component])
+    most = top or largest(values)
+    shown = np.clip(values, -most, most)
+    ax.plot_surface(
+        *np.meshgrid(*axes, indexing="ij"), shown, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,
+        antialiased=False, rasterized=True, alpha=0.9,
+    )  # fmt: skip
+    floor = -1.6 * most
+    for gait in gaits:
+        curve = gait.shape(PHASES)
+        ax.plot(*curve.T, floor, color="black", lw=1.0)
+        if not field.masked:
+            inside = ((curve >= [a[0] for a in axes]) & (curve <= [a[-1] for a in axes])).all(-1)
+            height = np.full(len(curve), np.nan)
+            height[inside] = Field(field.axes, field.values[component], field.degree)(curve[inside])
+            ax.plot(*curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10)
+            _floor(ax, field, component, gait, floor, error)
+    ax.set(
+        xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
+        title=f"{ccf_name(component)}: {TITLES[component]}",
+    )  # fmt: skip
+    ax.set_zlabel(ccf_label(component, unit, labels), labelpad=6)
+    ax.set_zticks([x for x in ax.get_zticks() if -most <= x <= most])
+    ax.tick_params(labelsize=7)
+    ax.view_init(elev=28, azim=-58)
+    ax.set_box_aspect(None, zoom=0.86)
+    return ax
+
+
+def _floor(ax, field: Field, component: int, gait: Gait, floor: float, error: Field | None) -> None:
+    """The area of a gait on the plane below a surface."""
+    x, y = (np.linspace(a[0], a[-1], AREA // 2) for a in field.axes)
+    shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
+    density = Field(field.axes, field.values[component], 1)(shapes) * winding(gait.shape(PHASES), x, y)
+    for s, colour in ((1, PLUS), (-1, MINUS)):
+        if (s * density > 0).any():
+            ax.contourf(
+                *np.moveaxis(shapes, -1, 0), (s * density > 0).astype(float), zdir="z", offset=floor, levels=[0.5, 2.0],
+                colors=[colour], alpha=0.35,
+            )  # fmt: skip
+
+
+CONNECTION_STYLES = ("quiver", "streamlines")
+CCF_STYLES = ("map", "contours", "surface")
+__all__ = ["CCF_STYLES", "CONNECTION_STYLES", "ccf_contours", "ccf_surface", "streamlines", "unit_of", "winding"]

@@ -1,0 +1,190 @@
+"""What moving costs: the metric of a system's shape space, and length of path, work and cost of transport of its gaits.
+
+Power is in axial drags of the whole body times body lengths a unit of time, in which phase grows by 1 rad; in a fluid the drag
+is that at a body length a unit of time. Work is its integral over a cycle, path length that of F = power^(1/degree)
+(`geomech.metric`): in a dry medium the same, in body lengths. Cost of transport is work over that of towing the body, straight
+and along itself, as far in the same time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from geomech import connection, metric
+from geomech.errors import SceneError, number, real_array
+from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
+from geomech.harmonics import Harmonics
+from geomech.metric import Finsler, Metric
+from geomech.scene.model import Scene
+from geomech.study import tables
+from geomech.study.results import Displacements
+from geomech.systems.base import SHAPE_ALONE, System
+from geomech.tiers import TIERS
+from geomech.tiers.base import Numerics, in_groups
+from geomech.tiers.path import axes
+
+DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
+HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
+METRIC = "of the system's own metric"
+EVEN = 1e-6  # of the power: a solver's rounding is below it
+
+
+def why_none(system: System) -> str:
+    """Why a system has no metric, in words that follow its name; "" if it has one."""
+    if blame := system.blame(SHAPE_ALONE):
+        return f"no metric with {blame}: its power does not follow from shape alone"
+    if system.stored("connection"):
+        return "" if system.stored("metric") else "no metric with this table: its file tells no power"
+    if system.cost is not None:
+        return ""
+    if system.power_degree is None:
+        power = (
+            "its power is of no one degree in the rate" if hasattr(system, "work") else "nothing says what moving costs"
+        )
+        return f"no metric with {system.blames}: {power}"
+    if not system.linear and system.joints != 2:
+        return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
+    return "" if _even(system) else f"no metric with {system.blames}: one way costs another power than the way back"
+
+
+def _even(system: System) -> bool:
+    """Whether power is the same for alphadot and -alphadot, at a few shapes that stand for all."""
+    if system.linear:
+        return True
+    rng = np.random.default_rng(0)
+    alpha, alphadot = rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)), connection.directions(2, 8)
+    forth, back = (system.power(alpha, sign * alphadot) for sign in (1, -1))
+    return bool(np.abs(forth - back).max() <= EVEN * np.abs(forth).max())
+
+
+def table(system: System, numerics: Numerics, progress: Callable | None = None) -> Metric | Finsler:
+    """The metric on the field's grid: quadratic where xi = A alphadot, else a norm. ValueError if it has none."""
+    if reason := why_none(system):
+        raise ValueError(reason)
+    if own := system.stored("metric"):
+        return own
+    grid, degree = axes(system, numerics), numerics.interpolation
+    if system.cost is not None or system.linear:
+        return metric.fit(system.cost or system.power, grid, degree, progress)
+    norm = lambda *at: _norm(system.power(*at), system.power_degree)
+    count = TIERS["harmonic"].directions(system, numerics)
+    return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
+
+
+def shared(system: System) -> bool:
+    """Whether a metric takes the very velocities of the harmonic table."""
+    return not (system.linear or system.cost is not None or system.stored("connection")) and TIERS["harmonic"].takes(
+        system
+    )
+
+
+def with_harmonics(
+    system: System, numerics: Numerics, progress: Callable | None = None
+) -> tuple[Harmonics, Metric | Finsler]:
+    """The harmonic table and the metric from the same force balances. ValueError if it has no metric."""
+    if reason := why_none(system):
+        raise ValueError(reason)
+    seen, tier = _Watched(system), TIERS["harmonic"]
+    found = tier.table(seen, numerics, progress=progress)
+    P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
+    P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
+    F = _norm(P, system.power_degree).T.reshape(-1, *map(len, found.axes))
+    unit = connection.directions(2, len(F))
+    return found, metric.of_samples(F, found.axes, unit, found.degree, highest=HIGHEST)
+
+
+class _Watched:
+    """A system of which powers are kept as its velocities are asked for."""
+
+    def __init__(self, system: System):
+        self.system, self.powers = system, []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.system, name)
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        xi, power = self.system.driven(alpha, alphadot)
+        self.powers.append(power)
+        return xi
+
+
+def _norm(power, degree: float) -> np.ndarray:
+    return np.maximum(power, 0.0) ** (1.0 / degree)
+
+
+def refuse_costless(scene: Scene) -> None:
+    """SceneError for a scene of which nothing says what moving costs."""
+    system = scene.system
+    if not (hasattr(system, "work") or system.cost is not None or system.stored("metric")):
+        what = "its file does not tell it" if system.stored("connection") else "nothing says what moving costs"
+        raise SceneError(f"{scene.name}: no path length or work with the {system.kind}: {what}")
+
+
+def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
+    """{"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the direct tier; each
+    error the change with half of the phases. Path lengths are nan where power is of no one degree in the rate. ValueError
+    where nothing says what moving costs."""
+    system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
+    amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
+    number("phases", phases or 8, 8, 1e6, whole=True)
+    phases, degree = 2 * (-(-(phases or scene.numerics.phases) // 2)), system.power_degree
+
+    def told(some):
+        alpha, alphadot = gait.cycle(phases, some)
+        if system.cost is not None:  # a metric, of which there is no work
+            square = np.asarray(system.cost(alpha, alphadot))
+            rates = np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
+        else:
+            done = system.run(alpha, alphadot, True).work
+            P = system.power(alpha, alphadot) if done is None else done.power / system.length
+            rates = np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
+        fine, half = (2 * np.pi * x.mean(-1) for x in (rates, rates[..., ::2]))
+        return np.concatenate([fine, np.abs(fine - half)], 1)
+
+    names = ("path_length", "work", "path_length_error", "work_error")
+    return dict(zip(names, in_groups(told, amplitudes, system.at_once(phases))[:, :4].T))
+
+
+def add_effort(table: Displacements) -> None:
+    """Put what `transport` tells into a table of displacements."""
+    scene, gait = table.scene, table.gait
+    found = effort(scene, gait, table["amplitude"])
+    table.update(transport(scene, found, {m: np.array(table[m], float).reshape(-1, 3) for m in table.tiers}))
+    table["units"] |= units(scene.system)
+
+
+def transport(scene: Scene, found: Mapping, poses: Mapping) -> dict:
+    """Of what `effort` found and the net poses (B, 3) by tier: JSON's {"path_length", "work", "path_length_error",
+    "work_error": [...], "efficiency", "cost_of_transport": {tier: [...]}}, None where there is none. efficiency: net
+    distance, in body lengths, over path length."""
+    degree, length = scene.system.power_degree, scene.system.length
+    distance = {m: tables.of_pose(p)["net_distance"] / length for m, p in poses.items()}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = {m: d / found["path_length"] for m, d in distance.items()}
+        towed = {
+            m: np.nan * d if degree is None else d * (d / (2 * np.pi)) ** (degree - 1) for m, d in distance.items()
+        }
+        cost = {m: found["work"] / t for m, t in towed.items()}
+    by_tier = {"efficiency": ratio, "cost_of_transport": cost}
+    return {
+        **{key: _listed(x) for key, x in found.items()},
+        **{key: {m: _listed(x) for m, x in each.items()} for key, each in by_tier.items()},
+    }
+
+
+def units(system: System) -> dict[str, str]:
+    """Of the keys of `transport`."""
+    if system.cost is not None:
+        return {"path_length": METRIC, "path_length_error": METRIC, "efficiency": f"BL / {METRIC}"}
+    length = "BL" if system.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
+    work = "axial drag x BL" if system.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
+    each = {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}
+    return {**each, "path_length_error": length, "work_error": work}
+
+
+def _listed(values) -> list:
+    return [float(x) if np.isfinite(x) else None for x in values]

@@ -1,0 +1,110 @@
+"""The CCF of three and more joints: a field of two-forms, one component for each pair of joints, and its integral over a
+surface that a loop spans.
+
+    CCF = sum over i < j of CCF_ij dalpha_i ^ dalpha_j,      displacement ~ exp of its integral over the surface.
+
+With two joints there is one surface, the area. With more there are many, and CCF = dA + [A, A] is not closed: by the Bianchi
+identity its derivative is the bracket of A and CCF. So x and y hang on the surface, by a part of order 3 in the gait's size, as
+is what the estimate leaves out; by none for a loop in a plane and surfaces there. Turning, which has no bracket, is closed.
+`spanned` tells how much, from cones over the loop with different tips.
+
+Harmonics of the velocity in the direction of alphadot are those of a circle, of two joints. Of more they would be spherical
+harmonics: up to the 15th 136 for each component of three joints, 3,876 of five, at each shape of a grid that is large already,
+to save a force balance of some microseconds. So the harmonic tier stays with two joints; more take the path or the direct one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from geomech.connection import Connection
+from geomech.curvature import ccf
+from geomech.errors import number, real_array
+from geomech.field import Field
+from geomech.gaits import Gait
+from geomech.gaits.base import checked_gait
+from rft import se2
+
+RADII = 8  # nodes of Gauss's rule along a cone
+
+
+@dataclass(frozen=True)
+class TwoForm:
+    """CCF_ij of all pairs i < j. field: values (pairs, 3, N_1, ..., N_d). pairs: of joints, from 0, in the field's order."""
+
+    field: Field
+    pairs: tuple[tuple[int, int], ...]
+
+    def __repr__(self) -> str:
+        return f"TwoForm({len(self.pairs)} pairs of {self.field.joints} joints; {self.field!r})"
+
+    def pair(self, i: int, j: int) -> Field:
+        """CCF_ij, values (3, N_1, ..., N_d); that of (j, i) has the other sign."""
+        if {i, j} not in map(set, self.pairs) or i == j:
+            raise ValueError(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
+        sign = 1.0 if i < j else -1.0
+        values = sign * self.field.values[self.pairs.index((min(i, j), max(i, j)))]
+        return Field(self.field.axes, values, self.field.degree)
+
+    def slice(self, i: int, j: int, at) -> Field:
+        """CCF_ij over the plane of joints i and j through the shape ``at`` (d,): a field of two joints, to be drawn."""
+        at = self.field.inside(real_array("at", at))
+        axes = self.field.axes[i], self.field.axes[j]
+        shapes = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
+        shapes[..., i], shapes[..., j] = np.meshgrid(*axes, indexing="ij")
+        return Field(axes, np.moveaxis(self.pair(i, j)(shapes), -1, 0), self.field.degree)
+
+    def __call__(self, alpha, u, v) -> np.ndarray:
+        """CCF(u, v) (..., 3) at shapes alpha (..., d), for changes of shape u, v (..., d)."""
+        i, j = np.array(self.pairs).T
+        area = u[..., i] * v[..., j] - u[..., j] * v[..., i]
+        return np.einsum("...pc,...p->...c", self.field(alpha), area)
+
+
+def two_form(connection: Connection) -> TwoForm:
+    """The CCF of all pairs of joints, of order `Connection.degree` in the spacing."""
+    pairs = tuple(combinations(range(len(connection.axes)), 2))
+    if not pairs:
+        raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
+    values = np.stack([ccf(connection, i, j).values for i, j in pairs])
+    return TwoForm(Field(connection.axes, values, connection.degree), pairs)
+
+
+@dataclass(frozen=True)
+class Spanned:
+    """Displacement (B, 3) by the integral over a cone from the mean of the loop. other: by cones from shapes on the loop,
+    (B, tips, 3). spread: (B, 2), the largest distance between them, of positions and of headings: what hangs on the surface."""
+
+    net: np.ndarray
+    other: np.ndarray
+    spread: np.ndarray
+
+
+def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4) -> Spanned:
+    """The area tier of a gait of any number of joints, for amplitudes (B,) or its own, and how much hangs on the surface.
+    ValueError where the gait leaves the field, whose box holds every cone over a loop in it."""
+    number("phases", phases, 8, 1e6, whole=True)
+    number("tips", tips, 1, phases, whole=True)
+    if checked_gait(gait).joints != form.field.joints:
+        raise ValueError(f"the gait moves {gait.joints} joints, the field has {form.field.joints}")
+    amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
+    alpha, alphadot = gait.cycle(int(phases), amplitudes)  # (B, N, d)
+    form.field.inside(alpha)
+    net = _cone(form, alpha, alphadot, alpha.mean(1, keepdims=True))
+    at = (np.arange(tips) * phases) // tips
+    other = np.stack([_cone(form, alpha, alphadot, alpha[:, k : k + 1]) for k in at], 1)
+    apart = other - net[:, None]
+    spread = np.stack([np.hypot(apart[..., 0], apart[..., 1]).max(1), np.abs(apart[..., 2]).max(1)], -1)
+    return Spanned(net, other, spread)
+
+
+def _cone(form: TwoForm, alpha, alphadot, tip) -> np.ndarray:
+    """exp of the integral (B, 3) over tip + s (alpha - tip), s from 0 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(RADII)
+    total = 0.0
+    for s, w in zip((nodes + 1) / 2, weights / 2):
+        total = total + w * form(tip + s * (alpha - tip), alpha - tip, s * alphadot).mean(1)
+    return se2.exp(2 * np.pi * total)

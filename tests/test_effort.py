@@ -1,0 +1,205 @@
+"""What moving costs: tables of metric and norm, path length, work and cost of transport of gaits, on file and by command."""
+
+import json
+
+import numpy as np
+import pytest
+
+import geomech
+from geomech import metric
+from geomech.connection import Connection
+from geomech.errors import SceneError
+from geomech.gaits import Circle, Ellipse
+from geomech.output import netcdf
+from geomech.scene.frames import framed
+from geomech.study import cost, effort
+from geomech.systems import NoSlipSnake, Swimmer, Table
+from rft import BodyInertia, Chain, Granular, Serpenoid, SkinFriction, Transient, Viscous
+
+FLUID, SAND = Viscous(2.7), Granular(C=1.8, gamma0=np.radians(13.8))
+UNEVEN = Chain((0.7, 1.4, 0.9), length=0.3)
+GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.5, centre=(0.2, -0.1))
+NUMERICS = geomech.Numerics(grid=21, extent=1.8)
+
+
+def scene(system, gait=GAIT):
+    return geomech.Scene(system, gait, NUMERICS, "mine")
+
+
+@pytest.mark.parametrize("medium", [FLUID, SAND])
+def test_table_and_gait_agree_and_do_not_see_size_or_frame(medium):
+    study = geomech.Study(scene(Swimmer(medium, UNEVEN)))
+    found = study.effort(amplitudes=[0.5, 1.2])
+    looked_up = metric.path_length(study.metric.norm, GAIT, [0.5, 1.2])
+    assert looked_up == pytest.approx(found["path_length"], rel=1e-5 if medium is FLUID else 3e-3)
+    for other in (Chain((0.7, 1.4, 0.9)), Chain((0.7, 1.4, 0.9), length=0.3, frame="link-2")):
+        again = geomech.Study(scene(Swimmer(medium, other))).effort(amplitudes=[0.5, 1.2])
+        for key in ("path_length", "work"):
+            assert again[key] == pytest.approx(found[key], rel=1e-9)
+
+
+@pytest.mark.parametrize("medium", [FLUID, SAND])
+def test_power_is_that_of_every_frame(medium):
+    inner = Swimmer(medium, UNEVEN)
+    system = framed(inner, NUMERICS)
+    rng = np.random.default_rng(0)
+    alpha, rate = rng.uniform(-1.5, 1.5, (30, 2)), rng.normal(size=(30, 2))
+    xi, power = system.driven(alpha, rate)
+    assert power == pytest.approx(inner.power(alpha, rate), rel=1e-12)
+    assert xi == pytest.approx(system.velocity(alpha, rate), abs=1e-14)
+    assert system.work(alpha, rate, xi).power / 0.3 == pytest.approx(power, rel=1e-12)
+
+
+def test_a_norm_shares_the_velocities_of_the_harmonics():
+    study, calls = geomech.Study(scene(Swimmer(SAND, UNEVEN))), []
+    whole = Swimmer.velocity
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            Swimmer, "velocity", lambda self, a, u: calls.append(np.broadcast(a, u).size) or whole(self, a, u)
+        )
+        norm = study.metric
+        before = sum(calls)
+        table = study.table("harmonic")
+        assert sum(calls) == before
+    alone = geomech.Study(study.scene)
+    assert np.array_equal(alone.table("harmonic").coefficients, table.coefficients)
+    assert np.abs(alone.metric.coefficients - norm.coefficients).max() < 1e-12 * norm.coefficients.max()
+    assert study.metric is norm
+    assert study.turned(grid=15).metric is not norm
+    assert study.turned(phases=64).metric is norm
+
+
+def test_work_and_cost_of_transport_of_known_motions():
+    """Viscous: work over that of towing is path length^2 at best over distance^2, with equality at constant power."""
+    found = geomech.Study(scene(Swimmer(FLUID, Chain()), Circle())).effort(amplitudes=[0.05])
+    assert found["work"] * 2 * np.pi == pytest.approx(found["path_length"] ** 2, rel=0.1)
+    assert found["work"] * 2 * np.pi >= found["path_length"] ** 2
+    study = geomech.Study(scene(Swimmer(SAND, UNEVEN)))
+    table = study.study([0.5, 1.0], ["direct", "path"])
+    effort.add_effort(table)
+    distance = np.array(table["net_distance"]["path"]) / 0.3
+    assert table["cost_of_transport"]["path"] == pytest.approx(np.array(table["work"]) / distance)
+    assert table["efficiency"]["path"] == pytest.approx(distance / np.array(table["path_length"]))
+    assert table["path_length"] == table["work"]
+    assert set(effort.units(study.scene.system)) <= set(table["units"])
+
+
+def test_viscous_circle_is_as_efficient_as_published():
+    study = geomech.Study(scene(Swimmer(Viscous(2.0), Chain()), Circle()))
+    table = study.study([1.0, 1.3], ["direct"])
+    effort.add_effort(table)
+    assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
+    assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)
+
+
+def test_errors_cover_four_times_as_many_phases():
+    one = scene(Swimmer(SAND, UNEVEN))
+    coarse, fine = (effort.effort(one, GAIT, [0.4, 0.9, 1.5], phases) for phases in (64, 512))
+    for key in ("path_length", "work"):
+        assert (np.abs(coarse[key] - fine[key]) <= coarse[f"{key}_error"]).all()
+        assert (coarse[f"{key}_error"] < 1e-2 * fine[key]).all()
+
+
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [
+        (NoSlipSnake(), "nothing says what moving costs"),
+        (Swimmer(SAND, Chain((1, 1, 1, 1))), "of 3 joints"),
+        (Swimmer(SAND, Chain(), (SkinFriction(0.3, 0.6),)), "another power than the way back"),
+        (Swimmer(SAND, Chain(), (Transient(travel=0.1),)), "not memoryless"),
+    ],
+)
+def test_what_has_no_metric_says_why(system, said):
+    gait = Circle() if system.joints == 2 else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
+    study = geomech.Study(scene(system, gait))
+    with pytest.raises(SceneError, match=said):
+        study.metric  # noqa: B018
+
+
+def test_gaits_with_a_past_cost_work_all_the_same():
+    past = Swimmer(SAND, Chain(), (Transient(travel=1e-9),))
+    with_past, plain = (effort.effort(scene(s, Circle()), None, [1.0], 32) for s in (past, Swimmer(SAND, Chain())))
+    assert with_past["work"] == pytest.approx(plain["work"], rel=0.02)
+    heavy = Swimmer(SAND, Chain(length=0.3), (BodyInertia(mass=0.01, drag=1.0, frequency=1.0, length=0.3),))
+    found = effort.effort(scene(heavy, Circle()), None, [0.5], 32)
+    assert np.isnan(found["path_length"]).all() and (found["work"] > 0).all()
+
+
+@pytest.mark.parametrize("medium", [FLUID, SAND])
+def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
+    study = geomech.Study(scene(Swimmer(medium, UNEVEN)))
+    netcdf.save_connection(tmp_path / "made.nc", study)
+    assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
+    table = Table(str(tmp_path / "made.nc"))
+    own, back = study.metric, table.stored("metric")
+    name = "M" if medium is FLUID else "coefficients"
+    assert np.array_equal(getattr(back, name), getattr(own, name)) and table.power_degree == (
+        2 if medium is FLUID else 1
+    )
+    again = geomech.Study(scene(table)).effort(amplitudes=[1.0])
+    there = study.effort(amplitudes=[1.0])
+    assert again["path_length"] == pytest.approx(there["path_length"], rel=3e-3)
+    assert again["work"] == pytest.approx(there["work"], rel=5e-3)
+    saved = study.to_xarray()
+    assert saved.attrs["power_degree"] == table.power_degree
+    assert ("metric" if medium is FLUID else "norm") in saved
+
+
+def test_a_damaged_metric_is_refused(tmp_path):
+    from scipy.io import netcdf_file
+
+    study = geomech.Study(scene(Swimmer(FLUID, UNEVEN)))
+    for what in ("symmetry", "degree"):
+        path = tmp_path / f"{what}.nc"
+        netcdf.save_connection(path, study)
+        with netcdf_file(path, "a", mmap=False) as file:
+            if what == "symmetry":
+                file.variables["metric"][0, 1] += 1.0
+            else:
+                file.power_degree = -1.0
+        with pytest.raises(SceneError, match="symmetric" if what == "symmetry" else "power_degree"):
+            Table(str(path))
+
+
+@pytest.mark.parametrize(("medium", "body"), [(FLUID, UNEVEN), (SAND, UNEVEN), (FLUID, Serpenoid(elements=12))])
+def test_what_it_takes_is_foretold(medium, body):
+    one, calls = scene(Swimmer(medium, body), Circle()), []
+    whole = Swimmer.velocity
+    foretold = cost.price(cost.of_metric(one)).balances
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            Swimmer, "velocity", lambda self, a, u: calls.append(np.broadcast(a, u).size // 2) or whole(self, a, u)
+        )
+        geomech.Study(one).metric  # noqa: B018
+    assert sum(calls) == pytest.approx(foretold, rel=0.1)
+
+
+def test_by_command(capsys):
+    from geomech.cli import main
+
+    with pytest.raises(SystemExit) as ended:
+        main(["displacement", "three-link-viscous", "--amplitudes", "0,1", "--methods", "direct", "--cost", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert ended.value.code == 0
+    assert told["path_length"] == pytest.approx([0.0, 0.512235], abs=1e-6)
+    assert told["efficiency"]["direct"] == [None, pytest.approx(0.1001, abs=6e-5)]
+    assert told["cost_of_transport"]["direct"][0] is None
+    with pytest.raises(SystemExit) as ended:
+        main(["displacement", "no-slip-snake", "--amplitudes", "1", "--cost"])
+    assert ended.value.code == 2 and "nothing says what moving costs" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["three-link-floating", "three-link-ideal-fluid"])
+def test_a_metric_of_the_systems_own_has_lengths_and_no_work(name, capsys):
+    from geomech.cli import main
+
+    study = geomech.Study(geomech.load(name).with_numerics(grid=31, extent=2.5))
+    alpha, alphadot = study.scene.gait.cycle(256, 0.8)
+    length = 2 * np.pi * np.sqrt(study.scene.system.cost(alpha, alphadot)).mean()
+    found = study.effort(amplitudes=[0.8])
+    assert found["path_length"] == pytest.approx([length], rel=1e-12) and np.isnan(found["work"]).all()
+    assert metric.path_length(study.metric.norm, study.scene.gait, [0.8]) == pytest.approx([length], rel=1e-4)
+    with pytest.raises(SystemExit) as ended:
+        main(["displacement", name, "--amplitudes", "0.8", "--methods", "direct", "--cost"])
+    assert ended.value.code == 0 and f"path length: {effort.METRIC}" in capsys.readouterr().out
+    assert "metric" in study.to_xarray()
