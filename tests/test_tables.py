@@ -257,7 +257,7 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
 def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch, capsys):
     folder, s = made
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(plots, "save", lambda fig, path: Path(path).touch())
+    monkeypatch.setattr(plots, "save", lambda fig, *paths: [Path(path).touch() for path in paths])
     (tmp_path / "t").mkdir()
     (tmp_path / "t" / "a.nc").write_bytes((folder / "a.nc").read_bytes())
     text = '[system]\nkind = "table"\nfile = "a.nc"\n[gait]\nkind = "circle"\namplitude = 0.8\n'

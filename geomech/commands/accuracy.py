@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 
 from geomech import terminal
-from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, allow, loaded
+from geomech.commands.asked import allow, loaded
+from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption
 from geomech.files import whole_folder
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.options import SceneArgument, YesOption, allow, check_outputs, loaded
+from geomech.commands.asked import allow, loaded
+from geomech.commands.options import SceneArgument, YesOption, check_outputs
 
 
 def animate(

@@ -7,15 +7,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import (
-    BesideOption,
-    ExtentOption,
-    GridOption,
-    SceneArgument,
-    YesOption,
-    beside_field,
-    field,
-)
+from geomech.commands.asked import beside_field, field
+from geomech.commands.options import BesideOption, ExtentOption, GridOption, SceneArgument, YesOption
 from geomech.errors import SceneError, choose
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
+from geomech.commands.asked import beside_field, field
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -14,9 +15,7 @@ from geomech.commands.options import (
     PlotOption,
     SceneArgument,
     YesOption,
-    beside_field,
     check_netcdf,
-    field,
 )
 from geomech.errors import SceneError, choose
 

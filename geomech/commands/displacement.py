@@ -8,6 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
+from geomech.commands.asked import allow, loaded
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -15,10 +16,8 @@ from geomech.commands.options import (
     PlotOption,
     SceneArgument,
     YesOption,
-    allow,
     amplitude_kind,
     check_outputs,
-    loaded,
     spread,
 )
 from geomech.errors import SceneError, choose

@@ -8,7 +8,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import IntruderArgument, JsonOption, PlotOption, allow, check_outputs, loaded_intruder
+from geomech.commands.asked import allow, loaded_intruder
+from geomech.commands.options import IntruderArgument, JsonOption, PlotOption, check_outputs
 from geomech.errors import SceneError
 
 

@@ -9,16 +9,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.options import (
-    JsonOption,
-    PlotOption,
-    SceneArgument,
-    YesOption,
-    allow,
-    an_angle,
-    check_outputs,
-    loaded,
-)
+from geomech.commands.asked import allow, loaded
+from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, an_angle, check_outputs
 from geomech.errors import SceneError
 from geomech.files import whole_file
 

@@ -1,4 +1,4 @@
-"""What commands share: options, and what they must be; a scene and its field, loaded and asked for."""
+"""What commands share: options, and what they must be; `geomech.commands.asked` has the scenes they are asked for."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ import functools
 import inspect
 import math
 import re
-import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from geomech import terminal
 from geomech.commands.names import intruder_names, scene_names, walker_names
-from geomech.errors import Note, SceneError, check_angle, named
+from geomech.errors import SceneError
 from geomech.files import refuse_inputs, whole_file
 
 
@@ -37,8 +35,6 @@ MediumOption = Annotated[
         "--medium", metavar="FILE", help="what 'geomech calibrate' wrote, or a CSV of drag, in place of the scene's"
     ),
 ]
-
-WORTH_SAYING = 1.0  # s that a field takes
 
 
 def folder(text: str | Path) -> Path:
@@ -209,110 +205,3 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
     if not all(map(math.isfinite, values)):
         raise SceneError(f"{option}: {text!r} must be finite")
     return values
-
-
-def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
-    """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError if it takes too
-    long to be begun without --yes."""
-    cost.check(scene.name, yes)
-    for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
-        warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
-    if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
-        terminal.tell(f"{scene.name}: {cost}")
-
-
-def scene_with_gait(name: str):
-    """The scene of that name; SceneError for one without a gait."""
-    from geomech.scene import Scene, WalkerScene, load
-
-    scene = load(name)
-    if isinstance(scene, WalkerScene):
-        raise SceneError(
-            f"{name}: a robot that walks has no shape space: give it to 'geomech walk', 'sweep' or 'accuracy'"
-        )
-    if not isinstance(scene, Scene):
-        raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
-    return scene
-
-
-def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
-    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
-    from geomech.scene import in_medium
-
-    scene = scene_with_gait(name)
-    own = scene.system.stored("connection")
-    if (grid, extent) != (None, None) and own:
-        raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
-    if scene.system.joint_angles and not own:
-        check_angle("an extent", scene.numerics.extent if extent is None else extent)
-    scene = scene.with_numerics(grid=grid, extent=extent)
-    return in_medium(scene, medium) if medium else scene
-
-
-def loaded_intruder(name: str):
-    """The intruder scene of that name; SceneError for one with a gait."""
-    from geomech.scene import Scene, WalkerScene, load
-
-    scene = load(name)
-    if isinstance(scene, (Scene, WalkerScene)):
-        raise SceneError(f"{name}: a scene with a gait has no [intruder]: see 'geomech scenes' for those that have")
-    return scene
-
-
-def loaded_walker(name: str):
-    """The scene of that name; SceneError for one without a robot."""
-    from geomech.scene import WalkerScene, load
-
-    scene = load(name)
-    if not isinstance(scene, WalkerScene):
-        raise SceneError(f"{name}: a scene without a [robot] does not walk: see 'geomech scenes' for those that do")
-    return scene
-
-
-def field(
-    name, grid, extent, output: Path, plot: Path | None, maps: bool, yes: bool, with_gait: bool = False,
-    harmonics: bool = False, metric: bool = False,
-):  # fmt: skip
-    """The scene's study with its field computed, once its outputs are known to be writable. maps: they show shape space.
-    with_gait: and the gait, which is refused if it leaves the field. harmonics: with those of the velocity, where it has
-    any beside the connection, and the metric, if it has one. metric: it must."""
-    from geomech.study.bench import Study
-    from geomech.study.cost import built, of_metric, price
-    from geomech.study.effort import shared, why_none
-    from geomech.tiers import TIERS
-
-    scene = loaded(name, grid, extent)
-    study, joints = Study(scene), scene.system.joints
-    with named(scene.name):
-        TIERS["path"].refuse(scene.system)
-        if maps and joints != 2:
-            two = f"maps of shape space take a body of two joints, or modes, this one has {joints}"
-            raise SceneError(f"{scene.name}: {two}: give a chain two [body] modes")
-        if with_gait:
-            study.refuse_outside()
-        check_outputs(scene, output, plot)
-        parts, jobs = [study.compute_field], [built(scene, "path")]
-        if metric and (reason := why_none(scene.system)):
-            raise SceneError(f"{scene.name}: {reason}")
-        costed = metric or (harmonics and not why_none(scene.system))
-        if costed:
-            parts, jobs = [*parts, study.compute_metric], [*jobs, *of_metric(scene)]
-        if harmonics and "harmonic" in study.lookups:
-            parts.append(lambda progress: study.table("harmonic", progress=progress))
-            jobs += [] if costed and shared(scene.system) else [built(scene, "harmonic")]
-        allow(scene, price(jobs), yes, WORTH_SAYING)
-    with terminal.progress(f"field of {scene.name}") as bar:
-        for k, part in enumerate(parts):
-            part(progress=lambda done: bar((k + done) / len(parts)))
-    return study
-
-
-def beside_field(study, frame: str, yes: bool):
-    """The study of the same scene in another body frame, with its field computed."""
-    from geomech.study.cost import built, price
-
-    other = study.in_frame(frame)
-    allow(other.scene, price([built(other.scene, "path")]), yes, WORTH_SAYING)
-    with terminal.progress(f"field of {other.scene.name}, frame {frame}") as bar:
-        other.compute_field(bar)
-    return other

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
+from geomech.commands.asked import allow, loaded
 from geomech.commands.names import scene_names
-from geomech.commands.options import FolderOption, MediumOption, YesOption, allow, loaded
+from geomech.commands.options import FolderOption, MediumOption, YesOption
 from geomech.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"

@@ -8,14 +8,13 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
+from geomech.commands.asked import allow, loaded
 from geomech.commands.options import (
     PlotOption,
     SceneArgument,
     YesOption,
-    allow,
     check_netcdf,
     check_outputs,
-    loaded,
     parameter_kind,
     spread,
 )

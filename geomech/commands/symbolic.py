@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.options import SceneArgument, loaded
+from geomech.commands.asked import loaded
+from geomech.commands.options import SceneArgument
 from geomech.errors import named
 
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.options import CyclesOption, SceneArgument, YesOption, allow, check_outputs, loaded
+from geomech.commands.asked import allow, loaded
+from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
 
 
 def trajectory(

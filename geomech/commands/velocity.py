@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.options import JsonOption, SceneArgument, numbers, scene_with_gait
+from geomech.commands.asked import scene_with_gait
+from geomech.commands.options import JsonOption, SceneArgument, numbers
 from geomech.errors import Note, named
 
 

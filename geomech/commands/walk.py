@@ -8,7 +8,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.options import JsonOption, WalkerArgument, YesOption, allow, check_outputs, folder, loaded_walker
+from geomech.commands.asked import allow, loaded_walker
+from geomech.commands.options import JsonOption, WalkerArgument, YesOption, check_outputs, folder
 from geomech.files import whole_folder
 
 

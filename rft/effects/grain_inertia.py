@@ -68,7 +68,7 @@ class Flux(PerSample):
     beta: np.ndarray | float
 
     @property
-    def numbers(self):
+    def numbers(self) -> np.ndarray | float:
         """For compiled code (`rft.backend`)."""
         return self.beta
 
