@@ -2,7 +2,6 @@
 
 import math
 import os
-import time
 
 import pytest
 
@@ -72,19 +71,12 @@ def no_lines_of_progress(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def compiled_code(tmp_path_factory):
-    """Compiled descents, made by the first process that asks; the others wait for it."""
+def compiled_code():
+    """Compiled descents. To make them takes some twenty seconds, so that is left to `python -m rft`, and to .ci/run."""
     if not backend.installed():
         pytest.skip("numba is not installed")
-    folder = tmp_path_factory.getbasetemp()
-    folder = folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
-    try:
-        (folder / "making").mkdir()
-        compiled.make()
-        (folder / "made").touch()
-    except FileExistsError:
-        while not (folder / "made").exists():
-            time.sleep(0.1)
+    if not compiled.made():
+        pytest.skip("compiled code is not made yet: python -m rft")
 
 
 @pytest.fixture(params=["numpy", "numba"])

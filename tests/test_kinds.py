@@ -430,7 +430,7 @@ def test_two_packages_of_one_name_and_built_in_names(package):
     told = text("medium")
     assert 'law = "thick"\nOf the package' in told
     assert 'law = "viscous"\nNot that of the package clash 1.2, which is refused' in told
-    laws = [x["properties"].get("law") for x in schema()["properties"]["medium"]["oneOf"]]
+    laws = [x["properties"].get("law") for x in schema()["$defs"]["gaits"]["medium"]["oneOf"]]
     assert laws.count({"const": "thick"}) == laws.count({"const": "viscous"}) == 1
     assert type(load("three-link-viscous").system.medium) is Viscous  # the built-in one stands
 

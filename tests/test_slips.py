@@ -84,7 +84,7 @@ COMMANDS = [
     ["run", "s.toml", "-o", "s.toml"], ["run", "s.toml", "-o", "loop"], ["run", "s.toml", "out"], ["run", "nope"],
     ["accuracy", "s.toml", "-o", "s.toml"], ["accuracy"],
     *([*S, x] for x in ("gait.amplitude", "amplitude=1", "gait.amplitude=", "gait.amplitud=1", "gate.amplitude=1", "=1")),
-    *([*S, x] for x in ("medium.C=1", "gait.kind=1", "gait.centre=1", "gait..amplitude=1", "effects.x.y=1", "body.lengths=1")),
+    *([*S, x] for x in ("medium.D=1", "gait.kind=1", "gait.centre=1", "gait..amplitude=1", "effects.x.y=1", "body.lengths=1")),
     *([*S, x] for x in ("numerics.grid=2.5", "frame.x=1", "physical.mass=1", "gait.amplitude=0:1:99999999")),
     [*S, "gait.amplitude=1", "--over", "gait.amplitude=2"], [*S[:3], "s.txt", "--over", "gait.amplitude=1"],
     [*S[:3], "folder.nc", "--over", "gait.amplitude=1"], [*S[:3], "..", "--over", "gait.amplitude=1"],

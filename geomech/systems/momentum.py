@@ -29,8 +29,8 @@ class Linkage(Chain):
 
     masses: tuple[float, ...] = ()
 
-    def _of_frame(self, x: np.ndarray, frame: str) -> np.ndarray:
-        link, masses = self._link_of(frame), np.asarray(self.masses)
+    def _of_link(self, x: np.ndarray, link: int | None) -> np.ndarray:
+        masses = np.asarray(self.masses)
         return x[link] if link is not None else masses @ x / masses.sum()
 
 
