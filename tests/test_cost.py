@@ -151,7 +151,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.commands.options.WORTH_SAYING", 0.0)
+    monkeypatch.setattr("geomech.commands.asked.WORTH_SAYING", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
     assert err.startswith("five.toml: 8,192 force balances, about 1 s of computing and 16")
@@ -321,9 +321,9 @@ def test_what_was_ignored_stays_ignored():
 
 
 def test_a_second_signal_does_not_disturb_the_keeping():
-    def work():
+    def work():  # a shell's background jobs ignore INT, under nohup HUP too
         try:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(5)
         finally:
             os.kill(os.getpid(), signal.SIGTERM)
@@ -331,7 +331,7 @@ def test_a_second_signal_does_not_disturb_the_keeping():
 
     with pytest.raises(terminal.Stopped) as stopped, terminal.stoppable():
         work()
-    assert stopped.value.code == 130
+    assert stopped.value.code == 143
 
 
 # Terminals and folders.
