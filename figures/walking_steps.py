@@ -26,7 +26,7 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
 
     def slope(at: State, where: float):
         a, motors, ground = robots.forces(at.pose[None], at.twist[None], *robots.turned(np.array([where]), of))
-        return State(at.twist, a[0], motors[0], ground[0])
+        return State(at.twist, a[0], motors[0], ground[0], 0.0 * ground[0])
 
     first = slope(state, phase)
     then = State(*(x + dt * y for x, y in zip(state, first)))

@@ -122,7 +122,9 @@ def test_the_limit_cycle_is_that_of_many_strides():
     walkers = [xplorer(c, f) for c, f in ((1.0, 2.0), (0.3, 3.0))]
     strides = _strides(walkers, QUICK)
     _, told, _, _ = from_rest(strides, 12 / strides.frequency)
-    state = State(*(np.stack([rows[2][-1][s] for rows in told]) for s in (slice(1, 4), slice(4, 7), 7, 8)))
+    state = State(
+        *(np.stack([rows[2][-1][s] for rows in told]) for s in (slice(1, 4), slice(4, 7), 7, 8)), np.zeros(len(told))
+    )
     _, progress, _, periodic, done, ends = limit_cycle(_strides(walkers, QUICK), state)
     long = [rows[-1][-1, 1] - rows[-2][-1, 1] for rows in told]
     assert periodic.all() and (ends == "").all() and (done < 8).all()
@@ -360,3 +362,13 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     assert left[-1] < 0.02 and (chattering > 0).all()
     smooth, lugs = made[wheel]["found"].values()
     assert smooth[60.0].pull[2] < smooth[0.0].pull[2] < lugs[0.0].pull[2] < lugs[60.0].pull[2]
+
+
+def test_steps_that_are_not_solved_are_told(monkeypatch):
+    """With Newton's method cut short none is, and every walk counts them; the built-in robots solve all."""
+    robot = xplorer(1.0, 2.0)
+    (found,) = walk([robot], QUICK, 1)
+    assert found.unsolved == 0
+    monkeypatch.setattr("rft.walking.planar.ITERATIONS", 1)
+    (found,) = walk([robot], QUICK, 1)
+    assert found.unsolved > 0

@@ -26,7 +26,7 @@ def columns(found: Walked) -> dict[str, np.ndarray]:
 def as_json(found: Walked) -> str:
     w = found.walk
     series = {name: values.tolist() for name, values in columns(found).items() if name in ("t", "x", "z", "pitch")}
-    numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic}
+    numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
     return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
 
 
@@ -41,6 +41,7 @@ def told(scene: WalkerScene, found: Walked) -> str:
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
         f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J",
+        *([f"{w.unsolved} steps were taken unsolved: raise [numerics] steps or rounding"] if w.unsolved else []),
     ])  # fmt: skip
 
 

@@ -31,12 +31,14 @@ ENOUGH = 0.1  # of the fall of the residual that Newton's method foretells
 
 
 class State(NamedTuple):
-    """pose, twist: (B, 3) as (x, z, pitch) and their rates. work, loss: (B,), J, of the motors and in the ground, so far."""
+    """pose, twist: (B, 3) as (x, z, pitch) and their rates. work, loss: (B,), J, of the motors and in the ground, so far.
+    unsolved: (B,), steps so far that Newton's method left unsolved, however short, and that were taken as they were."""
 
     pose: np.ndarray
     twist: np.ndarray
     work: np.ndarray
     loss: np.ndarray
+    unsolved: np.ndarray
 
     def take(self, some) -> State:
         return State(*(x[some] for x in self))
@@ -93,7 +95,7 @@ class Robots:
             low.append(self.belly.lowest(np.zeros(len(self))) + np.zeros(len(self)))
         pose = np.zeros((len(self), 3))
         pose[:, 1] = -np.min(low, axis=0)
-        return State(pose, np.zeros_like(pose), np.zeros(len(self)), np.zeros(len(self)))
+        return State(pose, np.zeros_like(pose), *np.zeros((3, len(self))))
 
     def turned(self, phase, of) -> tuple[np.ndarray, np.ndarray]:
         """Angles (B, K) and rates (B, K), rad/s, of the legs at phases (B,), by the rates that hold at ``of``."""
@@ -155,10 +157,12 @@ class Robots:
         pose, twist = state.pose + (h - k) * v, state.twist + (h - k) * slope
         v, motors, ground, also = self._stage(pose, twist, v, angle + h * rate, rate, k)
         work, loss = (dt * ((1 - GAMMA) * a + GAMMA * b) for a, b in zip(first, (motors, ground)))
-        new = State(pose + k * v, v, state.work + work, state.loss + loss)
+        new = State(pose + k * v, v, state.work + work, state.loss + loss, state.unsolved)
         bad = np.flatnonzero(~(solved & also))
-        if not bad.size or not halvings:
+        if not bad.size:
             return new
+        if not halvings:
+            return new._replace(unsolved=state.unsolved + ~(solved & also))
         few, half, there = self.take(bad), dt[bad] / 2, phase[bad]
         middle = few.step(state.take(bad), there, of, half, halvings - 1)
         later = there + half * np.array([g.frequency for g in few.gaits])

@@ -56,9 +56,10 @@ def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None) -
         found = found.put(here, _limits([walkers[k] for k in here], numerics, state.take(here)))
     walks = []
     for k, rows in enumerate(paths):
-        states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8])
+        states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], 0.0 * rows[:, 8])
         energy = strides.robots.take([k]).energy(states)
-        walks.append(Walk(rows[:, 0], *states, energy, *found.of(k)))
+        unsolved = state.unsolved[k] if found.limit[k] is None else found.limit[k].unsolved[0]
+        walks.append(Walk(rows[:, 0], *states[:4], energy, *found.of(k), int(unsolved)))
     return walks
 
 
@@ -125,5 +126,5 @@ def again(
         state = State(*(np.concatenate(x) for x in zip(*(walks[k].limit for k in here))))
         speeds = _limits([walkers[k] for k in here], numerics, state, FEW_STRIDES)
         for j, k in enumerate(here):
-            found[k] = Walk(*walks[k][:6], *speeds.of(j))
+            found[k] = Walk(*walks[k][:6], *speeds.of(j), int(speeds.limit[j].unsolved[0]))
     return found

@@ -29,7 +29,8 @@ class Walk(NamedTuple):
     """How one robot walks. t (T,), s; pose, twist (T, 3); work, loss (T,), J, of the motors and into the ground, and energy
     (T,), J, of the body: work = loss + change of energy. speed: m/s, mean of the limit cycle, or till the robot's end. status:
     "walking", "stuck", "sunk", "flipped" or "airborne". cycles: computed in all. periodic: whether the limit cycle was
-    found. drift: m/s, what the speed may still change. limit: its state there, (13,), None where there is none.
+    found. drift: m/s, what the speed may still change. limit: its state there, None where there is none. unsolved: steps,
+    of all computed, that were taken unsolved (`State`).
     """
 
     t: np.ndarray
@@ -44,6 +45,7 @@ class Walk(NamedTuple):
     periodic: bool
     drift: float
     limit: State | None
+    unsolved: int = 0
 
 
 class Strides:
