@@ -372,3 +372,16 @@ def test_steps_that_are_not_solved_are_told(monkeypatch):
     monkeypatch.setattr("rft.walking.planar.ITERATIONS", 1)
     (found,) = walk([robot], QUICK, 1)
     assert found.unsolved > 0
+
+
+def test_axes_of_a_sweep_have_units():
+    from geomech.output import walk_sweeps
+
+    many = {"speed": np.ones((2, 3)), "estimate": np.zeros((2, 3)), "status": np.full((2, 3), "walking")}
+    over = {"gait.frequency": [1.0, 2.0], "robot.mass": [0.1, 0.2, 0.3]}
+    (ax,) = walk_sweeps.draw(scenes.load("xplorer"), {"over": over, **many}).axes
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency (Hz)", "mean speed (m/s)")
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["mass (kg): 0.1", "mass (kg): 0.2", "mass (kg): 0.3"]
+    one = {"over": {"robot.legs.relative_curvature": [0.0, 1.0]}, **{k: v[:, 0] for k, v in many.items()}}
+    (ax,) = walk_sweeps.draw(scenes.load("xplorer"), one).axes
+    assert ax.get_xlabel() == "relative_curvature (-)" and ax.get_legend() is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -132,14 +133,14 @@ def _map(ax, x, y, net: np.ndarray, label: str) -> None:
     ax.figure.colorbar(image, ax=ax).set_label(label)
 
 
-def labels(scene: Scene, parameters: list[str]) -> list[str]:
+def labels(scene, parameters: list[str], units: Mapping[str, str] = PARAMETERS) -> list[str]:
     """For axes: names with units; by their last part where that says which, "body-inertia: frequency (Hz)" else."""
     last = [name.rpartition(".")[2] for name in parameters]
     out = []
     for name, short in zip(parameters, last):
         whose = name.split(".")[-2].replace("_", "-")
         shown = short if last.count(short) == 1 else f"{whose}: {short}"
-        unit = "deg" if short.endswith("_deg") else PARAMETERS.get(short, "-")
+        unit = "deg" if short.endswith("_deg") else units.get(short, "-")
         angle = shown.removesuffix("_deg").replace("gamma0", "gamma_0")
         out.append(scene.gait.amplitude_label if name == AMPLITUDE else plots.quantity(angle, unit))
     return out

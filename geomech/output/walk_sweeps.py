@@ -10,9 +10,16 @@ from geomech.errors import SceneError
 from geomech.files import whole_file
 from geomech.output import plots
 from geomech.output.netcdf import attribute
+from geomech.output.sweeps import labels
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.walking import STATUSES
+
+UNITS = {  # of parameters, by the last part of their names; the others have none
+    "mass": "kg", "inertia": "kg m$^2$", "length": "m", "width": "m", "height": "m", "hip_height": "m", "radius": "m",
+    "lug_height": "m", "lug_width": "m", "axle": "m", "frequency": "Hz", "sweep": "rad", "middle": "rad", "air_speed": "m/s",
+    "fluidisation": "m/s", "grazing": "rad", "duration": "s", "rounding": "m/s",
+}  # fmt: skip
 
 
 def save(path: Path, scene: WalkerScene, results: dict) -> None:
@@ -54,23 +61,23 @@ def draw(scene: WalkerScene, results: dict):
     over = results["over"]
     if len(over) > 2:
         raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
-    (name, values), *others = over.items()
-    second, lines = others[0] if others else ("", [None])
+    name, *second = labels(scene, list(over), UNITS)
+    values, *others = over.values()
     fig, axes = plots.figure(4.6, 3.2)
-    curves(axes[0, 0], values, results, [f"{second} = {v:g}" if second else "" for v in lines])
+    curves(axes[0, 0], values, results, [f"{second[0]}: {v:g}" for v in others[0]] if others else [""])
     axes[0, 0].set(xlabel=name, ylabel="mean speed (m/s)")
     return fig
 
 
-def curves(ax, values, results: dict, labels) -> None:
-    """Speed (N, ...) over ``values``, a curve for each label, with its error; open: not walking."""
+def curves(ax, values, results: dict, names) -> None:
+    """Speed (N, ...) over ``values``, a curve for each name, with its error; open: not walking."""
     from cmcrameri import cm
 
     speed, error, status = (np.asarray(results[x]).reshape(len(values), -1) for x in ("speed", "estimate", "status"))
-    for k, label in enumerate(labels):
-        colour = cm.batlow(0.85 * k / max(1, len(labels) - 1))
+    for k, label in enumerate(names):
+        colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
         ax.errorbar(values, speed[:, k], yerr=error[:, k], color=colour, lw=1.0, capsize=2, label=label)
         for fill, some in ((colour, status[:, k] == "walking"), ("white", status[:, k] != "walking")):
             ax.plot(np.array(values)[some], speed[some, k], "o", ms=4, color=colour, mfc=fill)
-    if any(labels):
+    if any(names):
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
