@@ -24,7 +24,8 @@ from rft import (
     Transient,
     Viscous,
 )
-from rft.media import CATALOGUE
+from rft.media import CATALOGUE, is_closed
+from rft.media import Table as Measured
 from rft.spatial import Cylinder, Leg, Screw, Sphere
 from rft.vertical import (
     VERTICAL,
@@ -44,6 +45,8 @@ from rft.vertical.effects import Aeration, Slope
 from rft.vertical.effects import DisturbedGround as DisturbedPlaces
 from rft.vertical.effects import GrainInertia as GrainPressure
 
+_PSI = np.linspace(0.0, math.pi / 2, 12)  # rad
+
 MEDIA = {
     **{name: entry.medium for name, entry in CATALOGUE.items()},
     "sharp": Granular(C=1.8, gamma0=math.radians(0.1)),
@@ -52,9 +55,11 @@ MEDIA = {
     "strong": Granular(C=1e3, gamma0=0.24),
     "viscous-1": Viscous(1.0),
     "viscous-slippery": Viscous(1e4),
+    "measured": Measured(_PSI, *Granular(C=1.4, gamma0=0.25).traction(np.cos(_PSI), np.sin(_PSI))),
 }
-DRY = {k: m for k, m in MEDIA.items() if m.dry}
-LINEAR = {k: m for k, m in MEDIA.items() if not m.dry}
+CLOSED = {k: m for k, m in MEDIA.items() if is_closed(m)}  # exact integrals over a link
+LINEAR = {k: m for k, m in CLOSED.items() if not m.dry}
+DRY = {k: m for k, m in MEDIA.items() if k not in LINEAR}
 
 BODIES = {
     "two": Chain((1, 2)),

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from registry import BODIES, DRY, MEDIA
+from registry import BODIES, CLOSED, DRY, MEDIA
 
 from geomech import coordinates
 from geomech.gaits import Butterfly, Circle, Fourier
@@ -50,6 +50,12 @@ STRANGE_BODIES = {
     "kilometre": Chain(length=1e3),
     "twelve": Chain((1,) * 12, frame="link-7"),
 }
+CROSSED = [
+    (name, medium)
+    for name, body in (BODIES | STRANGE_BODIES).items()
+    for medium in MEDIA
+    if medium in CLOSED or body.joints < 5  # quadrature takes its time
+]
 
 
 def hard(joints):
@@ -59,9 +65,9 @@ def hard(joints):
 
 
 @pytest.mark.usefixtures("solved_by")
-@pytest.mark.parametrize("medium", MEDIA)
-@pytest.mark.parametrize("body", (BODIES | STRANGE_BODIES).values(), ids=BODIES | STRANGE_BODIES)
+@pytest.mark.parametrize(("body", "medium"), CROSSED)
 def test_hard_cases(body, medium):
+    body = (BODIES | STRANGE_BODIES)[body]
     cases, alpha, alphadot = hard(body.joints)
     solution = body_velocity(MEDIA[medium], body, alpha, alphadot)
     speed = np.linalg.norm(alphadot, axis=-1)

@@ -3,7 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from registry import MEDIA
+from registry import CLOSED, MEDIA
 
 from rft import Granular
 from rft.loads import element_load, exact, gauss, k_function, midpoint
@@ -56,11 +56,11 @@ def test_k_on_both_sides_of_its_branch(t):
     assert got == pytest.approx(float(exact_k), rel=5e-14)
 
 
-@pytest.mark.parametrize("name", MEDIA)
+@pytest.mark.parametrize("name", CLOSED)
 def test_tangent_is_the_slope_of_the_force(name):
     rng = np.random.default_rng(2)
     v, eps = rng.normal(size=(3, 1, 40)), np.full(40, 0.05)
-    load = exact(MEDIA[name])
+    load = exact(CLOSED[name])
     tangent, h = load(*v, eps)[:, 1:], 1e-6
     for j in range(3):
         step = h * np.eye(3)[j][:, None, None]
@@ -68,12 +68,12 @@ def test_tangent_is_the_slope_of_the_force(name):
         np.testing.assert_allclose(tangent[:, j], slope, rtol=1e-5, atol=1e-6 * np.abs(tangent).max())
 
 
-@pytest.mark.parametrize("name", MEDIA)
+@pytest.mark.parametrize("name", CLOSED)
 def test_gauss_agrees_where_the_law_is_smooth(name):
     rng = np.random.default_rng(4)
     v = rng.normal(size=(3, 2, 30))
     v[1] = 3.0 * np.sign(v[1]) * (1 + np.abs(v[2]))  # no pivot in the link
-    fine, closed = gauss(MEDIA[name], 40)(*v, np.full(30, 0.1)), exact(MEDIA[name])(*v, np.full(30, 0.1))
+    fine, closed = gauss(CLOSED[name], 40)(*v, np.full(30, 0.1)), exact(CLOSED[name])(*v, np.full(30, 0.1))
     np.testing.assert_allclose(fine, closed, rtol=1e-8, atol=1e-11 * np.abs(closed).max())
 
 
