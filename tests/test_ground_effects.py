@@ -11,7 +11,7 @@ from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 from figures import ground_effects
 from geomech import scene as scenes
 from geomech.output.explain import explain
-from rft.spatial import Spatial, shapes, wrench
+from rft.spatial import Spatial, bearing, shapes, wrench
 from rft.vertical import Plate, loads
 from rft.vertical.effects import KINDS, Aeration, DisturbedGround, GrainInertia, Slope, folded
 
@@ -37,6 +37,19 @@ def test_every_kind_is_in_the_registry():
 def of_mesh(effects, shape=None):
     found = wrench(SOLID, MESH, np.eye(3), [0.02, 0.1, -0.01], [-0.3, 0.1, -0.4], [2.0, 9.0, 1.0], effects)
     return np.concatenate([found.force, found.moment, [found.power]])
+
+
+def test_what_faces_bear_with_effects_sums_to_the_wrench():
+    """Force and, of a fine mesh, moment: pressure of grains pushes against faces and has its lever, too."""
+    fine, place = shapes.leg(0.03, 0.8, 0.006, 0.02, along=96, across=16, thick=6), np.array([0.02, 0.1, -0.01])
+    rates, effects = ([-0.3, 0.1, -0.4], [2.0, 9.0, 1.0]), (GrainInertia(20.0, 700.0), Slope(0.2, 0.6))
+    found, faces = (f(SOLID, fine, np.eye(3), place, *rates, effects) for f in (wrench, bearing))
+    plain = wrench(SOLID, fine, np.eye(3), place, *rates)
+    assert (np.abs(found.moment - plain.moment) > 0.1 * np.abs(plain.moment)).all()
+    np.testing.assert_allclose(faces.force.sum(0), found.force, rtol=2e-3)
+    np.testing.assert_allclose(np.cross(faces.middle - place, faces.force).sum(0), found.moment, rtol=1e-2)
+    speed = rates[0] + np.cross(rates[1], faces.middle - place)
+    assert (faces.force * speed).sum() == pytest.approx(found.power, rel=1e-2)
 
 
 @pytest.mark.parametrize(("on", "shape"), [(both, "c-leg"), (both, "half-cylinder"), (of_mesh, None)])

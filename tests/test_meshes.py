@@ -150,6 +150,48 @@ def test_velocities_are_those_of_the_poses(body, motion):
         np.testing.assert_allclose(lowest, [0.0, -motion.depth], atol=1e-12)
 
 
+def test_motions_go_where_their_angles_say():
+    """Along closed forms, with level, upright and oblique ways; a turn of the body about y by default."""
+    ball = Sphere(0.02).mesh(100)
+    for heading, direction, way in (
+        (0.0, 0.0, (1, 0, 0)),
+        (0.0, np.pi / 2, (0, 0, -1)),
+        (np.pi / 2, 0.0, (0, 1, 0)),
+        (2.0, -0.5, (np.cos(0.5) * np.cos(2.0), np.cos(0.5) * np.sin(2.0), np.sin(0.5))),
+    ):
+        p = Drag(0.05, direction, heading, speed=0.2, distance=0.3).passage(ball)
+        np.testing.assert_allclose(p.place[-1], [0, 0, -0.05] + 0.3 * np.array(way), atol=1e-15)
+        np.testing.assert_allclose(p.velocity[7], 0.2 * np.array(way), atol=1e-16)
+        assert (p.velocity[7] == 0.0).tolist() == [x == 0 for x in way]  # to the last digit
+        assert p.t[-1] == pytest.approx(1.5) and not p.angle.any()
+    p = Penetrate(0.03, direction=2.0, heading=-1.0).passage(ball)
+    assert p.place[-1] == pytest.approx([0.03 / np.tan(2.0) * np.cos(1.0), -0.03 / np.tan(2.0) * np.sin(1.0), -0.01])
+    turned = Rotate(0.04, start=-1.0, stop=0.5).passage(ball)
+    assert turned.spin[0] == pytest.approx([0, 2 * np.pi, 0]) and turned.angle[[0, -1]] == pytest.approx([-1.0, 0.5])
+    np.testing.assert_allclose(turned.rotation[-1] @ [0, 0, -1], [-np.sin(0.5), 0, -np.cos(0.5)], atol=1e-15)
+    t = np.arange(3.0)
+    assert not Path(t, t, 0 * t, 0 * t).passage(ball).angle.any()
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Drag(0.1, heading=-11.0), "heading must be"),
+        (lambda: Drag(0.1, direction=11.0), "direction must be"),
+        (lambda: Drag(-11.0), "depth must be"),
+        (lambda: Penetrate(0.0), "depth must be"),
+        (lambda: Penetrate(0.1, direction=0.0), "direction must point downwards"),
+        (lambda: Path((0, 1), (0, 1), (0, 1), (0, 1)), "3 to"),
+        (lambda: Path((0, 1, 2), *[(0, 0, 0)] * 4, (0, 1, 3.5), (0, 0, 0)), "2 rad or more after t = 1"),
+        (lambda: Path((0, 2, 1), *[(0, 0, 0)] * 3), "t must ascend"),
+        (lambda: Sphere(0.1).mesh(2.5), "whole number"),
+    ],
+)
+def test_motions_and_counts_that_make_no_sense_are_refused(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
 def test_a_path_of_poses_gives_the_motion_it_was_taken_from(geomech, tmp_path):  # noqa: F811
     """A steady rotation about an oblique axis, with the hub moving, from a CSV file."""
     made = MADE.replace("sphere", "c-leg").replace("radius", "width = 0.02\nthickness = 0.004\nradius")
