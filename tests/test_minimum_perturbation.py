@@ -178,6 +178,7 @@ def test_a_scene_in_it(law):
     assert scenes.parse(scenes.toml(scene)) == scene
     assert scene.with_numerics(grid=9).system.axes != scene.system.axes
     assert scene.with_numerics(phases=32).system is scene.system
+    assert scene.system.with_solver(tolerance=1e-8).inner.solver.tolerance == 1e-8
 
 
 def test_no_such_frame_where_there_is_none():

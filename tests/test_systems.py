@@ -21,7 +21,7 @@ from geomech.study.bench import Study
 from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
 from geomech.systems.swimmer import Solver
 from geomech.tiers.direct import direct
-from rft import Backbone, Chain, Coulomb, Transient, se2
+from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
 
 AWAY = Ellipse(semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7))  # from alpha_1 = alpha_2
 
@@ -195,6 +195,12 @@ def test_whatever_has_a_velocity_is_a_system():
         np.testing.assert_allclose(study.displacement(tier, None, [0.2]), truth, atol=0.02 * np.hypot(*truth[0, :2]))
     with pytest.raises(SceneError, match="of no kind that a scene file can name"):
         scenes.toml(Scene(Disc(), GAITS["ellipse"]))
+
+
+def test_three_links_are_a_chain_of_three_and_nothing_else():
+    """The published gaits, circle and butterfly, are compared for these alone."""
+    bodies = Chain((1, 2, 1)), Chain((1,) * 4), Chain((1,) * 3, modes=((1.0, 0.5), (0.0, 1.0))), Serpenoid(12)
+    assert [Swimmer(Coulomb(2.0), body).three_link for body in bodies] == [True, False, False, False]
 
 
 def test_points_on_either_side_of_a_change_of_sign_are_crossed():
