@@ -54,7 +54,8 @@ def work_done(
     model = folded(effects, medium, pieces_of, loads)
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    eps = regularisation * pace(body, alphadot)
+    speed = pace(body, alphadot)
+    eps = regularisation * np.where(speed > 0, speed, 1.0)  # a body at rest: any will do
     done = done_by(model, halves(body), model.motions(pieces_of.motion(alpha, alphadot)), xi, eps)
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 

@@ -11,7 +11,7 @@ from geomech.optimise.cycles import Brought
 
 AIMS = ("displacement", "efficiency", "turning", "speed")
 DIRECTIONS = ("x", "y")
-TINY = 1e-12  # body lengths: a distance that is none
+TINY = 1e-9  # body lengths: a distance that is none
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ class Aim:
             theta = b.net[0][2]
             return abs(theta), (-1.0 if theta < 0 else 1.0) * b.net[1][2]
         far = self._displacement(b)
+        if (b.length[0] if self.name == "efficiency" else time) == 0:  # of a gait that rests
+            return 0.0, 0 * far[1]
         if self.name == "efficiency":
             value = far[0] / b.length[0]
             return value, (far[1] - value * b.length[1]) / b.length[0]
@@ -67,7 +69,9 @@ class Aim:
         (x, y, _), (dx, dy, _) = b.net
         if not self.direction:
             size = np.hypot(x, y)
-            return size / self.length, (x * dx + y * dy) / (size + TINY) / self.length
+            if size < TINY * self.length:  # at the tip of a cone: the steepest way up
+                x, y = np.linalg.svd(np.stack([dx.ravel(), dy.ravel()]), full_matrices=False)[0][:, 0]
+            return size / self.length, (x * dx + y * dy) / np.hypot(x, y) / self.length
         value, slopes = self.along(b)
         return abs(value) / self.length, (-1.0 if value < 0 else 1.0) * slopes / self.length
 

@@ -10,21 +10,20 @@ from geomech.optimise.aims import Aim
 
 EVEN = 1e-3  # of the value: what uneven pacing costs; it decides among pacings that bring the same
 STRAIGHT = 1e-3  # rad: below it a gait does not turn
-STRIDE, TOGETHER = (
-    0.5,
-    50,
-)  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
+STRIDE = 0.5  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
+TOGETHER = 50
 FLAT, BACK = 0.05, 1e-6  # of the first harmonic: how thin a plane, and how far back a stroke, is none
 TRIES = 2.5  # cycles that a step takes, at most in the mean
-MARGIN = 0.5  # of the start's distance from singular shapes, which is kept
+KEPT = 5e-3  # rad, and of a limit: how far beyond a rule a loop may be that counts as keeping it
+SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after a loop that cannot be run, or no way up; and at the end
 
 
 def climb(
     cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, most: int = 100, tolerance: float = 1e-6,
-    singularity: Callable | None = None, told: Callable = lambda: None,
+    singularity: Callable | None = None, away: float = 0.0, told: Callable = lambda: None,
 ) -> np.ndarray:  # fmt: skip
     """The loop that ``aim`` leads to from ``p``; cycles: `Phases` or `Runs`. turn (rad): of a cycle, at most, where the aim is
-    to get along. singularity: of shapes, not to be met."""
+    to get along. singularity: of shapes, nowhere nearer to 0 than ``away``."""
     from scipy.optimize import minimize
 
     seen = _Seen(cycles, p.shape, told, TRIES * most)
@@ -60,24 +59,46 @@ def climb(
     if (once := _once_round(loops, p, unit, paced)) is not None:
         rules.append(once)
     if singularity is not None:
-        rules.append(_away(loops, singularity, p, unit, paced))
-    x, left = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit, most
-    while left > 0:
-        room = np.where(np.arange(len(x)) < p.size, STRIDE, np.inf)
-        begun, way = x, []
+        rules.append(_away(loops, singularity, away, p, unit, paced))
+    x, left, stride = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit, most, STRIDE
+    while left > 0 and stride > SHORTEST * STRIDE:
+        room = np.where(np.arange(len(x)) < p.size, stride, np.inf)
+        begun, way, found = x, _Way(down, rules), None
         try:
+            way(x)
             found = minimize(
                 down, x, jac=True, method="SLSQP", constraints=rules, bounds=np.stack([x - room, x + room], -1),
-                options={"maxiter": min(left, TOGETHER), "ftol": tolerance}, callback=lambda y: way.append(np.array(y)),
+                options={"maxiter": min(left, TOGETHER), "ftol": tolerance}, callback=way,
             )  # fmt: skip
-            way.append(found.x)
         except _Enough:
             left = 0
-        x = next((y for y in reversed(way) if np.isfinite(y).all()), x)
-        left -= max(len(way), 1)
-        if left > 0 and np.abs(x - begun)[: p.size].max() < STRIDE * (1 - 1e-6) and found.success:
+        except RuntimeError:  # of a loop on the way
+            stride *= SHORTER
+        x = x if way.best is None else way.best
+        left -= max(way.steps, 1)
+        gone = np.abs(x - begun)[: p.size].max()
+        if found is not None and found.success and gone < stride * (1 - 1e-6):
             break
+        stride *= SHORTER if gone == 0 else 1.0
     return np.reshape(split(x)[0] * unit, shape)
+
+
+class _Way:
+    """Where a search has been: the best place that keeps the rules, or the last where none did."""
+
+    def __init__(self, down: Callable, rules: list[dict]):
+        self.down, self.rules, self.best, self.least, self.steps = down, rules, None, np.inf, -1
+
+    def __call__(self, x: np.ndarray) -> None:
+        self.steps += 1
+        value = self.down(x)[0] if np.isfinite(x).all() and all(_kept(rule, x) for rule in self.rules) else np.inf
+        if value < self.least or (self.least == np.inf and np.isfinite(x).all()):
+            self.best, self.least = np.array(x), value
+
+
+def _kept(rule: dict, x: np.ndarray) -> bool:
+    slack = rule["fun"](x)
+    return bool((np.abs(slack) if rule["type"] == "eq" else -slack).max() <= KEPT)
 
 
 class _Enough(Exception):
@@ -182,11 +203,9 @@ def _once_round(loops, p, unit: float, paced: bool) -> dict | None:
     return {"type": "ineq", "fun": lambda x: side * swept(x), "jac": slopes}
 
 
-def _away(loops, singularity, p, unit: float, paced: bool) -> dict:
-    """On this side of the singular shapes, no nearer than MARGIN of where the start is."""
-    d = singularity(loops.cycle(p)[0])
-    side, least = np.sign(d[0]), MARGIN * np.abs(d).min()
-    joints, h = p.shape[-1], 1e-6
+def _away(loops, singularity, least: float, p, unit: float, paced: bool) -> dict:
+    """On this side of the singular shapes, and no nearer."""
+    side, joints, h = np.sign(singularity(loops.cycle(p)[0])[0]), p.shape[-1], 1e-6
 
     def slack(x):
         shapes = loops.cycle(np.reshape((x[:-1] if paced else x) * unit, p.shape))[0]

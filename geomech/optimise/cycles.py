@@ -50,6 +50,8 @@ class Phases:
         spans = 2 * steps[:, None]
         self.count += 1
         xi = self.velocity(*every)
+        if not np.isfinite(xi).all():
+            raise RuntimeError("a loop that has no velocity somewhere")
         net, by_xi = slopes(xi[0])
         swing_by = _first_of_turning(len(alpha))
         dxi = (xi[1 : 2 * d + 1] - xi[2 * d + 1 :]) / spans[..., None]  # (2 d, N, 3)

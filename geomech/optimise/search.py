@@ -29,6 +29,9 @@ FINISHED = 2  # answers of the table that the direct tier goes on from
 TURNED = 0.02  # rad: what 128 phases leave of a net turn
 AS_MUCH = 1e-3  # of the value
 STRAIGHTENED = 4  # steps of Newton, at most
+MARGIN = 0.5  # of the start's distance from singular shapes, which all loops keep
+NEARLY = 0.95  # of it
+SMALLER = 0.7 ** np.arange(12)
 ENOUGH = 64  # harmonics that any start is told in
 
 
@@ -56,7 +59,7 @@ class _Search:
 
     def __init__(self, request: Request, progress: Callable | None):
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
-        self.done = 0
+        self.done, self.away = 0, 0.0
         climbs = request.starts + min(FINISHED, request.starts) if request.looks_up else request.starts
         self.expected = climbs * TRIES * (RUNS if request.whole else FINISH)
 
@@ -65,9 +68,15 @@ class _Search:
         own = r.loops.of(r.scene.gait)
         start = self._told(self._start(own))
         turn = abs(float(start.displacement[2]))
-        found = self._climbed(r.loops.starts(own, r.starts), turn)
+        first, *others = r.loops.starts(own, r.starts)
+        if r.system.singularity is not None:
+            first = self._clear(first, first)
+            self.away = MARGIN * np.abs(self._singularity(first)).min()
+        found = self._climbed([first, *(self._clear(p, first) for p in others)], turn)
         best, answers, p = start, [], None
         for q, times in found:
+            if self._meets(q, NEARLY):
+                continue
             told, q = self._forwards(self._told(self._turned_to(q)), q)
             straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED + told.heading
             answers.append((told.value, times))
@@ -75,7 +84,7 @@ class _Search:
                 best, p = told, q
         if p is None:
             best, p = dataclasses.replace(start, gait=self._as_series(start.gait)), r.loops.fitted(own)
-        active = [*r.loops.active(p), *best.limits]
+        active = [*r.loops.active(p), *["singular shapes"] * self._meets(p, 1 / NEARLY), *best.limits]
         best = dataclasses.replace(best, gait=self._timed(best))
         return Optimum(
             r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), self.count,
@@ -97,10 +106,31 @@ class _Search:
         ]
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
 
+    def _clear(self, p: np.ndarray, first: np.ndarray) -> np.ndarray:
+        """The loop; where it meets singular shapes, one of its form about the centre of the first, as large as may be."""
+        if not self._meets(p):
+            return p
+        smaller = (np.concatenate([first[:1], size * p[1:]]) for size in SMALLER)
+        return next((q for q in smaller if not self._meets(q)), first)
+
+    def _singularity(self, p: np.ndarray) -> np.ndarray:
+        return self.r.system.singularity(series.waves(series.DENSE, self.r.loops.harmonics) @ p)
+
+    def _meets(self, p: np.ndarray, share: float = 1.0) -> bool:
+        """Whether the loop meets singular shapes, or comes nearer to them than a share of what all keep."""
+        if self.r.system.singularity is None:
+            return False
+        d = self._singularity(p)
+        return bool(np.ptp(np.sign(d)) > 0 or np.abs(d).min() < share * self.away)
+
     def _worth(self, tier, p, turn: float) -> float:
         """Value of a loop as the search sees it, none if it turns too much."""
-        b = tier(p)
-        self.count += 1
+        try:
+            b = tier(p)
+        except RuntimeError:  # it cannot be run
+            return -np.inf
+        finally:
+            self.count += 1
         if self.r.aim.straight and abs(b.net[0][2]) > turn + TURNED:
             return -np.inf
         power = b.power[0] if b.power else None
@@ -112,7 +142,7 @@ class _Search:
         before = cycles.count
         p = climb(
             cycles, self.r.aim, p, turn=turn, most=most, tolerance=tolerance,
-            singularity=self.r.system.singularity, told=self._tell,
+            singularity=self.r.system.singularity, away=self.away, told=self._tell,
         )  # fmt: skip
         self.count += cycles.count - before
         return self._straightened(cycles, self.r.loops.fitted(p), turn)
@@ -204,7 +234,7 @@ class _Search:
 
     def _timed(self, told: Told) -> Gait:
         gait = told.gait
-        frequency = 1 / (2 * np.pi * told.time) if self.r.aim.timed else self.r.scene.gait.frequency
+        frequency = 1 / (2 * np.pi * told.time) if self.r.aim.timed and told.time else self.r.scene.gait.frequency
         return dataclasses.replace(gait, frequency=frequency)
 
     def _as_series(self, gait: Gait) -> Gait:
@@ -235,9 +265,9 @@ class _Search:
         length = b.length and b.length[0]
         if aim.name == "efficiency":
             coarse = 2 * np.pi * (np.maximum(full.work.power[::2] / system.length, 0.0) ** (1 / degree)).mean()
-            error = (error + value * abs(length - coarse)) / length
+            error = (error + value * abs(length - coarse)) / (length or 1.0)
         if aim.timed:
-            error = error / (2 * np.pi * period)
+            error = error / (2 * np.pi * (period or 1.0))
         work = 2 * np.pi * b.power[0] if b.power else None
         return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
 
