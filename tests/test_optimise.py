@@ -333,7 +333,11 @@ def test_singular_shapes_are_kept_away_from():
         ("sandfish-heavy", {"aim": "speed"}, "no speed with"),
         ("sandfish-loose", {"harmonics": 3}, "amplitude and waves are sought"),
         ("sandfish-loose", {"within": 1.0}, "amplitude and waves are sought"),
-        ("sandfish-loose", {"aim": "speed"}, "say --power"),
+        ("sandfish-loose", {"aim": "speed", "rate": 1.0}, "say --power"),
+        ("three-link-floating", {}, "goes nowhere in its frame 'mean'"),
+        ("three-link-ideal-fluid", {"aim": "speed", "power": 1.0}, "has none: say --rate"),
+        ("three-link-viscous", {"within": [1.0]}, "one for each of 2 joints"),
+        ("three-link-viscous", {"within": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),
         ("sandfish-loose", {"aim": "turning"}, "does not turn"),
     ],
 )
@@ -347,7 +351,7 @@ def test_a_cycle_without_slopes_is_that_with():
     system, (loops, p) = Swimmer(FLUID, ODD), some_loop()
     run = system.run(*loops.cycle(p), True)
     b = Phases(loops, system.velocity, lambda *a: system.work(*a).power, 2.0)(p)
-    net, swing, length, power, _ = brought(run, 2.0)
+    net, swing, length, power, _ = brought(run, run.work.power, 2.0)
     assert (swing, length, power) == pytest.approx((b.swing[0], b.length[0], b.power[0]))
     assert net == pytest.approx(b.net[0])
 

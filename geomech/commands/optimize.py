@@ -10,7 +10,7 @@ import typer
 
 from geomech import terminal
 from geomech.commands.asked import allow, loaded
-from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, an_angle, check_outputs
+from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, check_outputs, joint_limits
 from geomech.errors import SceneError
 from geomech.files import whole_file
 
@@ -21,14 +21,15 @@ def optimize(
     direction: Annotated[Optional[str], typer.Option(help="x or y: displacement along that axis of the body")] = None,
     harmonics: Annotated[Optional[int], typer.Option(help="of the Fourier series; 5 if left out")] = None,
     within: Annotated[
-        Optional[float],
-        typer.Option(metavar="EXTENT", help="of every joint, in rad or as 120deg; the field's if left out", parser=an_angle),
+        Optional[str],
+        typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, =-0.5:2, or 1,2 for each; else the field's"),
     ] = None,
     starts: Annotated[int, typer.Option(metavar="N", help="loops to begin with; the first is the scene's")] = 1,
     rate: Annotated[Optional[float], typer.Option(help="rad/s that no joint exceeds, for speed")] = None,
     power: Annotated[Optional[float], typer.Option(help="mean, body's axial drag x BL/s, for speed")] = None,
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="BEST.toml", help="scene to write")] = None,
     plot: PlotOption = None,
+    stretch: Annotated[bool, typer.Option("--stretch", help="draw it where equal lengths cost the same, too")] = False,
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):  # fmt: skip
@@ -37,16 +38,30 @@ def optimize(
     from geomech.output import optima, plots
 
     scene = loaded(name)
-    request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
+    request = checked(scene, aim, direction, harmonics, joint_limits(within, scene), starts, rate, power)
     if out and out.suffix != ".toml":
         raise SceneError(f"cannot write {out}: end the name of a scene in .toml")
+    if stretch:
+        refuse_stretch(scene, plot)
     check_outputs(scene, out, plot)
     allow(scene, request.cost(), yes)
     with terminal.progress(f"{aim} of {scene.name}") as bar:
         found = search(request, bar)
     if plot:
-        plots.save(plots.optimum_figure(found), plot)
+        plots.save(plots.optimum_figure(found, stretch), plot)
     if out:
         with whole_file(out) as part:
             part.write_text(optima.scene_toml(found), encoding="utf-8")
     print(json.dumps(found.numbers()) if as_json else optima.text(found))
+
+
+def refuse_stretch(scene, plot: Path | None) -> None:
+    """SceneError where there is no picture to stretch, or no metric to stretch it by."""
+    from geomech.study.effort import why_none
+
+    if plot is None:
+        raise SceneError("--stretch is a way to draw: say --plot FILE, too")
+    if scene.system.joints != 2:
+        raise SceneError(f"{scene.name}: --stretch takes two joints, this one has {scene.system.joints}: drop it")
+    if reason := why_none(scene.system):
+        raise SceneError(f"{scene.name}: {reason}: drop --stretch")

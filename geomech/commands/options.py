@@ -161,6 +161,21 @@ def an_angle(text: str | float) -> float:
         raise typer.BadParameter(f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg") from None
 
 
+def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] | None:
+    """--within: 2.5 or 120deg for all joints, -0.5:2 from low to high, or some of these, 1,-0.5:2, one for each."""
+    if text is None:
+        return None
+    pairs = []
+    for part in text.split(","):
+        ends = [number for end in part.split(":") for number in numbers("--within", end, 1, None)]
+        if len(ends) > 2:
+            raise SceneError(f"--within: {part!r} is no limit: give one such as 2.5, 120deg or -0.5:2")
+        pairs.append((-ends[0], ends[0]) if len(ends) == 1 else tuple(ends))
+    if len(pairs) == 1:
+        return pairs[0][1] if ":" not in text else pairs * scene.system.joints
+    return pairs
+
+
 ExtentOption = Annotated[
     Optional[float],
     typer.Option("--extent", metavar="ANGLE", help="half width of the field in rad, or as 120deg", parser=an_angle),

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from geomech.optimise.aims import Aim
+from geomech.optimise.stroke import Stroke
 
 EVEN = 1e-3  # of the value: what uneven pacing costs; it decides among pacings that bring the same
 STRAIGHT = 1e-3  # rad: below it a gait does not turn
 STRIDE = 0.5  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
 TOGETHER = 50
-FLAT, BACK = 0.05, 1e-6  # of the first harmonic: how thin a plane, and how far back a stroke, is none
 TRIES = 2.5  # cycles that a step takes, at most in the mean
 KEPT = 5e-3  # rad, and of a limit: how far beyond a rule a loop may be that counts as keeping it
 SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after a loop that cannot be run, or no way up; and at the end
@@ -20,10 +20,10 @@ SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after a loop that cannot be run
 
 def climb(
     cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, most: int = 100, tolerance: float = 1e-6,
-    singularity: Callable | None = None, away: float = 0.0, told: Callable = lambda: None,
+    stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, told: Callable = lambda: None,
 ) -> np.ndarray:  # fmt: skip
     """The loop that ``aim`` leads to from ``p``; cycles: `Phases` or `Runs`. turn (rad): of a cycle, at most, where the aim is
-    to get along. singularity: of shapes, nowhere nearer to 0 than ``away``."""
+    to get along. stroke: the loop is a `Stroke`, and stays one. singularity: of shapes, nowhere nearer to 0 than ``away``."""
     from scipy.optimize import minimize
 
     seen = _Seen(cycles, p.shape, told, TRIES * most)
@@ -56,14 +56,19 @@ def climb(
     theta = seen(p.ravel() / unit).net[1][2]
     if aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else, as in sines, none of them turns
         rules += _straight(seen, turn, unit, paced)
-    if (once := _once_round(loops, p, unit, paced)) is not None:
-        rules.append(once)
+    if stroke:
+        once = Stroke(loops, p)
+        rules.append(_once(once, unit, paced, shape))
     if singularity is not None:
         rules.append(_away(loops, singularity, away, p, unit, paced))
     x, left, stride = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit, most, STRIDE
     while left > 0 and stride > SHORTEST * STRIDE:
         room = np.where(np.arange(len(x)) < p.size, stride, np.inf)
-        begun, way, found = x, _Way(down, rules), None
+        begun, way, found = (
+            x,
+            _Way(down, rules, lambda x: not stroke or once.winding(_loop(x, unit, paced, shape)) == 1),
+            None,
+        )
         try:
             way(x)
             found = minimize(
@@ -72,7 +77,7 @@ def climb(
             )  # fmt: skip
         except _Enough:
             left = 0
-        except RuntimeError:  # of a loop on the way
+        except RuntimeError:  # of a loop on the way that cannot be run, or is another stroke
             stride *= SHORTER
         x = x if way.best is None else way.best
         left -= max(way.steps, 1)
@@ -83,14 +88,21 @@ def climb(
     return np.reshape(split(x)[0] * unit, shape)
 
 
+def _loop(x: np.ndarray, unit: float, paced: bool, shape) -> np.ndarray:
+    """p from what the search moves."""
+    return np.reshape((x[:-1] if paced else x) * unit, shape)
+
+
 class _Way:
     """Where a search has been: the best place that keeps the rules, or the last where none did."""
 
-    def __init__(self, down: Callable, rules: list[dict]):
-        self.down, self.rules, self.best, self.least, self.steps = down, rules, None, np.inf, -1
+    def __init__(self, down: Callable, rules: list[dict], same: Callable):
+        self.down, self.rules, self.same, self.best, self.least, self.steps = down, rules, same, None, np.inf, -1
 
     def __call__(self, x: np.ndarray) -> None:
         self.steps += 1
+        if not self.same(x):
+            raise RuntimeError("a loop of another number of strokes")
         value = self.down(x)[0] if np.isfinite(x).all() and all(_kept(rule, x) for rule in self.rules) else np.inf
         if value < self.least or (self.least == np.inf and np.isfinite(x).all()):
             self.best, self.least = np.array(x), value
@@ -169,38 +181,14 @@ def _straight(seen, turn: float, unit: float, paced: bool) -> list[dict]:
     ]
 
 
-def _once_round(loops, p, unit: float, paced: bool) -> dict | None:
-    """Never back about the centre, in the plane of the first harmonic: one stroke a cycle. None where ``p`` itself goes back,
-    or has no such plane: else p's sense and plane are kept."""
-    if p.ndim != 2 or p.shape[1] < 2:
-        return None
-    plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
-    if size[1] < FLAT * size[0]:
-        return None
-    at, rates = loops.basis[::2].copy(), loops.rates[::2]
-    at[:, 0] = 0.0  # about the centre
-
-    def going(x):
-        q = np.reshape((x[:-1] if paced else x) * unit, p.shape) @ plane
-        return at @ q, rates @ q
-
-    def swept(x):
-        (u, v), (du, dv) = (y.T for y in going(x))
-        return (u * dv - v * du) / (size[0] * size[1])
-
-    side = np.sign(swept(np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit).mean())
+def _once(stroke: Stroke, unit: float, paced: bool, shape) -> dict:
+    """Never back."""
 
     def slopes(x):
-        (u, v), (du, dv) = (y.T for y in going(x))
-        by_u, by_v = dv[:, None] * at - v[:, None] * rates, u[:, None] * rates - du[:, None] * at
-        rows = by_u[..., None] * plane[:, 0] + by_v[..., None] * plane[:, 1]  # (N, 2 K + 1, joints)
-        rows = side * unit * rows.reshape(len(at), -1) / (size[0] * size[1])
+        rows = unit * stroke.slopes(_loop(x, unit, paced, shape)).reshape(-1, int(np.prod(shape)))
         return np.column_stack([rows, np.zeros(len(rows))]) if paced else rows
 
-    start = np.append(p.ravel() / unit, 1.0) if paced else p.ravel() / unit
-    if (side * swept(start)).min() < -BACK:
-        return None
-    return {"type": "ineq", "fun": lambda x: side * swept(x), "jac": slopes}
+    return {"type": "ineq", "fun": lambda x: stroke.swept(_loop(x, unit, paced, shape)), "jac": slopes}
 
 
 def _away(loops, singularity, least: float, p, unit: float, paced: bool) -> dict:
@@ -208,11 +196,11 @@ def _away(loops, singularity, least: float, p, unit: float, paced: bool) -> dict
     side, joints, h = np.sign(singularity(loops.cycle(p)[0])[0]), p.shape[-1], 1e-6
 
     def slack(x):
-        shapes = loops.cycle(np.reshape((x[:-1] if paced else x) * unit, p.shape))[0]
+        shapes = loops.cycle(_loop(x, unit, paced, p.shape))[0]
         return side * singularity(shapes) - least
 
     def slopes(x):
-        shapes = loops.cycle(np.reshape((x[:-1] if paced else x) * unit, p.shape))[0]
+        shapes = loops.cycle(_loop(x, unit, paced, p.shape))[0]
         by = [singularity(shapes + h * e) - singularity(shapes - h * e) for e in np.eye(joints)]
         rows = side * unit * np.einsum("nk,nj->nkj", loops.basis, np.stack(by, -1) / (2 * h)).reshape(len(shapes), -1)
         return np.column_stack([rows, np.zeros(len(rows))]) if paced else rows

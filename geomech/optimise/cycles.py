@@ -77,17 +77,22 @@ class Phases:
 
 
 class Runs:
-    """Cycles of gaits run as a whole, by `System.run`; loops: whatever has ``cycle(p)`` for rows of p."""
+    """Cycles of gaits run as a whole, by `System.run`; loops: whatever has ``cycle(p)`` for rows of p. length: of the body."""
 
-    def __init__(self, loops, run: Callable, work: bool = False, degree: float = 1.0, step: float = STEP_OF_RUNS):
-        self.loops, self.run, self.work, self.degree, self.step = loops, run, work, degree, step
+    def __init__(
+        self, loops, run: Callable, work: bool = False, degree: float = 1.0, length: float = 1.0,
+        step: float = STEP_OF_RUNS,
+    ):  # fmt: skip
+        self.loops, self.run, self.work, self.degree, self.length, self.step = loops, run, work, degree, length, step
         self.count = 0
 
     def __call__(self, p: np.ndarray) -> Brought:
         moves = self.step * self.loops.unit * np.eye(p.size).reshape(-1, *p.shape)
         every = np.concatenate([p[None], p + moves, p - moves])
         self.count += 1
-        found = brought(self.run(*self.loops.cycle(every), self.work), self.degree)
+        done = self.run(*self.loops.cycle(every), self.work)
+        power = None if done.work is None else done.work.power / self.length
+        found = brought(done, power, self.degree)
         return Brought(*(None if x is None else self._with_slopes(x, p.shape) for x in found))
 
     def _with_slopes(self, x: np.ndarray, shape: tuple) -> tuple:
@@ -97,13 +102,14 @@ class Runs:
         return x[0], np.moveaxis(rise, 0, -1).reshape(*x.shape[1:], *shape)
 
 
-def brought(run, degree: float) -> tuple:
-    """The numbers of `Brought`, without slopes, of a `Cycle` of gaits (...,): pose, swing, length, power, 0."""
-    length = power = None
-    if run.work is not None:
-        P = np.maximum(run.work.power, 0.0)
-        length, power = 2 * np.pi * (P ** (1 / degree)).mean(-1), P.mean(-1)
-    return run.net, turning(run.xi)[..., 0], length, power, np.zeros(np.shape(run.net)[:-1])
+def brought(run, power, degree: float) -> tuple:
+    """The numbers of `Brought`, without slopes, of a `Cycle` of gaits (...,) that take ``power`` (..., N), or None: pose,
+    swing, length, power, 0."""
+    length = mean = None
+    if power is not None:
+        P = np.maximum(power, 0.0)
+        length, mean = 2 * np.pi * (P ** (1 / degree)).mean(-1), P.mean(-1)
+    return run.net, turning(run.xi)[..., 0], length, mean, np.zeros(np.shape(run.net)[:-1])
 
 
 def _first_of_turning(n: int) -> np.ndarray:

@@ -22,17 +22,33 @@ SAME = 0.02  # of its size: largest distance between two loops that are one
 
 @dataclass(frozen=True)
 class Loops:
-    """All loops of ``harmonics`` harmonics in ``joints`` shape variables that stay ``within`` (rad) of 0, seen at
-    ``phases``."""
+    """All loops of ``harmonics`` harmonics in ``joints`` shape variables, seen at ``phases``. within (rad): how near to 0 all
+    of these stay, or (lowest, highest) of each."""
 
     joints: int
     harmonics: int
-    within: float
+    within: float | tuple[tuple[float, float], ...]
     phases: int = 64
 
     @property
     def shape(self) -> tuple[int, int]:
         return 2 * self.harmonics + 1, self.joints
+
+    @cached_property
+    def box(self) -> np.ndarray:
+        """(2, joints): the lowest and the highest shapes."""
+        w = self.within
+        return np.array([[-w] * self.joints, [w] * self.joints] if np.ndim(w) == 0 else np.transpose(w), float)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """Of the limits, (joints,)."""
+        return self.box.mean(0)
+
+    @property
+    def half(self) -> np.ndarray:
+        """Of the room between the limits, (joints,)."""
+        return (self.box[1] - self.box[0]) / 2
 
     @cached_property
     def basis(self) -> np.ndarray:
@@ -50,7 +66,7 @@ class Loops:
     @property
     def unit(self) -> float:
         """Of p, so that steps are of the size of the room."""
-        return self.within / 2.5
+        return float(self.half.max()) / 2.5
 
     def cycle(self, p) -> tuple[np.ndarray, np.ndarray]:
         """(alpha, alphadot), (..., N, joints), of loops p (..., 2 K + 1, joints)."""
@@ -60,14 +76,16 @@ class Loops:
         """(A, b) with A p <= b for p as a row, at up to 256 phases of all shape variables together."""
         rows = self.basis[:: max(1, self.joints * self.phases // 256)]
         A = np.concatenate([np.kron(rows, unit) for unit in np.eye(self.joints)[:, None]])
-        return np.concatenate([A, -A]), np.full(2 * len(A), self.within * (1 - NARROWER))
+        sides = self.half * (1 - NARROWER) + [[1.0], [-1.0]] * self.middle
+        return np.concatenate([A, -A]), np.repeat(sides, len(rows), 1).ravel()
 
     def active(self, p) -> list[str]:
         """Limits that the loop touches."""
         found = []
-        for j, (low, high) in enumerate(zip(*self.reach(p))):
-            found += [f"alpha_{j + 1} >= {-self.within:g}"] if low <= -self.within * (1 - TOUCHING) else []
-            found += [f"alpha_{j + 1} <= {self.within:g}"] if high >= self.within * (1 - TOUCHING) else []
+        (low, high), near, reach = self.box, TOUCHING * self.half, self.reach(p)
+        for j, (down, up) in enumerate(zip(reach[0] <= low + near, reach[1] >= high - near)):
+            found += [f"alpha_{j + 1} >= {low[j]:g}"] if down else []
+            found += [f"alpha_{j + 1} <= {high[j]:g}"] if up else []
         return found
 
     def gait(self, p) -> Fourier:
@@ -89,21 +107,21 @@ class Loops:
         p = np.array(np.reshape(p, self.shape))
         moving = waves(DENSE, self.harmonics)[:, 1:] @ p[1:]
         high, low = moving.max(0), moving.min(0)
-        limit = self.within * (1 - NARROWER / 2)
-        size = min(1.0, float((2 * limit / np.maximum(high - low, 1e-300)).min()))
+        room = self.half * (1 - NARROWER / 2)
+        size = min(1.0, float((2 * room / np.maximum(high - low, 1e-300)).min()))
         p[1:] *= size
-        p[0] = np.clip(p[0], -limit - size * low, limit - size * high)
+        p[0] = np.clip(p[0], self.middle - room - size * low, self.middle + room - size * high)
         return p
 
     def _sizeable(self, p) -> np.ndarray:
         """p, made larger where it is so small that slopes are too; a travelling wave where it does not move."""
         p = np.array(p)
-        size = np.abs(waves(DENSE, self.harmonics)[:, 1:] @ p[1:]).max()
+        size, room = np.abs(waves(DENSE, self.harmonics)[:, 1:] @ p[1:]).max(), self.half.max()
         if size == 0:
             lag = np.pi / 2 * np.arange(self.joints)
             p[1], p[2], size = np.cos(lag), np.sin(lag), 1.0
-        if size < SMALL * self.within:
-            p[1:] *= SIZEABLE * self.within / size
+        if size < SMALL * room:
+            p[1:] *= SIZEABLE * room / size
         return p
 
     def reach(self, p) -> tuple[np.ndarray, np.ndarray]:
@@ -118,12 +136,12 @@ class Loops:
         for k in range(count - 1):
             p = np.zeros(self.shape)
             lag = np.arange(self.joints) * (lags[k] if k < len(lags) else rng.uniform(-np.pi, np.pi))
-            size = self.within * (0.7 if k == 0 else rng.uniform(0.4, 0.9))
-            p[1], p[2] = size * np.cos(lag), size * np.sin(lag)
+            size = self.half * (0.7 if k == 0 else rng.uniform(0.4, 0.9))
+            p[0], p[1], p[2] = self.middle, size * np.cos(lag), size * np.sin(lag)
             if k > 0:
                 falling = 1 / np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None] ** 2
                 p[1:] += 0.3 * size * falling * rng.normal(size=(2 * self.harmonics, self.joints))
-                p[0] += 0.1 * self.within * rng.normal(size=self.joints)
+                p[0] += 0.1 * self.half * rng.normal(size=self.joints)
             found.append(self.fitted(p))
         return found
 

@@ -17,7 +17,8 @@ from geomech.scene.write import gait_table
 class Told:
     """A gait by the direct tier. value, error: of the aim. heading: error of the net turn, rad. displacement: (3,), in the
     frame at the start, the system's unit. length: of the path, work: of a cycle at a rad of phase per unit of time, in body
-    drag x body length, None where there is no power. time: of a rad of phase. limits: of the time."""
+    drag x body length; None where nothing tells these, and for the work of a metric that is not one of drag. time: of a rad
+    of phase. limits: of the time."""
 
     gait: Gait
     value: float
@@ -54,8 +55,8 @@ class Optimum:
         scene = scene.changed(gait=gait)
         if isinstance(gait, Sine) or scene.system.stored("connection"):
             return scene
-        room = np.abs(gait.centre) + np.abs(gait.unit(np.linspace(0, 2 * np.pi, 721))).max()
-        return scene.with_numerics(extent=max(scene.numerics.extent, float(room.max()) * 1.0001))
+        reach = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
+        return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(reach)))
 
     def numbers(self) -> dict:
         """As JSON has them."""

@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from geomech.connection import evaluate
-from geomech.errors import SceneError, check_angle, named, number
+from geomech.errors import SceneError, named, number
 from geomech.gaits import Sine
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
+from geomech.optimise.limits import limits
 from geomech.optimise.loops import Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
@@ -24,6 +25,7 @@ PHASES = 128  # of a cycle in the search
 ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
 NEAR, FINISH, RUNS = 100, 16, 12  # steps of the search in tables, by the direct tier, and of gaits run as a whole
 CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
+STILL = 1e-12  # of the velocity: what is rounding
 DEGREES = 1e-3  # by which the degree of the power may scatter
 
 
@@ -53,15 +55,30 @@ class Request:
 
     @cached_property
     def power(self) -> Callable | None:
-        """power(alpha, alphadot, xi) in body drag x body length / time, None if the system has none."""
-        work, length = getattr(self.system, "work", None), self.system.length
+        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square of its
+        own metric for a system that has one; None where nothing tells what moving costs."""
+        system, length = self.system, self.system.length
+        if self.stored:
+            told, degree, box = system.stored("metric"), system.power_degree or 2.0, self.loops.box
+            return told and (lambda alpha, alphadot, xi: told.norm(np.clip(alpha, *box), alphadot) ** degree)
+        if system.cost is not None:
+            return lambda alpha, alphadot, xi: system.cost(alpha, alphadot)
+        work = getattr(system, "work", None)
         return work and (lambda alpha, alphadot, xi: work(alpha, alphadot, xi).power / length)
 
     @cached_property
     def degree(self) -> float:
         """Of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; ValueError if there is no such."""
+        aim, system = self.aim, self.system
         if self.power is None:
-            raise ValueError(f"--for {self.aim.name} asks for power, which the {self.system.kind} does not tell")
+            instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
+            raise ValueError(f"--for {aim.name} asks for power, which {told_by(system)} does not tell: {instead}")
+        if system.cost is not None:
+            if aim.power is not None:
+                raise ValueError(f"--power is that of drag, and the {system.kind} has none: say --rate")
+            return 2.0
+        if self.stored:
+            return system.power_degree
         if self.system.steps:
             return 1.0 if self.system.kinks else 2.0
         rng = np.random.default_rng(0)
@@ -99,11 +116,11 @@ class Request:
     @property
     def extent(self) -> float:
         """Of the field that is looked up."""
-        return self.loops.within * ROOM
+        return float(np.abs(self.loops.box).max()) * ROOM
 
 
 def checked(
-    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: float | None = None,
+    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within=None,
     starts: int = 1, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
     """The request, or SceneError, one line, for one that makes no sense."""
@@ -116,7 +133,9 @@ def checked(
             if system.lacks & Premise.RATE_INDEPENDENT:
                 system.refuse("speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
-                wanted = Aim(aim, towards, system.length, rate=_own_rate(scene))
+                waves = isinstance(scene.gait, Sine)
+                own = {"power": _own_power(scene)} if waves else {"rate": _own_rate(scene)}
+                wanted = Aim(aim, towards, system.length, **own)
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not wanted.straight:
             raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
@@ -125,7 +144,23 @@ def checked(
         request = Request(scene, wanted, loops, int(starts))
         if wanted.costs:
             request.degree  # noqa: B018 - refuses what has none
+        if wanted.straight and _stays(system):
+            raise SceneError(f"the {system.kind} goes nowhere in its frame {system.frame!r}: optimize for turning")
         return request
+
+
+def told_by(system: System) -> str:
+    """A system, or its file."""
+    return "the table's file" if system.stored("connection") else f"the {system.kind}"
+
+
+def _stays(system: System) -> bool:
+    """Whether no change of shape moves the frame, at a few shapes that stand for all."""
+    if system.steps or not system.linear or system.stored("connection"):
+        return False
+    rng = np.random.default_rng(0)
+    xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
+    return bool(np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi)))
 
 
 def _own_rate(scene: Scene) -> float:
@@ -135,7 +170,15 @@ def _own_rate(scene: Scene) -> float:
     return float(2 * np.pi * scene.frequency * np.abs(scene.gait.cycle(PHASES)[1]).max())
 
 
-def _loops(scene: Scene, harmonics: int | None, within: float | None) -> Loops | Undulations:
+def _own_power(scene: Scene) -> float:
+    """The mean power of the scene's gait at its frequency, or at 1 rad of phase a unit of time; refused where a speed is."""
+    gait, system = scene.gait, scene.system
+    done = system.run(*gait.cycle(PHASES), True).work
+    per_second = 1.0 if scene.frequency is None else 2 * np.pi * scene.frequency
+    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.power_degree)
+
+
+def _loops(scene: Scene, harmonics: int | None, within) -> Loops | Undulations:
     gait, system, n = scene.gait, scene.system, scene.numerics
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("within", within)):
@@ -146,23 +189,8 @@ def _loops(scene: Scene, harmonics: int | None, within: float | None) -> Loops |
         raise SceneError(f"a loop of {system.joints} joints is too much to search: at most {JOINTS}, or a sine gait")
     number("--harmonics", 5 if harmonics is None else harmonics, 1, 32, whole=True)
     harmonics = 5 if harmonics is None else int(harmonics)
-    edge = _edge(system)
-    if within is None:
-        within = min(max(n.extent, float(np.abs(gait.cycle(PHASES)[0]).max())), edge)
-    number("--within", within, 1e-6, 100)
-    if system.joint_angles:
-        check_angle("a limit of joints", within)
-    if within > edge * (1 + 1e-9):
-        raise SceneError(f"--within {within:g} lies outside the field that the scene has: at most {edge:g}")
-    return Loops(system.joints, harmonics, min(float(within), edge), max(PHASES, 16 * harmonics))
+    return Loops(system.joints, harmonics, limits(scene, within, PHASES), max(PHASES, 16 * harmonics))
 
 
 def _inner(system: System) -> System:
     return system.inner if getattr(system, "carried", False) else system
-
-
-def _edge(system) -> float:
-    """Half width of the field of a table, or of a frame; infinity where there is neither."""
-    own = system.stored("connection")
-    axes = own.axes if own else system.axes if getattr(system, "carried", False) else ()
-    return min((min(-a[0], a[-1]) for a in axes), default=float("inf"))

@@ -16,6 +16,7 @@ from geomech.gaits import Gait
 from geomech.optimise import loops as series
 from geomech.optimise.climb import TRIES, climb
 from geomech.optimise.cycles import Brought, Phases, Runs, brought
+from geomech.optimise.keeping import NEARLY, Keeping
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
 from geomech.optimise.request import FINISH, NEAR, RUNS, Request, checked
@@ -29,20 +30,19 @@ FINISHED = 2  # answers of the table that the direct tier goes on from
 TURNED = 0.02  # rad: what 128 phases leave of a net turn
 AS_MUCH = 1e-3  # of the value
 STRAIGHTENED = 4  # steps of Newton, at most
-MARGIN = 0.5  # of the start's distance from singular shapes, which all loops keep
-NEARLY = 0.95  # of it
-SMALLER = 0.7 ** np.arange(12)
+LARGER = 0.6  # of the room: how far the scene's own gait goes where a table is asked a second time
 ENOUGH = 64  # harmonics that any start is told in
 
 
 def optimise(
     scene: Scene, aim: str = "displacement", direction: str | None = None, harmonics: int | None = None,
-    within: float | None = None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
+    within=None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
     """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
-    ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, searched for from the scene's own
-    gait and ``starts`` - 1 others. A sine is sought among sines. SceneError for what makes no sense."""
+    ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest) for each,
+    searched for from the scene's own gait and ``starts`` - 1 others. A sine is sought among sines. SceneError for what makes
+    no sense."""
     request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
     return search(request, progress)
 
@@ -59,7 +59,7 @@ class _Search:
 
     def __init__(self, request: Request, progress: Callable | None):
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
-        self.done, self.away = 0, 0.0
+        self.done = 0
         climbs = request.starts + min(FINISHED, request.starts) if request.looks_up else request.starts
         self.expected = climbs * TRIES * (RUNS if request.whole else FINISH)
 
@@ -69,13 +69,11 @@ class _Search:
         start = self._told(self._start(own))
         turn = abs(float(start.displacement[2]))
         first, *others = r.loops.starts(own, r.starts)
-        if r.system.singularity is not None:
-            first = self._clear(first, first)
-            self.away = MARGIN * np.abs(self._singularity(first)).min()
-        found = self._climbed([first, *(self._clear(p, first) for p in others)], turn)
+        self.keeping = Keeping(r.loops, r.system.singularity, first)
+        found = self._climbed([self.keeping.first, *map(self.keeping.start, others)], turn)
         best, answers, p = start, [], None
         for q, times in found:
-            if self._meets(q, NEARLY):
+            if self.keeping.meets(q, NEARLY):
                 continue
             told, q = self._forwards(self._told(self._turned_to(q)), q)
             straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED + told.heading
@@ -84,7 +82,7 @@ class _Search:
                 best, p = told, q
         if p is None:
             best, p = dataclasses.replace(start, gait=self._as_series(start.gait)), r.loops.fitted(own)
-        active = [*r.loops.active(p), *["singular shapes"] * self._meets(p, 1 / NEARLY), *best.limits]
+        active = [*r.loops.active(p), *["singular shapes"] * self.keeping.meets(p, 1 / NEARLY), *best.limits]
         best = dataclasses.replace(best, gait=self._timed(best))
         return Optimum(
             r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), self.count,
@@ -98,7 +96,8 @@ class _Search:
             most = RUNS if r.whole else NEAR
             return self._different([self._up(tier, p, turn, most, NEAR_TOLERANCE) for p in starts])
         table = self._table()
-        near = [self._up(table, p, turn, NEAR, NEAR_TOLERANCE) for p in starts]
+        near = [self._up(table, p, turn, NEAR, NEAR_TOLERANCE) for p in [*starts, self._larger(starts[0])]]
+        near[0] = max(near[0], near.pop(), key=lambda p: self._worth(table, p, turn))
         ranked = sorted(self._different(near), key=lambda found: -self._worth(tier, found[0], turn))[:FINISHED]
         finished = [
             max((self._up(tier, p, turn, FINISH, TOLERANCE), p), key=lambda q: self._worth(tier, q, turn))
@@ -106,22 +105,12 @@ class _Search:
         ]
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
 
-    def _clear(self, p: np.ndarray, first: np.ndarray) -> np.ndarray:
-        """The loop; where it meets singular shapes, one of its form about the centre of the first, as large as may be."""
-        if not self._meets(p):
-            return p
-        smaller = (np.concatenate([first[:1], size * p[1:]]) for size in SMALLER)
-        return next((q for q in smaller if not self._meets(q)), first)
-
-    def _singularity(self, p: np.ndarray) -> np.ndarray:
-        return self.r.system.singularity(series.waves(series.DENSE, self.r.loops.harmonics) @ p)
-
-    def _meets(self, p: np.ndarray, share: float = 1.0) -> bool:
-        """Whether the loop meets singular shapes, or comes nearer to them than a share of what all keep."""
-        if self.r.system.singularity is None:
-            return False
-        d = self._singularity(p)
-        return bool(np.ptp(np.sign(d)) > 0 or np.abs(d).min() < share * self.away)
+    def _larger(self, p: np.ndarray) -> np.ndarray:
+        """The loop with another size: a small one may lead to a poor answer."""
+        size = np.abs(self.r.loops.cycle(p)[0] - p[0]).max()
+        return self.keeping.start(
+            self.r.loops.fitted(np.concatenate([p[:1], p[1:] * LARGER * self.r.loops.half.max() / size]))
+        )
 
     def _worth(self, tier, p, turn: float) -> float:
         """Value of a loop as the search sees it, none if it turns too much."""
@@ -141,8 +130,8 @@ class _Search:
     def _up(self, cycles, p, turn: float, most: int, tolerance: float) -> np.ndarray:
         before = cycles.count
         p = climb(
-            cycles, self.r.aim, p, turn=turn, most=most, tolerance=tolerance,
-            singularity=self.r.system.singularity, away=self.away, told=self._tell,
+            cycles, self.r.aim, p, turn=turn, most=most, tolerance=tolerance, stroke=self.keeping.stroke,
+            singularity=self.r.system.singularity, away=self.keeping.away, told=self._tell,
         )  # fmt: skip
         self.count += cycles.count - before
         return self._straightened(cycles, self.r.loops.fitted(p), turn)
@@ -184,8 +173,8 @@ class _Search:
         r = self.r
         degree = r.degree if r.aim.costs else 1.0
         if r.whole:
-            return Runs(r.loops, r.system.run, r.aim.costs, degree)
-        velocity = _inside(r.system.velocity, r.loops.within) if r.stored else r.system.velocity
+            return Runs(r.loops, r.system.run, r.aim.costs, degree, r.system.length)
+        velocity = _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
         return Phases(r.loops, velocity, r.power if r.aim.costs else None, degree)
 
     def _table(self) -> Phases:
@@ -195,17 +184,19 @@ class _Search:
         table = study.table("harmonic")
         if r.aim.costs:
             run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
-            norm = _inside(metric.fit_norm(run, table.axes).norm, r.extent)
+            norm = _inside(metric.fit_norm(run, table.axes).norm, (-r.extent, r.extent))
             power = lambda alpha, alphadot, xi: norm(alpha, alphadot) ** r.degree
-        return Phases(r.loops, _inside(table.velocity, r.extent), power, r.degree if r.aim.costs else 1.0)
+        return Phases(r.loops, _inside(table.velocity, (-r.extent, r.extent)), power, r.degree if r.aim.costs else 1.0)
 
     def _start(self, own) -> Gait:
         """The scene's gait; where that goes beyond the limits, drawn together so as to keep them."""
         r, gait = self.r, self.r.scene.gait
-        if isinstance(r.loops, Loops) and np.abs(gait.cycle(series.DENSE)[0]).max() > r.loops.within * (1 + 1e-3):
-            note(
-                f"{r.scene.name}: its gait reaches beyond {r.loops.within:g} rad: the search starts from a smaller one"
-            )
+        if not isinstance(r.loops, Loops):
+            return gait
+        off = np.abs(gait.cycle(series.DENSE)[0] - r.loops.middle).max(0)
+        if (off > r.loops.half * (1 + 1e-3)).any():
+            limit = f"{r.loops.within:g} rad" if np.ndim(r.loops.within) == 0 else "its limits"
+            note(f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one")
             return r.loops.gait(r.loops.fitted(own))
         return gait
 
@@ -256,7 +247,8 @@ class _Search:
         alpha, alphadot = gait.cycle(phases)
         degree = r.degree if r.power else 1.0
         full = system.run(alpha, alphadot, r.power is not None)
-        b, coarse = self._brought(full, net, degree), None
+        P = self._power(full, alpha, alphadot)
+        b = self._brought(full, net, P, degree)
         period, limits = 1.0, []
         if aim.timed:
             period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
@@ -264,21 +256,27 @@ class _Search:
         error = errors[1] if aim.name == "turning" else errors[0]
         length = b.length and b.length[0]
         if aim.name == "efficiency":
-            coarse = 2 * np.pi * (np.maximum(full.work.power[::2] / system.length, 0.0) ** (1 / degree)).mean()
+            coarse = 2 * np.pi * (P[::2] ** (1 / degree)).mean()
             error = (error + value * abs(length - coarse)) / (length or 1.0)
         if aim.timed:
             error = error / (2 * np.pi * (period or 1.0))
-        work = 2 * np.pi * b.power[0] if b.power else None
+        work = 2 * np.pi * b.power[0] if b.power and system.cost is None else None
         return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
 
-    def _brought(self, run, net, degree: float) -> Brought:
-        """Numbers of a gait without slopes."""
+    def _power(self, run, alpha, alphadot) -> np.ndarray | None:
+        """(N,) of a gait that was run, body drag x body length / time; None where nothing tells it."""
+        r = self.r
         if run.work is not None:
-            run = run._replace(work=run.work._replace(power=run.work.power / self.r.system.length))
+            return np.maximum(run.work.power / r.system.length, 0.0)
+        return None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
+
+    @staticmethod
+    def _brought(run, net, power, degree: float) -> Brought:
+        """Numbers of a gait without slopes."""
         flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
-        return Brought(*map(flat, (net, *brought(run, degree)[1:])))
+        return Brought(*map(flat, (net, *brought(run, power, degree)[1:])))
 
 
-def _inside(look_up: Callable, extent: float) -> Callable:
+def _inside(look_up: Callable, box) -> Callable:
     """A look-up that takes shapes beyond its field for those at its edge."""
-    return lambda alpha, alphadot: look_up(np.clip(alpha, -extent, extent), alphadot)
+    return lambda alpha, alphadot: look_up(np.clip(alpha, *box), alphadot)

@@ -6,6 +6,7 @@ import textwrap
 
 from geomech.optimise import Optimum
 from geomech.scene.write import toml
+from geomech.study.effort import METRIC
 
 
 def text(optimum: Optimum) -> str:
@@ -18,8 +19,10 @@ def text(optimum: Optimum) -> str:
         f"(the scene's gait: {optimum.start.value:.6g})",
         f"displacement per cycle: x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad",
     ]
-    if best.length is not None:
+    if best.work is not None:
         lines.append(f"path length {best.length:.6g}, work {best.work:.6g} (body's axial drag x body length)")
+    elif best.length is not None:
+        lines.append(f"path length {best.length:.6g} ({METRIC})")
     if aim.timed:
         limits = {
             "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",

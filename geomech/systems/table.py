@@ -6,6 +6,7 @@ alphadot as in the scene it came from, and A is its linear part; else xi = A alp
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,6 +74,14 @@ class Table(Plain):
     shape_labels = property(lambda self: tuple((name, "rad") for name in self.held.shapes))
     power_degree = property(lambda self: self.held.power_degree)
 
+    @property
+    def cost(self) -> Callable | None:
+        """As `Plain.cost`, where the file has a metric that is not one of drag."""
+        told = self.held.metric
+        if told is None or self.power_degree is not None:
+            return None
+        return lambda alpha, alphadot: told.norm(alpha, alphadot) ** 2
+
     def in_frame(self, frame: str) -> Table:
         raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
 
@@ -87,7 +96,7 @@ class Table(Plain):
 
     def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """As `Plain.driven`, where the file tells what moving costs."""
-        if self.held.metric is None:
+        if self.held.metric is None or self.power_degree is None:
             raise ValueError(f"no power with this table: {self.file} does not tell it; make it anew from its scene")
         return self.velocity(alpha, alphadot), self.held.metric.norm(alpha, alphadot) ** self.power_degree
 

@@ -100,11 +100,12 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
 
 
 def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:
-    """What a change of shape costs, and the degree of its power; (None, None) of a file that does not tell."""
-    if not {"metric", "norm"} & set(found) or "power_degree" not in told:
-        return None, None
+    """What a change of shape costs, and the degree of its power, None where it is a metric of another kind; (None, None) of
+    a file that does not tell."""
     power, names, joints = told.get("power_degree"), tuple(f"alpha_{k + 1}" for k in range(len(axes))), len(axes)
-    if np.ndim(power) or np.asarray(power).dtype.kind not in "iuf" or not 0 < power < 100:
+    if "metric" not in found and ("norm" not in found or power is None):
+        return None, None
+    if power is not None and (np.ndim(power) or np.asarray(power).dtype.kind not in "iuf" or not 0 < power < 100):
         raise ValueError(f"has a power_degree that makes no sense: {SOURCE}")
     if "metric" in found:
         M = numbers("metric", _array(found, "metric", ("joint", "other_joint", *names), axes))
@@ -112,7 +113,7 @@ def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsle
             raise ValueError(
                 f"has a metric of shape {M.shape} where it must be ({joints}, {joints}, ...) and symmetric"
             )
-        return Metric(axes, M, degree), float(power)
+        return Metric(axes, M, degree), None if power is None else float(power)
     rows = numbers("norm", _array(found, "norm", ("norm_coefficient", *names), axes))
     if joints != 2 or len(rows) % 2 == 0:
         raise ValueError(f"has a norm of shape {rows.shape} where it must be (an odd number, ...) of two joints")

@@ -10,8 +10,10 @@ from geomech.field import Field
 from geomech.minimum_perturbation import minimum_perturbation
 from geomech.optimise import Optimum
 from geomech.optimise.loops import TOUCHING
-from geomech.output.plots.maps import ccf_map, drawable
+from geomech.output.plots.maps import ccf_map, drawable, largest, shape_space
+from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
+from geomech.stretch import stretch
 from geomech.study.bench import Study
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
@@ -25,48 +27,92 @@ HOLDS = {  # what holds a loop: colour, text
 
 
 def along(optimum: Optimum, study: Study | None = None) -> Field:
-    """The CCF that tells what the aim gains by area, values (1, N_1, N_2): in the minimum-perturbation frame, along the
-    displacement, or of the heading for turning. ValueError for singular shapes."""
+    """The CCF that tells what the aim gains by area, values (1, N_1, N_2): along the displacement, or of the heading for
+    turning, in the minimum-perturbation frame, or, where singular shapes leave none, in the scene's own."""
     fitted, best = (study or Study(optimum.scene)).fitted, optimum.best
-    frame = minimum_perturbation(fitted)
-    there = ccf(Connection(fitted.axes, frame.connection(fitted), fitted.residual, fitted.speed, fitted.degree))
-    if optimum.request.aim.name == "turning":
-        return Field(there.axes, there.values[2:], there.degree)
-    x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
-    share = np.array([x, y]) / (np.hypot(x, y) or 1.0)
-    return Field(there.axes, np.tensordot(share, there.values[:2], 1)[None], there.degree)
+    there, (x, y, _) = fitted, best.displacement
+    if not fitted.field.masked:
+        frame = minimum_perturbation(fitted)
+        there = Connection(fitted.axes, frame.connection(fitted), fitted.residual, fitted.speed, fitted.degree)
+        x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
+    found = ccf(there)
+    share = np.array([0, 0, 1] if optimum.request.aim.name == "turning" else [x, y, 0]) / (np.hypot(x, y) or 1.0)
+    return Field(found.axes, np.tensordot(share, found.values, 1)[None], found.degree)
 
 
-def held(optimum: Optimum, field: Field) -> np.ndarray:
-    """(PHASES,): what of HOLDS holds the best loop at each phase, from ``field``, that of `along`."""
+def held(optimum: Optimum, field: Field | None) -> np.ndarray:
+    """(PHASES,): what of HOLDS holds the best loop at each phase, from ``field``, that of `along`; None: without one."""
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
-    value = np.abs(field(np.clip(alpha, [a[0] for a in field.axes], [a[-1] for a in field.axes]))[..., 0])
-    low, high = alpha.min(0), alpha.max(0)
-    inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, low, high)]
-    top = np.abs(field.values[0][np.ix_(*inside)]).max(initial=value.max())
-    rest = "length" if optimum.request.aim.name == "efficiency" else "else"
-    out = np.where(value <= NEAR_ZERO * top, "zero", rest)
-    limit = getattr(optimum.request.loops, "within", np.inf)
-    return np.where((np.abs(alpha) >= limit * (1 - TOUCHING)).any(-1), "limit", out)
+    out = np.full(PHASES, "length" if optimum.request.aim.name == "efficiency" else "else")
+    if field is not None:
+        value = np.abs(_seen(field, alpha))
+        inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
+        around = np.abs(field.values[0][np.ix_(*inside)])
+        top = largest(around) if field.masked else around.max(initial=value.max())
+        out = np.where(value <= NEAR_ZERO * top, "zero", out)
+    box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
+    near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
+    return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", out)
+
+
+def _seen(field: Field, alpha) -> np.ndarray:
+    """The field at shapes, for those beyond it at its edge; beside singular shapes from its nearest points, or nan."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    alpha = np.clip(alpha, [a[0] for a in field.axes], [a[-1] for a in field.axes])
+    if field.masked:
+        return RegularGridInterpolator(field.axes, field.values[0])(alpha)
+    return field(alpha)[..., 0]
 
 
 @styled
 def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
-    """The best loop on the map of `along`, coloured by what holds it; the start dashed."""
-    ax, scene = axes_of(ax), optimum.scene
-    field = drawable(along(optimum) if field is None else field)
-    unit = "rad" if optimum.request.aim.name == "turning" else scene.system.unit
-    labels = scene.system.shape_labels
-    ccf_map(field, 0, (), unit, ax, labels=labels)
-    what = "heading" if optimum.request.aim.name == "turning" else "displacement"
-    ax.set_title(f"CCF of the {what}, minimum-perturbation frame")
-    bar = ax.collections[0].colorbar
-    bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
-    t = np.linspace(0, 2 * np.pi, PHASES)
-    ax.plot(*optimum.start.gait.shape(t).T, color="0.25", lw=0.9, ls="--", label="start")
-    draw_held(ax, optimum.gait.shape(t), held(optimum, field))
+    """The best loop on the map of `along`, coloured by what holds it; the start dashed. Where the velocity does not follow
+    from shape alone there is no CCF, and the map has the loop alone."""
+    ax, system = axes_of(ax), optimum.scene.system
+    if system.steps:
+        shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, system.shape_labels)
+        ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
+    else:
+        field = drawable(along(optimum) if field is None else field)
+        ccf_map(field, 0, (), unit_of_gain(optimum), ax, labels=system.shape_labels)
+        frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
+        ax.set_title(f"CCF of the {gain(optimum)}, {frame}")
+        bar = ax.collections[0].colorbar
+        bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
+    draw_start_and_best(optimum, ax, lambda curve: curve, field)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1)
     return ax
+
+
+@styled
+def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, study: Study | None = None):
+    """`optimum_map` on shape space redrawn so that equal lengths cost equal effort. ValueError for what has no metric."""
+    ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
+    field, plane = along(optimum, study) if field is None else field, stretch(study.metric)
+    effort = "BL" if system.power_degree == 1 else "path length"
+    stretched_map(field, plane, 0, (), unit_of_gain(optimum), ax, labels=system.shape_labels, effort=effort)
+    ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
+    bar = ax.collections[0].colorbar
+    bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
+    low, high = ([a[k] for a in plane.field.axes] for k in (0, -1))
+    draw_start_and_best(optimum, ax, lambda curve: plane(np.clip(curve, low, high)), field)
+    return ax
+
+
+def gain(optimum: Optimum) -> str:
+    return "heading" if optimum.request.aim.name == "turning" else "displacement"
+
+
+def unit_of_gain(optimum: Optimum) -> str:
+    return "rad" if optimum.request.aim.name == "turning" else optimum.scene.system.unit
+
+
+def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> None:
+    """Both loops, each shape where ``place`` puts it."""
+    t = np.linspace(0, 2 * np.pi, PHASES)
+    ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
+    draw_held(ax, place(optimum.gait.shape(t)), held(optimum, field))
 
 
 def draw_held(ax, curve: np.ndarray, kinds: np.ndarray) -> None:
@@ -91,9 +137,8 @@ def angles(optimum: Optimum, ax=None):
     every = max(1, gait.joints // 6)
     for k, curve in list(enumerate(gait.shape(t).T))[every // 2 :: every]:
         ax.plot(t, curve, label=quantity(names[k][0]))
-    limit = getattr(optimum.request.loops, "within", None)
-    if limit is not None and any(x.startswith("alpha") for x in optimum.active):
-        for side in (-limit, limit):
+    if any(x.startswith("alpha") for x in optimum.active):
+        for side in np.unique(optimum.request.loops.box):
             ax.axhline(side, color=HOLDS["limit"][0], lw=0.8, ls=":")
     ax.set(xlabel="phase $t$ (rad)", ylabel=f"shape ({names[0][1]})", xlim=(0, 2 * np.pi))
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
@@ -104,15 +149,18 @@ def angles(optimum: Optimum, ax=None):
 
 
 @styled
-def optimum_figure(optimum: Optimum):
-    """`optimum_map` beside `angles`; the angles alone where there is no map."""
-    scene = optimum.scene
-    study = Study(scene)
-    if scene.system.joints != 2 or "path" not in study.methods or scene.system.singularity is not None:
+def optimum_figure(optimum: Optimum, stretched: bool = False):
+    """`optimum_map` beside `angles`; the angles alone where there are not two joints. stretched: `stretched_optimum` between
+    them."""
+    system, study = optimum.scene.system, Study(optimum.scene)
+    if system.joints != 2:
         fig, axes = figure(3.8, 3.4)
         angles(optimum, axes[0, 0])
         return fig
-    fig, axes = figure(7.6, 3.9, 2)
-    optimum_map(optimum, axes[0, 0], along(optimum, study))
-    angles(optimum, axes[0, 1])
+    fig, axes = figure(11.4 if stretched else 7.6, 3.9, 3 if stretched else 2)
+    field = None if system.steps else along(optimum, study)
+    optimum_map(optimum, axes[0, 0], field)
+    if stretched:
+        stretched_optimum(optimum, axes[0, 1], field, study)
+    angles(optimum, axes[0, -1])
     return fig

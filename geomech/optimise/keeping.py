@@ -1,0 +1,48 @@
+"""What all loops of a search keep of the first: that it is one stroke, and its distance from singular shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.optimise.loops import DENSE, Loops, waves
+from geomech.optimise.stroke import Stroke
+
+MARGIN = 0.5  # of the first loop's distance from singular shapes
+NEARLY = 0.95  # of that, to rounding
+SMALLER = 0.7 ** np.arange(12)  # sizes that are tried
+
+
+class Keeping:
+    """singularity: of the system, or None. first: the loop to begin with, drawn together where it meets singular shapes.
+    stroke: whether it is one stroke. away: how near to 0 the singularity may come."""
+
+    def __init__(self, loops, singularity, first: np.ndarray):
+        self.loops, self.singularity, self.away = loops, singularity, 0.0
+        self.first = self._clear(first, first)
+        self.stroke = isinstance(loops, Loops) and Stroke.is_one(loops, self.first)
+        if singularity is not None:
+            self.away = MARGIN * float(np.abs(self._distance(self.first)).min())
+
+    def start(self, p: np.ndarray) -> np.ndarray:
+        """The loop, or one like it that keeps to the rules: with less of its higher harmonics, smaller, and about the centre of
+        the first; the first itself where nothing else does."""
+        if self.stroke and not Stroke.is_one(self.loops, p):
+            rounder = (np.concatenate([p[:3], size * p[3:]]) for size in SMALLER)
+            p = next((q for q in rounder if Stroke.is_one(self.loops, q)), self.first)
+        return self._clear(p, self.first)
+
+    def _clear(self, p: np.ndarray, first: np.ndarray) -> np.ndarray:
+        if not self.meets(p):
+            return p
+        smaller = (np.concatenate([first[:1], size * p[1:]]) for size in SMALLER)
+        return next((q for q in smaller if not self.meets(q)), first)
+
+    def _distance(self, p: np.ndarray) -> np.ndarray:
+        return self.singularity(waves(DENSE, self.loops.harmonics) @ p)
+
+    def meets(self, p: np.ndarray, share: float = 1.0) -> bool:
+        """Whether the loop meets singular shapes, or comes nearer to them than a share of what all keep."""
+        if self.singularity is None:
+            return False
+        d = self._distance(p)
+        return bool(np.ptp(np.sign(d)) > 0 or np.abs(d).min() < share * self.away)

@@ -1,0 +1,71 @@
+"""How far joints may go: one limit for all, one for each, or from one angle to another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.errors import SceneError, check_angle, is_number, number, real_array, short
+from geomech.scene.model import Scene
+from geomech.systems.base import System
+
+LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
+Within = float | tuple[tuple[float, float], ...]
+
+
+def limits(scene: Scene, within, phases: int) -> Within:
+    """``within`` as `geomech.optimise.loops.Loops` takes it: a number, all joints being that near to 0, or a pair (lowest,
+    highest) for each. None: as far as the field goes, or the scene's gait if that goes further; all of a stored table.
+    ValueError for what lies outside the field that a scene has."""
+    system = scene.system
+    low, high = edges(system)
+    if within is None:
+        if system.stored("connection"):
+            return _told(low, high)
+        n = scene.numerics
+        within = min(
+            max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
+        )
+    if is_number(within):
+        number("--within", within, LEAST, MOST)
+        pairs = np.array([[-float(within), float(within)]] * system.joints)
+    else:
+        pairs = _pairs(within, system.joints)
+    if system.joint_angles:
+        check_angle("a limit of joints", float(np.abs(pairs).max()))
+    slack = 1e-9 * (1 + np.abs(pairs))
+    if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
+        field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
+        raise SceneError(f"--within {_text(within)} lies outside the field that the scene has: {field}")
+    return _told(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
+
+
+def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest shapes (joints,) of the field of a table, or of a frame; infinite where there is neither."""
+    own = system.stored("connection")
+    axes = (
+        own.axes if own else system.axes if getattr(system, "carried", False) else [(-np.inf, np.inf)] * system.joints
+    )
+    return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
+
+
+def _pairs(within, joints: int) -> np.ndarray:
+    """(joints, 2) of pairs, or of a number for each joint."""
+    x = real_array("--within", within)
+    x = np.stack([-x, x], -1) if x.ndim == 1 else x
+    good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
+    if not good:
+        raise SceneError(
+            f"--within takes a number, one for each of {joints} joints, or as many from low to high, got {short(within)}"
+        )
+    return x
+
+
+def _told(low: np.ndarray, high: np.ndarray) -> Within:
+    """As short as may be."""
+    if (low == -high[0]).all() and (high == high[0]).all():
+        return float(high[0])
+    return tuple(zip(low.tolist(), high.tolist()))
+
+
+def _text(within) -> str:
+    return f"{within:g}" if is_number(within) else short(within)
