@@ -9,7 +9,7 @@ import numpy as np
 from geomech.optimise.aims import Aim
 from geomech.optimise.stroke import Stroke
 
-EVEN = 1e-3  # of the value: what uneven pacing costs; it decides among pacings that bring the same
+EVEN = 1e-3  # of the value: what uneven pacing and a long way cost; it decides among loops that bring the same
 STRAIGHT = 1e-3  # rad: below it a gait does not turn
 STRIDE = 0.5  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
 TOGETHER = 50

@@ -22,8 +22,8 @@ STEP_OF_RUNS = 1e-3  # rad: cycles repeat to 1e-6 only
 
 class Brought(NamedTuple):
     """Numbers of a cycle, each with its slopes (..., *shape of p). net: (3,), pose. swing: heading at the start beyond its
-    mean, rad. length: of the path. power: mean over phases, at one rad of phase per unit of time. uneven: of the pacing, 0
-    where |alphadot| is constant."""
+    mean, rad. length: of the path. power: mean over phases, at one rad of phase per unit of time. uneven: of the pacing, least
+    where |alphadot| is constant, and more for a longer way: there are spurs that bring nothing."""
 
     net: tuple
     swing: tuple
@@ -120,8 +120,8 @@ def _first_of_turning(n: int) -> np.ndarray:
 
 
 def uneven(loops: Loops, alphadot: np.ndarray) -> tuple:
-    """mean |alphadot|^2 / (mean |alphadot|)^2 - 1, and its slopes."""
+    """mean |alphadot|^2 / (mean |alphadot|)^2 - 1, and mean |alphadot|^2 in the unit of the loops; and its slopes."""
     n, speed = len(alphadot), np.sqrt((alphadot**2).sum(-1)) + 1e-300
     mean, square = speed.mean(), (speed**2).mean()
-    by = (2 * alphadot / mean**2 - 2 * square / mean**3 * alphadot / speed[:, None]) / n
-    return square / mean**2 - 1, loops.rates.T @ by
+    by = (2 * alphadot / mean**2 - 2 * square / mean**3 * alphadot / speed[:, None] + 2 * alphadot / loops.unit**2) / n
+    return square / mean**2 - 1 + square / loops.unit**2, loops.rates.T @ by

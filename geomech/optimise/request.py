@@ -111,7 +111,7 @@ class Request:
         gaits = int(climbs * steps * TRIES * each)
         jobs += cost.direct(scene, scene.gait, gaits, loops.phases, each, checked=False)
         found = cost.price(jobs)
-        return found._replace(seconds=found.seconds + CLIMB * self.starts)
+        return found._replace(seconds=found.seconds + CLIMB * (self.starts + 1))
 
     @property
     def extent(self) -> float:

@@ -30,7 +30,7 @@ FINISHED = 2  # answers of the table that the direct tier goes on from
 TURNED = 0.02  # rad: what 128 phases leave of a net turn
 AS_MUCH = 1e-3  # of the value
 STRAIGHTENED = 4  # steps of Newton, at most
-LARGER = 0.6  # of the room: how far the scene's own gait goes where a table is asked a second time
+LARGER = 0.6  # of the room: how far the scene's own gait goes the second time
 ENOUGH = 64  # harmonics that any start is told in
 
 
@@ -94,16 +94,23 @@ class _Search:
         r, tier = self.r, self._direct()
         if not r.looks_up:
             most = RUNS if r.whole else NEAR
-            return self._different([self._up(tier, p, turn, most, NEAR_TOLERANCE) for p in starts])
-        table = self._table()
-        near = [self._up(table, p, turn, NEAR, NEAR_TOLERANCE) for p in [*starts, self._larger(starts[0])]]
-        near[0] = max(near[0], near.pop(), key=lambda p: self._worth(table, p, turn))
+            return self._different(self._near(tier, starts, turn, most))
+        near = self._near(self._table(), starts, turn, NEAR)
         ranked = sorted(self._different(near), key=lambda found: -self._worth(tier, found[0], turn))[:FINISHED]
         finished = [
             max((self._up(tier, p, turn, FINISH, TOLERANCE), p), key=lambda q: self._worth(tier, q, turn))
             for p, _ in ranked
         ]
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
+
+    def _near(self, cycles, starts: list[np.ndarray], turn: float, most: int) -> list[np.ndarray]:
+        """Where each start leads; the first twice, as it is and with another size, where that is cheap."""
+        r = self.r
+        twice = [self._larger(starts[0])] if r.looks_up or (r.system.linear and not r.whole) else []
+        near = [self._up(cycles, p, turn, most, NEAR_TOLERANCE) for p in [*starts, *twice]]
+        if twice:
+            near[0] = max(near[0], near.pop(), key=lambda p: self._worth(cycles, p, turn))
+        return near
 
     def _larger(self, p: np.ndarray) -> np.ndarray:
         """The loop with another size: a small one may lead to a poor answer."""

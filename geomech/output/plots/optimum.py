@@ -10,7 +10,7 @@ from geomech.field import Field
 from geomech.minimum_perturbation import minimum_perturbation
 from geomech.optimise import Optimum
 from geomech.optimise.loops import TOUCHING
-from geomech.output.plots.maps import ccf_map, drawable, largest, shape_space
+from geomech.output.plots.maps import ccf_map, drawable, shape_space
 from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
 from geomech.stretch import stretch
@@ -21,9 +21,12 @@ PHASES = 721
 HOLDS = {  # what holds a loop: colour, text
     "zero": ("black", "runs along the zero line"),
     "limit": ("#D55E00", "at the joint limit"),
+    "singular": ("#0072B2", "as near to singular shapes as it may"),
     "length": ("#009E73", "off the zero line: path length holds it back"),
     "else": ("#CC79A7", "off the zero line"),
+    "loop": ("black", "best"),
 }
+LEFT = {"length": ",\nand what A leaves of the law", "else": ": what A leaves of the law"}  # where drag is not linear
 
 
 def along(optimum: Optimum, study: Study | None = None) -> Field:
@@ -43,13 +46,19 @@ def along(optimum: Optimum, study: Study | None = None) -> Field:
 def held(optimum: Optimum, field: Field | None) -> np.ndarray:
     """(PHASES,): what of HOLDS holds the best loop at each phase, from ``field``, that of `along`; None: without one."""
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
-    out = np.full(PHASES, "length" if optimum.request.aim.name == "efficiency" else "else")
+    rest = "length" if optimum.request.aim.name == "efficiency" else "else"
+    out = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
     if field is not None:
         value = np.abs(_seen(field, alpha))
         inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
         around = np.abs(field.values[0][np.ix_(*inside)])
-        top = largest(around) if field.masked else around.max(initial=value.max())
+        top = (
+            np.nanmedian(around) if field.masked else around.max(initial=value.max())
+        )  # beside singular shapes it is any
         out = np.where(value <= NEAR_ZERO * top, "zero", out)
+    if "singular shapes" in optimum.active:
+        away = np.abs(optimum.scene.system.singularity(alpha))
+        out = np.where(away <= away.min() * (1 + NEAR_ZERO), "singular", out)
     box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
     near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
     return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", out)
@@ -112,16 +121,17 @@ def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> Non
     """Both loops, each shape where ``place`` puts it."""
     t = np.linspace(0, 2 * np.pi, PHASES)
     ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
-    draw_held(ax, place(optimum.gait.shape(t)), held(optimum, field))
+    left = field is not None and not optimum.scene.system.linear
+    draw_held(ax, place(optimum.gait.shape(t)), held(optimum, field), left)
 
 
-def draw_held(ax, curve: np.ndarray, kinds: np.ndarray) -> None:
-    """A curve (P, 2) in the colours of HOLDS, with a dot at its start and an arrow along it."""
+def draw_held(ax, curve: np.ndarray, kinds: np.ndarray, left: bool = False) -> None:
+    """A curve (P, 2) in the colours of HOLDS, with a dot at its start and an arrow along it. left: A is not all there is."""
     for kind, (colour, text) in HOLDS.items():
         here = kinds == kind
         if here.any():
             whole = here | np.roll(here, 1)
-            ax.plot(*np.where(whole, curve.T, np.nan), color=colour, lw=1.8, label=text)
+            ax.plot(*np.where(whole, curve.T, np.nan), color=colour, lw=1.8, label=text + LEFT.get(kind, "") * left)
     ax.plot(*curve[0], "o", color="black", ms=3)
     ax.annotate(
         "", curve[100], curve[90], arrowprops={"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}
@@ -143,8 +153,9 @@ def angles(optimum: Optimum, ax=None):
     ax.set(xlabel="phase $t$ (rad)", ylabel=f"shape ({names[0][1]})", xlim=(0, 2 * np.pi))
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
     best, aim = optimum.best, optimum.request.aim
-    ax.set_title(f"{aim.name}: {best.value:.4g} {aim.unit}\n(start {optimum.start.value:.4g})")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
+    start = optimum.start.value
+    ax.set_title(f"{aim.name}: {best.value:.4g} (start {start if start > 1e-9 else 0.0:.4g})\n{aim.unit}")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3 if max(len(n) for n, _ in names) < 12 else 1)
     return ax
 
 
@@ -157,7 +168,7 @@ def optimum_figure(optimum: Optimum, stretched: bool = False):
         fig, axes = figure(3.8, 3.4)
         angles(optimum, axes[0, 0])
         return fig
-    fig, axes = figure(11.4 if stretched else 7.6, 3.9, 3 if stretched else 2)
+    fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
     field = None if system.steps else along(optimum, study)
     optimum_map(optimum, axes[0, 0], field)
     if stretched:
