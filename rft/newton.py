@@ -91,7 +91,8 @@ class Balance:
 
     def solve(self, motion: Callable, scale, threads=None, guess=None, model: Model | None = None) -> Solved:
         """Body velocities of B samples. motion(index): `Kinematics` of all contacts' elements of those samples. scale:
-        (B,), the size of their velocities. guess: (3, B), tried first. model: of this batch, if not the balance's own."""
+        (B,), the size of their velocities. guess: (3, B), tried first but where it is nan. model: of this batch, if not the
+        balance's own."""
         self.motion, self.scale, self.guess = motion, scale, None if guess is None else guess / scale
         self.model = self.model if model is None else model
         self.scaled = not self.model.rate_independent
@@ -99,8 +100,12 @@ class Balance:
         self.limit = self.base + sum(1e-14 * np.max(term.size * scale / self.unit) for term in self.model.terms)
         size = scale.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
-        todo = np.arange(size)
         for way in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
+            todo = np.flatnonzero(out.residual > self.limit)
+            if way is WARM:
+                todo = todo[np.isfinite(self.guess).all(0)]
+            if not todo.size:
+                continue
             if isinstance(way, Descent) and backend.takes(self.backend, self.model):
                 self._attempt_compiled(todo, way, out, threads)
             elif isinstance(way, Descent):
@@ -108,9 +113,6 @@ class Balance:
                     self._attempt(todo, way, out, threads)
             else:
                 self._follow(todo, *way, out)
-            todo = np.flatnonzero(out.residual > self.limit)
-            if not todo.size:
-                break
         return out._replace(xi=out.xi * scale)
 
     def _units(self, scale) -> np.ndarray:

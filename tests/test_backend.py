@@ -19,6 +19,7 @@ from geomech.systems import solver
 from rft import Chain, EndCaps, GrainInertia, SkinFriction, TowedSled, backend, body_velocity, compiled, time_steps
 from rft.bodies.base import Kinematics
 from rft.contact import Model
+from rft.media.base import TermLaw
 from rft.samples import Jacobian
 
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
@@ -62,6 +63,45 @@ def test_the_same_marches(name):
     np.testing.assert_allclose(plain.xi, fast.xi, rtol=0, atol=1e-10)
     np.testing.assert_allclose(plain.pose, fast.pose, rtol=0, atol=1e-10)
     np.testing.assert_array_equal(plain.status, fast.status)
+
+
+@dataclasses.dataclass(frozen=True)
+class Both(TermLaw):
+    """Dry and viscous drag."""
+
+    dry = ((1.0, 1.0, 1.0), (0.24, 0.0, 1.7))
+    viscous = (0.3, 0.9)
+
+
+@pytest.mark.parametrize("how", BOTH)
+def test_starts(how, compiled_code):
+    """From the answer, from one nearby, from none, from nonsense and from rest: the same answers and statuses, and few steps
+    from a good one. Asymmetric body, length not 1, rates from slow to fast, a viscous part in which speed counts."""
+    rng = np.random.default_rng(11)
+    alpha, alphadot = rng.uniform(-2.6, 2.6, (90, 2)), rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1))
+    alpha[:6], alphadot[:6], alphadot[6] = 1.5, 0.3, 0.0  # links stick; a sample at rest
+    for medium in (GLASS, Both()):
+        given = {"backend": how, "tolerance": 1e-13}
+        solve = lambda a, start=None: body_velocity(medium, BODY, a, alphadot, start=start, **given)
+        cold, near = solve(alpha), solve(alpha + 1e-3).xi
+        starts = {"near": near, "itself": cold.xi, "at rest": np.zeros(3), "absurd": 100.0 * near[::-1]}
+        starts["of some"] = np.where(np.arange(90)[:, None] % 2, near, np.nan)
+        found = {name: solve(alpha, start) for name, start in starts.items()}
+        for name, one in found.items():
+            assert (one.status == cold.status).all(), name
+            assert apart(one, cold, alphadot, BODY).max() < 1e-10, name
+        steps = {name: one.iterations[7:] for name, one in found.items()}
+        cold_steps = cold.iterations[7:]
+        assert (steps["itself"] <= 2).all()  # rounding may take one more
+        assert steps["near"].mean() < 0.7 * cold_steps.mean()
+        np.testing.assert_array_equal(steps["of some"][0::2], steps["near"][0::2])
+        np.testing.assert_array_equal(steps["of some"][1::2], cold_steps[1::2])
+
+
+@pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((4, 3)), [0.0, np.inf, 0.0], "here", np.zeros((2, 3, 3))])
+def test_starts_that_are_none(wrong):
+    with pytest.raises(ValueError, match="start must be"):
+        body_velocity(GLASS, BODY, np.zeros((3, 2)), np.ones((3, 2)), start=wrong)
 
 
 @pytest.mark.usefixtures("compiled_code")

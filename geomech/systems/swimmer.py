@@ -170,17 +170,18 @@ class Swimmer(Plain):
         names = ("loads", "regularisation", "pieces", *names)
         return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
 
-    def solve(self, alpha, alphadot) -> rft.Solution:
-        """Body velocities with residual and status for alpha, alphadot (..., joints); see `rft.body_velocity`. ValueError
-        if shape alone does not settle them."""
+    def solve(self, alpha, alphadot, start=None) -> rft.Solution:
+        """Body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (..., 3) where
+        that is known; see `rft.body_velocity`. ValueError if shape alone does not settle them."""
         self.refuse("body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
-        return rft.body_velocity(self.medium, self.body, alpha, alphadot, **self._settings("tolerance", "backend"))
+        asked = self._settings("tolerance", "backend")
+        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **asked)
 
     sample = solve
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) in the body's frame; RuntimeError if any sample did not converge."""
-        return self.solve(alpha, alphadot).checked().xi
+    def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
+        """xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did not converge."""
+        return self.solve(alpha, alphadot, start).checked().xi
 
     def single(self, alpha, alphadot) -> dict:
         alpha, alphadot = (real_array(name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
