@@ -8,6 +8,7 @@ gaits, run side by side.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -38,7 +39,7 @@ class Phases:
 
     def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
         self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
-        self.count = 0
+        self.count, self.last, self.warm = 0, None, "start" in inspect.signature(velocity).parameters
 
     def __call__(self, p: np.ndarray) -> Brought:
         loops, d = self.loops, self.loops.joints
@@ -49,7 +50,7 @@ class Phases:
         every = alpha + moves[..., :d], alphadot + moves[..., d:]
         spans = 2 * steps[:, None]
         self.count += 1
-        xi = self.velocity(*every)
+        xi = self._velocities(*every)
         if not np.isfinite(xi).all():
             raise RuntimeError("a loop that has no velocity somewhere")
         net, by_xi = slopes(xi[0])
@@ -69,6 +70,14 @@ class Phases:
             length = 2 * np.pi * root.mean(), self._in_p(2 * np.pi / n * by_P[:, None] * dP)
         swing = float(swing_by @ xi[0][:, 2])
         return Brought((net, chain(by_xi)), (swing, chain(zero)), length, power, uneven(loops, alphadot))
+
+    def _velocities(self, alpha, alphadot) -> np.ndarray:
+        """xi (1 + 4 d, N, 3) of a loop and of those beside it, begun, where a balance may be, from the last loop and from this."""
+        if not self.warm:
+            return self.velocity(alpha, alphadot)
+        here = self.velocity(alpha[:1], alphadot[:1], start=self.last)
+        self.last = here
+        return np.concatenate([here, self.velocity(alpha[1:], alphadot[1:], start=here)])
 
     def _in_p(self, by: np.ndarray) -> np.ndarray:
         """Slopes (..., 2 K + 1, d) from those by shape and rate at every phase, (..., N, 2 d)."""
