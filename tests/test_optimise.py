@@ -1,6 +1,7 @@
 """Optimal gaits against published strokes, differences, bounds and each other."""
 
 import json
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from geomech.optimise import loops as series
 from geomech.optimise.aims import Aim
 from geomech.optimise.cycles import Phases, Runs, brought
 from geomech.optimise.loops import Loops
+from geomech.optimise.stroke import Stroke
 from geomech.output import optima
 from geomech.reconstruct import displacement, slopes
 from geomech.scene import Scene, parse
 from geomech.study.bench import Study
-from geomech.systems import Swimmer
+from geomech.systems import Plain, Swimmer, Table
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
@@ -167,6 +169,8 @@ def test_a_gait_in_sand_beats_nelder_mead():
     """0.336 BL, six coefficients from the butterfly; here from the circle, within 3 rad."""
     found = optimise(geomech.load("three-link-glass"), "displacement", within=3.0)
     assert found.value > 0.336 + found.estimate
+    assert Stroke.is_one(found.request.loops, found.request.loops.of(found.gait))
+    assert found.active == ()
     assert np.abs(found.gait.cycle(2000)[0]).max() <= 3.0 + 1e-9
     assert abs(found.best.displacement[2]) < 0.02
 
@@ -400,3 +404,214 @@ def test_the_loop_on_the_map(stroke, cheap, tmp_path):
     for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1), "three.png")):
         plots.save(plots.optimum_figure(found), tmp_path / name)
         assert (tmp_path / name).stat().st_size > 10_000
+
+
+def test_a_cycle_begun_from_the_last_one_is_the_same():
+    system, (loops, p) = Swimmer(SAND, ODD), some_loop()
+    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
+    warm, cold = (Phases(loops, system.velocity, power) for _ in range(2))
+    cold.warm = False
+    assert warm.warm
+    warm(0.9 * p)
+    for name in ("net", "swing", "length", "power"):
+        (value, found), (same, rise) = (getattr(c, name) for c in (warm(p), cold(p)))
+        assert value == pytest.approx(same, abs=1e-9), name
+        assert np.abs(np.asarray(found) - rise).max() < 1e-5 * np.abs(rise).max(), name
+
+
+def test_steepest_way_from_a_gait_that_brings_nothing():
+    """At a flat loop the displacement is the tip of a cone, whose slopes have no limit; every way up is one of two sides."""
+    aim, (loops, _) = Aim("displacement"), some_loop()
+    flat = loops.of(Ellipse(semi_axes=(0.8, 0.0), tilt=0.5))
+    cycles = Phases(loops, Swimmer(FLUID, ODD).velocity)
+    value, found = aim.value(cycles(flat))
+    assert value < 1e-12
+    far = lambda way: np.hypot(*cycles(flat + 1e-4 * way / np.linalg.norm(way)).net[0][:2]) / 1e-4
+    assert far(found) == pytest.approx(np.linalg.norm(found), rel=1e-3)
+    rng = np.random.default_rng(0)
+    assert max(far(rng.normal(size=flat.shape)) for _ in range(20)) < far(found)
+
+
+@pytest.mark.parametrize(
+    ("gait", "aim"),
+    [
+        (Circle(amplitude=0.0), "efficiency"),
+        (Circle(amplitude=0.0), "speed"),
+        (Ellipse(semi_axes=(0.5, 0.0)), "efficiency"),
+    ],
+    ids=["rest", "rest, timed", "flat"],
+)
+def test_a_start_that_brings_nothing(gait, aim):
+    found = optimise(viscous(gait=gait), aim, harmonics=1, within=1.2)
+    assert found.start.value == pytest.approx(0.0, abs=1e-9)
+    assert found.value > (0.1 if aim == "efficiency" else 0.008)
+
+
+def test_a_gait_at_rest_takes_no_work():
+    """In a dry medium, whose forces at rest are any."""
+    system = Swimmer(SAND, Chain())
+    assert system.work([0.3, 0.1], [0.0, 0.0], np.zeros(3)).power == 0.0
+
+
+def test_strokes():
+    loops = Loops(2, 3, 2.5)
+    round_, back = loops.of(Ellipse(semi_axes=(1.0, 0.5), centre=(0.4, -0.2))), loops.of(Butterfly())
+    assert Stroke.is_one(loops, round_)
+    assert Stroke.is_one(loops, series.reversed_(round_))
+    twice = np.zeros(loops.shape)
+    twice[3], twice[4], twice[1], twice[2] = (1.0, 0.0), (0.0, 1.0), (0.4, 0.0), (0.0, 0.4)
+    own = Stroke(loops, twice)
+    assert own.swept(twice).min() > 0  # never back, and yet
+    assert own.winding(twice) == 2
+    assert not Stroke.is_one(loops, twice)
+    assert not Stroke.is_one(loops, loops.of(Ellipse(semi_axes=(1.0, 0.01))))
+    assert not Stroke.is_one(loops, back + twice)
+    way, h = np.random.default_rng(0).normal(size=round_.shape), 1e-6
+    rise = (own.swept(round_ + h * way) - own.swept(round_ - h * way)) / (2 * h)
+    assert (own.slopes(round_) * way).sum((1, 2)) == pytest.approx(rise, abs=1e-8)
+
+
+def test_limits_of_each_joint_and_side():
+    box = ((-0.5, 2.0), (-1.2, 1.0))
+    found = optimise(viscous(), within=box, harmonics=3)
+    low, high = (f(found.gait.cycle(2000)[0], 0) for f in (np.min, np.max))
+    assert (low >= np.array([-0.5, -1.2]) - 1e-9).all()
+    assert (high <= np.array([2.0, 1.0]) + 1e-9).all()
+    named = {"alpha_1 >= -0.5": low[0] < -0.49, "alpha_1 <= 2": high[0] > 1.98, "alpha_2 >= -1.2": low[1] < -1.19,
+             "alpha_2 <= 1": high[1] > 0.99}  # fmt: skip
+    assert {x for x, touched in named.items() if touched} == set(found.active)
+    assert "alpha_1 >= -0.5" in found.active
+    assert found.value > found.start.value
+    loops = Loops(2, 2, box)
+    assert all((loops.reach(p)[0] >= loops.box[0]).all() for p in loops.starts(loops.of(Circle()), 5))
+    assert all((loops.reach(p)[1] <= loops.box[1]).all() for p in loops.starts(loops.of(Circle()), 5))
+    p = loops.of(Circle(amplitude=0.4, centre=(0.8, 0.0)))
+    A, b = loops.limits()
+    assert (A @ p.ravel() <= b).all()
+    assert (A @ loops.of(Circle(amplitude=0.4)).ravel() <= b).all()
+    assert not (A @ loops.of(Circle(amplitude=0.4, centre=(0.8, 0.7))).ravel() <= b).all()
+    assert not (A @ loops.of(Circle(amplitude=0.4, centre=(-0.2, 0.0))).ravel() <= b).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "limits"),
+    [
+        ("1.5", 1.5), ("90deg", np.pi / 2), ("-0.5:2", [(-0.5, 2.0)] * 2), ("1,-90deg:2", [(-1.0, 1.0), (-np.pi / 2, 2.0)]),
+        (None, None),
+    ],
+)  # fmt: skip
+def test_limits_as_they_are_typed(text, limits):
+    from geomech.commands.options import joint_limits
+
+    found = joint_limits(text, viscous())
+    assert found == limits if limits is None else np.asarray(found) == pytest.approx(np.asarray(limits))
+    for wrong in ("", "x", "1:2:3", "1:", ":2"):
+        with pytest.raises(SceneError, match="--within"):
+            joint_limits(wrong, viscous())
+
+
+def test_chains_without_drag_cost_what_their_metric_says():
+    """Path length by the metric of kinetic energy, by differences of the links' own motion."""
+    scene = geomech.load("three-link-ideal-fluid")
+    found = optimise(scene, "efficiency", harmonics=2)
+    alpha, alphadot = found.gait.cycle(256)
+    length = 2 * np.pi * np.sqrt(scene.system.cost(alpha, alphadot)).mean()
+    assert found.best.work is None
+    assert found.best.length == pytest.approx(length, rel=1e-10)
+    assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
+    assert found.value > 1.005 * found.start.value
+    assert "of the system's own metric" in optima.text(found)
+
+
+@pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
+def test_a_table_is_searched_like_its_scene(name, tmp_path):
+    from geomech.output.netcdf import save_connection
+
+    scene = geomech.load(name).with_numerics(grid=21)
+    save_connection(tmp_path / "field.nc", Study(scene))
+    table = Scene(Table(str(tmp_path / "field.nc")), Circle())
+    own, found = (optimise(s, "efficiency", harmonics=2) for s in (scene.changed(gait=Circle()), table))
+    assert found.value == pytest.approx(own.value, abs=found.estimate + 1e-3 * own.value)
+    assert (found.best.work is None) == (own.best.work is None)
+    with pytest.raises(SceneError, match="outside the field that the scene has: -2.5 to 2.5"):
+        checked(table, "displacement", within=3.0)
+
+
+@dataclass(frozen=True)
+class Strips(Plain):
+    """Displacement is the area under 3 cos(3 alpha_1) + 0.2, so that each strip between its zeros has a best loop."""
+
+    joints, linear, kind = 2, True, "strips"
+
+    def velocity(self, alpha, alphadot):
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        x = (np.sin(3 * alpha[..., 0]) + 0.2 * alpha[..., 0]) * alphadot[..., 1]
+        return np.stack([x, 0 * x, 0 * x], -1)
+
+
+def test_several_answers_are_told_from_one_found_again():
+    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, within=2.0, starts=5)
+    values, counts = zip(*found.answers)
+    assert sum(counts) == 5
+    assert max(counts) > 1
+    assert 1 < len(values) < 5
+    assert list(values) == sorted(values, reverse=True)
+    assert found.value == values[0] > 1.01 * values[1]
+    edge = np.arccos(-0.2 / 3) / 3  # of the strip in the middle, which is 4 rad long
+    middle = 2 * (np.sin(3 * edge) + 0.2 * edge) * 4
+    assert 0.8 * middle < values[1] < middle
+
+
+def test_all_starts_keep_off_singular_shapes():
+    snake = geomech.load("no-slip-snake")
+    found = optimise(snake, within=1.6, harmonics=2, starts=5)
+    least = np.abs(snake.system.singularity(snake.gait.cycle(1000)[0])).min()
+    d = snake.system.singularity(found.gait.cycle(1000)[0])
+    assert np.ptp(np.sign(d)) == 0
+    assert np.abs(d).min() > 0.47 * least
+    assert ("singular shapes" in found.active) == (np.abs(d).min() < 0.53 * least)
+
+
+def test_a_loop_that_cannot_be_run_ends_no_search():
+    """A velocity that fails beyond 1.1 rad: the best is at its edge."""
+    from geomech.optimise.climb import climb
+
+    system = Swimmer(FLUID, Chain())
+
+    def velocity(alpha, alphadot):
+        return np.where(np.abs(alpha).max(-1, keepdims=True) > 1.1, np.nan, system.velocity(alpha, alphadot))
+
+    loops = Loops(2, 2, 2.5, 32)
+    cycles, aim = Phases(loops, velocity), Aim("displacement")
+    first = loops.of(Circle(amplitude=0.5))
+    p = climb(cycles, aim, first, most=40)
+    assert np.abs(loops.cycle(p)[0]).max() <= 1.1
+    assert aim.value(cycles(p))[0] > 1.5 * aim.value(cycles(first))[0]
+
+
+def test_a_sine_has_the_power_of_its_own_gait_for_speed():
+    scene = geomech.load("sandfish-loose")
+    asked = checked(scene, "speed")
+    alpha, alphadot = scene.gait.cycle(128)
+    power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power.mean()
+    assert asked.aim.power == pytest.approx(power / scene.system.length, rel=1e-6)
+
+
+def test_loops_on_maps_of_all_kinds(stroke):
+    """Singular shapes leave the scene's own frame, time stepping no CCF, and a metric stretches the map."""
+    import dataclasses
+
+    from geomech.output import plots
+    from geomech.output.plots.optimum import held
+    from rft.effects import Transient
+
+    snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
+    titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
+    assert "CCF of the displacement, frame mean" in titles
+    assert "singular shapes" in snake.active
+    past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
+    stepped = dataclasses.replace(stroke, request=dataclasses.replace(stroke.request, scene=past))
+    assert set(held(stepped, None)) == {"loop"}
+    assert "no CCF" in plots.optimum_figure(stepped).axes[0].get_title()
+    fig = plots.optimum_figure(stroke, stretched=True)
+    assert any("stretched" in ax.get_title() for ax in fig.axes)

@@ -72,7 +72,7 @@ class Phases:
         return Brought((net, chain(by_xi)), (swing, chain(zero)), length, power, uneven(loops, alphadot))
 
     def _velocities(self, alpha, alphadot) -> np.ndarray:
-        """xi (1 + 4 d, N, 3) of a loop and of those beside it, begun, where a balance may be, from the last loop and from this."""
+        """xi (1 + 4 d, N, 3) of a loop and of those beside it; balances begin from the last loop and from this."""
         if not self.warm:
             return self.velocity(alpha, alphadot)
         here = self.velocity(alpha[:1], alphadot[:1], start=self.last)

@@ -104,9 +104,11 @@ class _Search:
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
 
     def _near(self, cycles, starts: list[np.ndarray], turn: float, most: int) -> list[np.ndarray]:
-        """Where each start leads; the first twice, as it is and with another size, where that is cheap."""
+        """Where each start leads; the first twice, as it is and with another size, where many a
+        loop is the best near by."""
         r = self.r
-        twice = [self._larger(starts[0])] if r.looks_up or (r.system.linear and not r.whole) else []
+        rough = r.looks_up or r.system.singularity is not None
+        twice = [self._larger(starts[0])] if rough else []
         near = [self._up(cycles, p, turn, most, NEAR_TOLERANCE) for p in [*starts, *twice]]
         if twice:
             near[0] = max(near[0], near.pop(), key=lambda p: self._worth(cycles, p, turn))
