@@ -3,8 +3,8 @@
 Sand's optima are larger and bring more. Two things differ. Drag in sand does not grow with speed: a link that creeps holds
 as firmly as one that sweeps, so that wide strokes pay, in which one end sweeps while the rest is an anchor, and a fast
 sweep costs no more work than a slow one. With drag like |v|^p and the fluid's ratio of drag across to drag along, 2, the
-stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the limit of 2.5 rad and 0.18 BL at p = 0.3 and 0.41 BL at
-p = 0; that for efficiency 1.44, 1.47 and 2.46 rad. And at small slip sand's drag across is 1 + C / tan gamma0 = 8.3 times
+stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the limit of 2.5 rad and 0.18 BL at p = 0.3 and 0.32 BL at
+p = 0; that for efficiency 1.44, 1.47 and 1.98 rad. And at small slip sand's drag across is 1 + C / tan gamma0 = 8.3 times
 that along. That alone adds to what a stroke brings and draws the loop in: a fluid of ratio 8.3 has 0.40 BL at 1.77 rad.
 
 In the fluid the stroke for displacement follows the zero line of the CCF, and that for efficiency cuts the far ends off,
@@ -65,7 +65,7 @@ def draw(numbers: dict):
             net = float(np.hypot(*best.displacement[:2]))
             ax.plot(
                 *best.gait.shape(np.linspace(0, 2 * np.pi, PHASES)).T, color=colour, lw=1.6,
-                label=f"{aim}: {net:.3f} BL, path {best.length:.2f}",
+                label=f"{aim}: {net:.3f} BL, path length {best.length:.2f}",
             )  # fmt: skip
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
     fig.suptitle("CCF along the displacement, minimum-perturbation frame", fontsize=9)
