@@ -10,11 +10,11 @@ import numpy as np
 
 from geomech.connection import evaluate
 from geomech.errors import SceneError, named, number
-from geomech.gaits import Sine
+from geomech.gaits import Gait, Sine
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
 from geomech.optimise.limits import limits
-from geomech.optimise.loops import Loops
+from geomech.optimise.loops import DENSE, Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
@@ -95,21 +95,29 @@ class Request:
             )
         return float(np.round(degrees.mean(), 3))
 
+    @cached_property
+    def gait(self) -> Gait:
+        """The scene's; where that goes beyond the limits, drawn together so as to keep them."""
+        gait, loops = self.scene.gait, self.loops
+        if isinstance(loops, Loops):
+            off = np.abs(gait.cycle(DENSE)[0] - loops.middle).max(0)
+            if (off > loops.half * (1 + 1e-3)).any():
+                return loops.gait(loops.fitted(loops.of(gait)))
+        return gait
+
     def cost(self) -> cost.Cost:
         """Balances, seconds and memory that it takes at most."""
-        scene, loops = self.scene, self.loops
+        scene, loops, gait = self.scene, self.loops, self.gait
         numbers = int(np.prod(loops.shape))
         each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
-        jobs = cost.direct(
-            scene, scene.gait, 3 + (2 if self.looks_up else self.starts), max(scene.numerics.phases, PHASES)
-        )
+        jobs = cost.direct(scene, gait, 3 + (2 if self.looks_up else self.starts), max(scene.numerics.phases, PHASES))
         if self.looks_up:
             jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
             climbs, steps = min(2, self.starts), FINISH
         else:
             climbs, steps = self.starts, RUNS if self.whole else NEAR
         gaits = int(climbs * steps * TRIES * each)
-        jobs += cost.direct(scene, scene.gait, gaits, loops.phases, each, checked=False)
+        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False)
         found = cost.price(jobs)
         return found._replace(seconds=found.seconds + CLIMB * (self.starts + 1))
 

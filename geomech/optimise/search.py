@@ -66,7 +66,7 @@ class _Search:
     def optimum(self) -> Optimum:
         r = self.r
         own = r.loops.of(r.scene.gait)
-        start = self._told(self._start(own))
+        start = self._told(self._start())
         turn = abs(float(start.displacement[2]))
         first, *others = r.loops.starts(own, r.starts)
         self.keeping = Keeping(r.loops, r.system.singularity, first)
@@ -197,17 +197,13 @@ class _Search:
             power = lambda alpha, alphadot, xi: norm(alpha, alphadot) ** r.degree
         return Phases(r.loops, _inside(table.velocity, (-r.extent, r.extent)), power, r.degree if r.aim.costs else 1.0)
 
-    def _start(self, own) -> Gait:
-        """The scene's gait; where that goes beyond the limits, drawn together so as to keep them."""
-        r, gait = self.r, self.r.scene.gait
-        if not isinstance(r.loops, Loops):
-            return gait
-        off = np.abs(gait.cycle(series.DENSE)[0] - r.loops.middle).max(0)
-        if (off > r.loops.half * (1 + 1e-3)).any():
+    def _start(self) -> Gait:
+        """The gait to begin with; a note where that is not the scene's."""
+        r = self.r
+        if r.gait is not r.scene.gait:
             limit = f"{r.loops.within:g} rad" if np.ndim(r.loops.within) == 0 else "its limits"
             note(f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one")
-            return r.loops.gait(r.loops.fitted(own))
-        return gait
+        return r.gait
 
     def _turned_to(self, p: np.ndarray) -> Gait:
         """The gait; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
