@@ -13,6 +13,7 @@ from geomech.optimise import checked, optimise
 from geomech.optimise import loops as series
 from geomech.optimise.aims import Aim
 from geomech.optimise.cycles import Phases, Runs, brought
+from geomech.optimise.keeping import Keeping
 from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
 from geomech.output import optima
@@ -56,9 +57,9 @@ def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, mediu
     system = Swimmer(medium, ODD if joints == 2 else Chain((0.7, 1.4, 0.9, 0.5), frame="link-2"))
     loops, p = some_loop(joints=joints)
     degree = 2.0 if medium is FLUID else 1.0
-    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power
+    power = lambda alpha, alphadot, xi: system.work(alpha, alphadot, xi).power / system.length
     by_phase = Phases(loops, system.velocity, power, degree)(p)
-    by_run = Runs(loops, system.run, True, degree, step=1e-6)(p)
+    by_run = Runs(loops, system.run, True, degree, system.length, step=1e-6)(p)
     for name in ("net", "swing", "length", "power"):
         (value, found), (same, rise) = getattr(by_phase, name), getattr(by_run, name)
         assert value == pytest.approx(same, rel=1e-9), name
@@ -139,6 +140,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.best.work == pytest.approx(2 * np.pi * power.mean(), rel=1e-10)
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
     Study(scene).displacement("area", amplitudes=[1.0])  # its field holds it
+    assert scene.numerics.extent == 2.5  # and is no larger than need be
     numbers = json.loads(json.dumps(cheap.numbers()))
     assert list(numbers) == [
         "objective", "value", "start_value", "displacement", "path_length", "work", "gait", "evaluations", "seconds",
@@ -533,6 +535,10 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     own, found = (optimise(s, "efficiency", harmonics=2) for s in (scene.changed(gait=Circle()), table))
     assert found.value == pytest.approx(own.value, abs=found.estimate + 1e-3 * own.value)
     assert (found.best.work is None) == (own.best.work is None)
+    if scene.system.cost is not None:
+        assert table.system.cost([0.3, -0.5], [1.0, 2.0]) == pytest.approx(
+            scene.system.cost([0.3, -0.5], [1.0, 2.0]), rel=1e-4
+        )
     with pytest.raises(SceneError, match="outside the field that the scene has: -2.5 to 2.5"):
         checked(table, "displacement", within=3.0)
 
@@ -590,11 +596,26 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
 
 
 def test_a_sine_has_the_power_of_its_own_gait_for_speed():
-    scene = geomech.load("sandfish-loose")
-    asked = checked(scene, "speed")
-    alpha, alphadot = scene.gait.cycle(128)
-    power = scene.system.work(alpha, alphadot, scene.system.velocity(alpha, alphadot)).power.mean()
-    assert asked.aim.power == pytest.approx(power / scene.system.length, rel=1e-6)
+    from rft import Backbone
+
+    system = Swimmer(SAND, Backbone(elements=24, length=0.1))
+    sine = Sine(amplitude=0.2, waves=1.0, elements=24, frequency=2.0)
+    asked = checked(Scene(system, sine), "speed")
+    alpha, alphadot = (np.array(x) for x in sine.cycle(128))
+    per_second = 2 * np.pi * 2.0 * alphadot
+    power = system.work(alpha, per_second, system.velocity(alpha, per_second)).power.mean()
+    assert asked.aim.power == pytest.approx(power / 0.1, rel=1e-6)
+
+
+def test_other_starts_are_made_one_stroke():
+    loops, first = Loops(2, 3, 2.5), Loops(2, 3, 2.5).of(Circle())
+    twice = np.zeros(loops.shape)
+    twice[3], twice[4], twice[1], twice[2] = (1.0, 0.0), (0.0, 1.0), (0.4, 0.0), (0.0, 0.4)
+    for own, one in ((first, True), (twice, False)):
+        keeping = Keeping(loops, None, own)
+        assert keeping.stroke is one
+        assert Stroke.is_one(loops, keeping.start(twice)) is one
+        assert np.array_equal(keeping.start(first), first)
 
 
 def test_loops_on_maps_of_all_kinds(stroke):
@@ -602,13 +623,14 @@ def test_loops_on_maps_of_all_kinds(stroke):
     import dataclasses
 
     from geomech.output import plots
-    from geomech.output.plots.optimum import held
+    from geomech.output.plots.optimum import along, held
     from rft.effects import Transient
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
     titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
     assert "CCF of the displacement, frame mean" in titles
     assert "singular shapes" in snake.active
+    assert 0.1 < (held(snake, along(snake)) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
     stepped = dataclasses.replace(stroke, request=dataclasses.replace(stroke.request, scene=past))
     assert set(held(stepped, None)) == {"loop"}

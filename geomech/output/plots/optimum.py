@@ -17,6 +17,7 @@ from geomech.stretch import stretch
 from geomech.study.bench import Study
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
+NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is held by them
 PHASES = 721
 HOLDS = {  # what holds a loop: colour, text
     "zero": ("black", "runs along the zero line"),
@@ -58,7 +59,7 @@ def held(optimum: Optimum, field: Field | None) -> np.ndarray:
         out = np.where(value <= NEAR_ZERO * top, "zero", out)
     if "singular shapes" in optimum.active:
         away = np.abs(optimum.scene.system.singularity(alpha))
-        out = np.where(away <= away.min() * (1 + NEAR_ZERO), "singular", out)
+        out = np.where(away <= away.min() * (1 + NEAR_SINGULAR), "singular", out)
     box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
     near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
     return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", out)
