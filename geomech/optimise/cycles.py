@@ -39,7 +39,7 @@ class Phases:
 
     def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
         self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
-        self.count, self.last, self.warm = 0, None, "start" in inspect.signature(velocity).parameters
+        self.count, self.last, self.warm = 0, None, _begins(velocity)
 
     def __call__(self, p: np.ndarray) -> Brought:
         loops, d = self.loops, self.loops.joints
@@ -109,6 +109,14 @@ class Runs:
         n = len(x) // 2
         rise = (x[1 : n + 1] - x[n + 1 :]) / (2 * self.step * self.loops.unit)
         return x[0], np.moveaxis(rise, 0, -1).reshape(*x.shape[1:], *shape)
+
+
+def _begins(velocity: Callable) -> bool:
+    """Whether a velocity may be told where to begin."""
+    try:
+        return "start" in inspect.signature(velocity).parameters
+    except (TypeError, ValueError):  # of compiled code
+        return False
 
 
 def brought(run, power, degree: float) -> tuple:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from geomech.errors import SceneError, check_angle, is_number, number, real_array, short
@@ -10,9 +12,10 @@ from geomech.systems.base import System
 
 LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
 Within = float | tuple[tuple[float, float], ...]
+Asked = float | Sequence[float] | Sequence[Sequence[float]] | None
 
 
-def limits(scene: Scene, within, phases: int) -> Within:
+def limits(scene: Scene, within: Asked, phases: int) -> Within:
     """``within`` as `geomech.optimise.loops.Loops` takes it: a number, all joints being that near to 0, or a pair (lowest,
     highest) for each. None: as far as the field goes, or the scene's gait if that goes further; all of a stored table.
     ValueError for what lies outside the field that a scene has."""

@@ -13,7 +13,7 @@ from geomech.errors import SceneError, named, number
 from geomech.gaits import Gait, Sine
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
-from geomech.optimise.limits import limits
+from geomech.optimise.limits import Asked, limits
 from geomech.optimise.loops import DENSE, Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
@@ -128,7 +128,7 @@ class Request:
 
 
 def checked(
-    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within=None,
+    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: Asked = None,
     starts: int = 1, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
     """The request, or SceneError, one line, for one that makes no sense."""
@@ -172,21 +172,19 @@ def _stays(system: System) -> bool:
 
 
 def _own_rate(scene: Scene) -> float:
-    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency; else 1 rad a unit of time."""
-    if scene.frequency is None:
-        return 1.0
-    return float(2 * np.pi * scene.frequency * np.abs(scene.gait.cycle(PHASES)[1]).max())
+    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of time."""
+    return float(2 * np.pi * (scene.frequency or 0.0) * np.abs(scene.gait.cycle(PHASES)[1]).max()) or 1.0
 
 
 def _own_power(scene: Scene) -> float:
-    """The mean power of the scene's gait at its frequency, or at 1 rad of phase a unit of time; refused where a speed is."""
+    """The mean power of the scene's gait at its frequency, or at 1 rad of phase a unit of time; 1 where it rests."""
     gait, system = scene.gait, scene.system
     done = system.run(*gait.cycle(PHASES), True).work
-    per_second = 1.0 if scene.frequency is None else 2 * np.pi * scene.frequency
-    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.power_degree)
+    per_second = 2 * np.pi * scene.frequency if scene.frequency else 1.0
+    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.power_degree) or 1.0
 
 
-def _loops(scene: Scene, harmonics: int | None, within) -> Loops | Undulations:
+def _loops(scene: Scene, harmonics: int | None, within: Asked) -> Loops | Undulations:
     gait, system, n = scene.gait, scene.system, scene.numerics
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("within", within)):

@@ -17,6 +17,7 @@ from geomech.optimise import loops as series
 from geomech.optimise.climb import TRIES, climb
 from geomech.optimise.cycles import Brought, Phases, Runs, brought
 from geomech.optimise.keeping import NEARLY, Keeping
+from geomech.optimise.limits import Asked
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
 from geomech.optimise.request import FINISH, NEAR, RUNS, Request, checked
@@ -36,7 +37,7 @@ ENOUGH = 64  # harmonics that any start is told in
 
 def optimise(
     scene: Scene, aim: str = "displacement", direction: str | None = None, harmonics: int | None = None,
-    within=None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
+    within: Asked = None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
     """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
