@@ -27,6 +27,7 @@ from geomech.errors import real_array
 from geomech.field import Field
 from rft import se2
 
+ROUNDING = 1e-10  # of A^theta: above what the linear solve leaves of a gradient
 TOLERANCE, STEPS = 1e-12, 1000  # of conjugate gradients: residual over the right side; some twenty steps are usual
 
 
@@ -82,7 +83,10 @@ def minimum_perturbation(connection: Connection) -> Frame:
     flat, a = (basis.at_nodes(basis.coefficients(x)) for x in w)  # (d, nodes)
     beta, off_turn = basis.least(a, np.zeros_like(a))
     beta = beta - _middle(connection, basis.on_grid(beta))
-    a = a + basis.gradient(beta)
+    left = a + basis.gradient(beta)
+    a = (
+        left if np.abs(left).max() > ROUNDING * np.abs(a).max() else np.zeros_like(a)
+    )  # of a pure gradient nothing is left
     z, off_shift = basis.least(np.exp(-1j * basis.at_nodes(beta)) * flat, a)
     beta, z = basis.on_grid(beta), basis.on_grid(z)
     z = np.exp(1j * beta) * z

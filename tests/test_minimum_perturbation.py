@@ -209,3 +209,15 @@ def test_its_file_and_pictures(tmp_path):
     for k, ax in enumerate(fig.axes[:3]):
         drawn = np.reshape(np.ma.getdata(ax.collections[0].get_array()), (15, 15)).T
         assert drawn == pytest.approx(scene.system.field.field.values[k])
+
+
+def test_a_connection_that_turns_by_a_gradient_alone():
+    """The differential drive: of A^theta nothing is left, and in the middle the CCF is the cart's own."""
+    study = Study(scenes.load("differential-drive"))
+    frame, c = smallest(study.fitted)
+    assert np.abs(c.A[2]).max() < 1e-10 * np.abs(study.fitted.A[2]).max()
+    assert frame.residual < 1e-10
+    assert size(c) < size(study.fitted)
+    cart, n = study.scene.system, len(c.axes[0]) // 2
+    middle = [0, -(cart.wheel_radius**2) / cart.track, 0]
+    assert curvature.ccf(c).values[:, n, n] == pytest.approx(middle, abs=1e-4)

@@ -340,7 +340,7 @@ def test_singular_shapes_are_kept_away_from():
         ("sandfish-loose", {"harmonics": 3}, "amplitude and waves are sought"),
         ("sandfish-loose", {"within": 1.0}, "amplitude and waves are sought"),
         ("sandfish-loose", {"aim": "speed", "rate": 1.0}, "say --power"),
-        ("three-link-floating", {}, "goes nowhere in its frame 'mean'"),
+        ("three-link-floating", {}, "goes nowhere: its mean frame stays"),
         ("three-link-ideal-fluid", {"aim": "speed", "power": 1.0}, "has none: say --rate"),
         ("three-link-viscous", {"within": [1.0]}, "one for each of 2 joints"),
         ("three-link-viscous", {"within": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -153,7 +154,7 @@ def checked(
         if wanted.costs:
             request.degree  # noqa: B018 - refuses what has none
         if wanted.straight and _stays(system):
-            raise SceneError(f"the {system.kind} goes nowhere in its frame {system.frame!r}: optimize for turning")
+            raise SceneError(f"the {system.kind} goes nowhere: its mean frame stays where it is; optimize for turning")
         return request
 
 
@@ -163,9 +164,11 @@ def told_by(system: System) -> str:
 
 
 def _stays(system: System) -> bool:
-    """Whether no change of shape moves the frame, at a few shapes that stand for all."""
+    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
     if system.steps or not system.linear or system.stored("connection"):
         return False
+    with contextlib.suppress(ValueError, TypeError):
+        system = system.in_frame("mean")
     rng = np.random.default_rng(0)
     xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
     return bool(np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi)))

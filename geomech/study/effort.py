@@ -45,10 +45,15 @@ def why_none(system: System) -> str:
         power = (
             "its power is of no one degree in the rate" if hasattr(system, "work") else "nothing says what moving costs"
         )
-        return f"no metric with {system.blames}: {power}"
+        return f"no metric with {_who(system)}: {power}"
     if not system.linear and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
-    return "" if _even(system) else f"no metric with {system.blames}: one way costs another power than the way back"
+    return "" if _even(system) else f"no metric with {_who(system)}: one way costs another power than the way back"
+
+
+def _who(system: System) -> str:
+    """What of a system is to blame; the whole where no premise is lacking."""
+    return system.blames or f"this {system.kind}"
 
 
 def _even(system: System) -> bool:
