@@ -65,7 +65,7 @@ def draw(numbers: dict):
             net = float(np.hypot(*best.displacement[:2]))
             ax.plot(
                 *best.gait.shape(np.linspace(0, 2 * np.pi, PHASES)).T, color=colour, lw=1.6,
-                label=f"{aim}: {net:.3f} BL, path length {best.length:.2f}",
+                label=f"{aim}: {net:.3f} BL, path {best.length:.2f}",
             )  # fmt: skip
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
     fig.suptitle("CCF along the displacement, minimum-perturbation frame", fontsize=9)
