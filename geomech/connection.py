@@ -145,33 +145,63 @@ def sampled(
     mirror: bool = False,
     singularity: Callable | None = None,
 ) -> list[np.ndarray]:
-    """What ``keep`` keeps of the velocity at every shape of a grid for the directions ``unit`` (C, d) of alphadot: keep takes
-    xi (s, C, 3) at some shapes and gives arrays (..., s), here (..., N_1, ..., N_d). Velocities themselves are not kept:
-    of 2,000,000 shapes and 1,000 directions they would fill 48 GB."""
+    """`sampled_at` at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
-    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
-    mirror = mirror and all(np.array_equal(a, -a[::-1]) for a in axes)
+    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    return sampled_on(velocity, alpha, unit, keep, progress, mirror, singularity)
+
+
+def sampled_on(
+    velocity: Velocity,
+    alpha,
+    unit,
+    keep: Callable,
+    progress: Callable | None = None,
+    mirror: bool = False,
+    singularity: Callable | None = None,
+) -> list[np.ndarray]:
+    """`sampled_at` on a mesh of shapes alpha (N_1, ..., d); arrays are (..., N_1, ...), nan where shapes are singular."""
+    flat, shape = alpha.reshape(-1, alpha.shape[-1]), alpha.shape[:-1]
+    fields = sampled_at(velocity, flat, unit, keep, progress, mirror, masked=singularity is not None)
+    fields = [x.reshape(*x.shape[:-1], *shape) for x in fields]
+    if singularity is not None:
+        mask = crossed(singularity(alpha))
+        fields = [np.where(mask, np.nan, x) for x in fields]
+    return fields
+
+
+def sampled_at(
+    velocity: Velocity,
+    alpha,
+    unit,
+    keep: Callable,
+    progress: Callable | None = None,
+    mirror: bool = False,
+    masked: bool = False,
+) -> list[np.ndarray]:
+    """What ``keep`` keeps of the velocity at shapes alpha (S, d) for the directions ``unit`` (C, d) of alphadot: keep takes xi
+    (s, C, 3) at some shapes and gives arrays (..., s), here (..., S). Velocities themselves are not kept: of 2,000,000 shapes
+    and 1,000 directions they would fill 48 GB. mirror: as in `fit`, of shapes that read backwards are those of the other
+    side, as on a grid in C order."""
+    mirror = mirror and np.array_equal(alpha, -alpha[::-1])
+    alpha = alpha[:, None]
     todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
     step = max(1, SAMPLES_TOGETHER // len(unit))
     fields: list[np.ndarray] = []
     for k in range(0, todo, step):
         here = slice(k, min(k + step, todo))
-        xi = evaluate(velocity, alpha[here], unit, masked=singularity is not None)
+        xi = evaluate(velocity, alpha[here], unit, masked=masked)
         kept = keep(xi)
         fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in kept]
         _put(fields, here, kept)
-        # In C order alpha -> -alpha is the grid read backwards; there xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
+        # There xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
         if twins := min(here.stop, len(alpha) - todo) - k:
             there = slice(len(alpha) - k - twins, len(alpha) - k)
             _put(fields, there, keep([-1.0, 1.0, 1.0] * xi[:twins][::-1]))
         if progress:
             progress(here.stop / todo)
-    fields = [x.reshape(*x.shape[:-1], *map(len, axes)) for x in fields]
-    if singularity is not None:
-        mask = crossed(singularity(alpha[:, 0]).reshape(*map(len, axes)))
-        fields = [np.where(mask, np.nan, x) for x in fields]
     return fields
 
 
@@ -232,6 +262,12 @@ def fit(
     unit = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = tried(velocity, axes, singularity is not None)
+    keep = least_squares(unit)
+    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, singularity), degree)
+
+
+def least_squares(unit: np.ndarray) -> Callable:
+    """A `keep` of `sampled_at`: A (3, d, s) that fits best, rms (3, s) of what it leaves and of xi itself."""
     inverse = np.linalg.pinv(unit)
 
     def keep(xi):
@@ -239,4 +275,4 @@ def fit(
         residual = np.sqrt(((xi - np.einsum("ijs,cj->sci", A, unit)) ** 2).mean(1)).T
         return A, residual, np.sqrt((xi**2).mean(1)).T
 
-    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, singularity), degree)
+    return keep

@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
-from geomech.connection import Connection
+from geomech.connection import SAMPLES_TOGETHER, Connection
 from geomech.curvature import ccf
 from geomech.errors import number, real_array
 from geomech.field import Field
@@ -57,6 +58,14 @@ class TwoForm:
         shapes[..., i], shapes[..., j] = np.meshgrid(*axes, indexing="ij")
         return Field(axes, np.moveaxis(self.pair(i, j)(shapes), -1, 0), self.field.degree)
 
+    @property
+    def joints(self) -> int:
+        return self.field.joints
+
+    def inside(self, alpha) -> np.ndarray:
+        """As `Field.inside`."""
+        return self.field.inside(alpha)
+
     def __call__(self, alpha, u, v) -> np.ndarray:
         """CCF(u, v) (..., 3) at shapes alpha (..., d), for changes of shape u, v (..., d)."""
         i, j = np.array(self.pairs).T
@@ -73,10 +82,10 @@ def two_form(connection: Connection) -> TwoForm:
     return TwoForm(Field(connection.axes, values, connection.degree), pairs)
 
 
-@dataclass(frozen=True)
-class Spanned:
+class Spanned(NamedTuple):
     """Displacement (B, 3) by the integral over a cone from the mean of the loop. other: by cones from shapes on the loop,
-    (B, tips, 3). spread: (B, 2), the largest distance between them, of positions and of headings: what hangs on the surface."""
+    (B, tips, 3). spread: (B, 2), the largest distance between them, of positions in the form's unit of length and of headings
+    in rad: what hangs on the surface."""
 
     net: np.ndarray
     other: np.ndarray
@@ -84,21 +93,28 @@ class Spanned:
 
 
 def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4) -> Spanned:
-    """The area tier of a gait of any number of joints, for amplitudes (B,) or its own, and how much hangs on the surface.
-    ValueError where the gait leaves the field, whose box holds every cone over a loop in it."""
+    """The area tier of a gait of any number of joints, for amplitudes (B,) or its own, and how much hangs on the surface, by
+    ``tips`` others. ValueError where the gait leaves the field, whose box holds every cone over a loop in it."""
     number("phases", phases, 8, 1e6, whole=True)
-    number("tips", tips, 1, phases, whole=True)
-    if checked_gait(gait).joints != form.field.joints:
-        raise ValueError(f"the gait moves {gait.joints} joints, the field has {form.field.joints}")
+    number("tips", tips, 0, phases, whole=True)
+    if checked_gait(gait).joints != form.joints:
+        raise ValueError(f"the gait moves {gait.joints} joints, the field has {form.joints}")
     amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
-    alpha, alphadot = gait.cycle(int(phases), amplitudes)  # (B, N, d)
-    form.field.inside(alpha)
-    net = _cone(form, alpha, alphadot, alpha.mean(1, keepdims=True))
-    at = (np.arange(tips) * phases) // tips
-    other = np.stack([_cone(form, alpha, alphadot, alpha[:, k : k + 1]) for k in at], 1)
+    at_once = max(1, SAMPLES_TOGETHER // int(phases))
+    groups = [amplitudes[k : k + at_once] for k in range(0, max(1, len(amplitudes)), at_once)]
+    net, other = map(np.concatenate, zip(*(_cones(form, gait, some, int(phases), int(tips)) for some in groups)))
     apart = other - net[:, None]
-    spread = np.stack([np.hypot(apart[..., 0], apart[..., 1]).max(1), np.abs(apart[..., 2]).max(1)], -1)
+    spread = np.stack([np.hypot(apart[..., 0], apart[..., 1]), np.abs(apart[..., 2])], -1).max(1, initial=0.0)
     return Spanned(net, other, spread)
+
+
+def _cones(form: TwoForm, gait: Gait, amplitudes, phases: int, tips: int) -> tuple[np.ndarray, np.ndarray]:
+    """exp of the integrals over the cone from the mean shape (B, 3), and over those from shapes on the loop (B, tips, 3)."""
+    alpha, alphadot = gait.cycle(phases, amplitudes)  # (B, N, d)
+    form.inside(alpha)
+    on_loop = [alpha[:, k * phases // tips, None] for k in range(tips)]
+    first, *others = (_cone(form, alpha, alphadot, tip) for tip in (alpha.mean(1, keepdims=True), *on_loop))
+    return first, np.stack(others, 1) if others else np.zeros((len(alpha), 0, 3))
 
 
 def _cone(form: TwoForm, alpha, alphadot, tip) -> np.ndarray:

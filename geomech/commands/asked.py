@@ -108,6 +108,74 @@ def field(
     return study
 
 
+MOST_PAIRS = 10  # of joints in a figure: those of five
+
+
+def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
+    """The planes of shape space that ``--pair`` and ``--slice`` ask for, of all pairs of joints or one; other joints are where
+    the middle of the scene's gait is, unless they are told."""
+    from itertools import combinations
+
+    from geomech.commands.options import numbers
+    from geomech.study.cost import of_planes, price
+    from geomech.tiers import TIERS
+
+    scene, joints = study.scene, study.scene.system.joints
+    with named(scene.name):
+        TIERS["path"].refuse(scene.system)
+        if joints == 1:
+            raise SceneError("a body of one joint has no map: a loop of it encloses no area")
+        pairs = [_pair(pair, joints)] if pair is not None else list(combinations(range(joints), 2))
+        if len(pairs) > MOST_PAIRS:
+            raise SceneError(
+                f"{joints} joints have {len(pairs)} pairs: say which with --pair, such as --pair 1,{joints}"
+            )
+        angles = numbers("--slice", slice_, angle=None) if slice_ is not None else None
+        at = [_held(scene, one, angles, pair is not None) for one in pairs]
+        allow(scene, price(of_planes(scene, len(pairs))), yes, WORTH_SAYING)
+    with terminal.progress(f"planes of {scene.name}") as bar:
+        return [
+            study.plane(one, shape, progress=lambda done, k=k: bar((k + done) / len(pairs)))
+            for k, (one, shape) in enumerate(zip(pairs, at))
+        ]
+
+
+def _pair(text: str, joints: int) -> tuple[int, int]:
+    """Joints from 0 of 1,3."""
+    found = text.split(",")
+    if len(found) != 2 or not all(x.strip().isdecimal() for x in found):
+        raise SceneError(f"--pair: {text!r} is not two joints such as 1,{joints}")
+    i, j = (int(x) - 1 for x in found)
+    if i == j or not all(0 <= k < joints for k in (i, j)):
+        raise SceneError(f"--pair: {text!r} must be two different joints from 1 to {joints}")
+    return i, j
+
+
+def _held(scene, pair: tuple[int, int], angles: list[float] | None, alone: bool):
+    """The shape through which the plane of a pair of joints goes. alone: angles may be those of the joints that it holds."""
+    import numpy as np
+
+    at, held = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
+    if angles is not None and not held:
+        raise SceneError("--slice says where other joints are held, and this body has but two: drop it")
+    if angles is None:
+        return at
+    extent = scene.numerics.extent
+    if not (scene.system.stored("connection") or all(abs(a) <= extent for a in angles)):
+        raise SceneError(
+            f"--slice: the angles must lie within the field's {extent:g} rad: give others, or raise --extent"
+        )
+    if len(angles) == len(at) > 1:
+        return np.array(angles)
+    if len(angles) != 1 and not (alone and len(angles) == len(held)):
+        ways = f"{len(held)} one by one, " * (alone and len(held) > 1) + "or "
+        raise SceneError(
+            f"--slice takes one angle for all joints that are held, {ways}{len(at)} for a shape, got {len(angles)}"
+        )
+    at[held] = angles
+    return at
+
+
 def beside_field(study, frame: str, yes: bool):
     """The study of the same scene in another body frame, with its field computed."""
     from geomech.study.cost import built, price

@@ -7,8 +7,17 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field
-from geomech.commands.options import BesideOption, ExtentOption, GridOption, SceneArgument, YesOption
+from geomech.commands.asked import beside_field, field, loaded, planes
+from geomech.commands.options import (
+    BesideOption,
+    ExtentOption,
+    GridOption,
+    PairOption,
+    SceneArgument,
+    SliceOption,
+    YesOption,
+    check_outputs,
+)
 from geomech.errors import SceneError, choose
 
 
@@ -22,10 +31,13 @@ def ccf(
     stretch: Annotated[
         bool, typer.Option("--stretch", help="redraw shape space: equal lengths cost equal effort")
     ] = False,
+    pair: PairOption = None,
+    slice_: SliceOption = None,
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
-    """The CCF map with the scene's gait drawn on it."""
+    """The CCF map with the scene's gait drawn on it. Of three and more joints: a slice for each pair, or for one, with the
+    others held."""
     from geomech.output import plots
 
     if style is not None:
@@ -34,6 +46,12 @@ def ccf(
         raise SceneError("--stretch is a map of its own: drop --style, --metric and --beside")
     if metric and style not in (None, "map"):
         raise SceneError(f"--metric draws on a map: drop --style {style}")
+    scene = loaded(name, grid, extent)
+    if scene.system.joints > 2 or pair is not None or slice_ is not None:
+        if metric or stretch:
+            raise SceneError("--metric and --stretch are those of two joints: drop them for slices")
+        plots.save(_slices(scene, plot, style or "map", (pair, slice_), beside, yes), plot)
+        return
     study = field(name, grid, extent, plot, plot, True, yes, with_gait=True, metric=metric or stretch)
     system, told = study.scene.system, {"gaits": [study.scene.gait], "unit": study.scene.system.unit}
     told |= {"error": study.curvature_error, "labels": system.shape_labels}
@@ -49,3 +67,19 @@ def ccf(
             told |= {"beside": (other.curvature, other.curvature_error), "names": [study.scene.frame, beside]}
         maps = plots.ccf_figure(study.curvature, **told)
     plots.save(maps, plot)
+
+
+def _slices(scene, plot: Path, style: str, asked: tuple, beside: str | None, yes: bool):
+    """The figure of `planes_figure` that a scene is asked for."""
+    from geomech.output import plots
+    from geomech.study.bench import Study
+
+    study, system = Study(scene), scene.system
+    check_outputs(scene, None, plot)
+    found, told = planes(study, *asked, yes), {"unit": system.unit, "labels": system.shape_labels, "style": style}
+    if beside is not None:
+        if len(found) > 1:
+            raise SceneError("--beside draws one pair of joints: say which with --pair")
+        (other,) = planes(study.in_frame(beside), *asked, yes)
+        told |= {"beside": other, "names": [scene.frame, beside]}
+    return plots.planes_figure(found, scene.gait, **told)

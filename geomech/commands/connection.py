@@ -7,15 +7,18 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field
+from geomech.commands.asked import beside_field, field, loaded, planes
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
     GridOption,
+    PairOption,
     PlotOption,
     SceneArgument,
+    SliceOption,
     YesOption,
     check_netcdf,
+    check_outputs,
 )
 from geomech.errors import SceneError, choose
 
@@ -29,12 +32,15 @@ def connection(
     sign: Annotated[Optional[str], typer.Option(help="of a .mat file: + for xi = + A alphadot (as is), or -")] = None,
     order: Annotated[Optional[str], typer.Option(help="of a .mat file: ndgrid (as is) or meshgrid")] = None,
     style: Annotated[Optional[str], typer.Option(help="of the plot: quiver or streamlines")] = None,
+    pair: PairOption = None,
+    slice_: SliceOption = None,
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
     from geomech.files import note
     from geomech.output import mat, netcdf, plots
+    from geomech.study.bench import Study
     from geomech.tables import ORDERS, SIGNS
 
     check_netcdf(out, matlab=True)
@@ -43,13 +49,18 @@ def connection(
             choose(option, word, known)
             if out.suffix == ".nc":
                 raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
-    if plot is None and (style or beside):
-        raise SceneError("--style and --beside are those of a figure: say --plot FILE")
+    if plot is None and not (style, pair, slice_, beside) == (None,) * 4:
+        raise SceneError("--style, --pair, --slice and --beside are those of a figure: say --plot FILE")
     if style is not None:
         choose("--style", style, plots.CONNECTION_STYLES)
-    study = field(
-        name, grid, extent, out, plot, plot is not None or out.suffix == ".mat", yes, harmonics=out.suffix == ".nc"
-    )
+    scene = loaded(name, grid, extent)
+    sliced = plot and (scene.system.joints > 2 or pair is not None or slice_ is not None)
+    if sliced:
+        if beside is not None:
+            raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
+        check_outputs(scene, out, plot)
+        found = planes(Study(scene), pair, slice_, yes)
+    study = field(name, grid, extent, out, plot, out.suffix == ".mat", yes, harmonics=out.suffix == ".nc")
     if out.suffix == ".nc":
         netcdf.save_connection(out, study)
     else:
@@ -59,6 +70,9 @@ def connection(
     if plot:
         system = study.scene.system
         told = {"labels": system.shape_labels, "style": style or "quiver"}
+        if sliced:
+            plots.save(plots.plane_connection_figure(found, system.unit, **told), plot)
+            return
         if beside is not None:
             told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
         plots.save(plots.connection_figure(study.fitted, system.unit, **told), plot)

@@ -55,6 +55,16 @@ YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more th
 BesideOption = Annotated[
     Optional[str], typer.Option("--beside", metavar="FRAME", help="draw another body frame below, on the same scales")
 ]
+PairOption = Annotated[
+    Optional[str],
+    typer.Option("--pair", metavar="I,J", help="joints on the axes, of three and more: 1,3 (all pairs if left out)"),
+]
+SliceOption = Annotated[
+    Optional[str],
+    typer.Option(
+        "--slice", metavar="ANGLES", help="of the joints that are held: 0.3 for each, or one by one 0.3,-20deg"
+    ),
+]
 PluginOption = Annotated[
     Optional[list[Path]],
     typer.Option(

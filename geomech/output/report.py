@@ -61,6 +61,12 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         if scene.system.carried:
             _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
         _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
+    elif "area" in study.methods:
+        study.compute_field(progress)
+        save_connection(folder / "connection.nc", study)
+        planes = [study.plane(pair) for pair in study.two_form.pairs]
+        _save(plots.plane_connection_figure(planes, unit, scene.system.shape_labels), folder / "connection")
+        _save(plots.planes_figure(planes, scene.gait, unit, scene.system.shape_labels), folder / "ccf")
     tables = {}
     for gait, some in zip(gaits, amplitudes):
         table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
@@ -76,7 +82,7 @@ def cost(scene: Scene) -> Cost:
     """Of `write`; SceneError, before anything is computed, for what it refuses."""
     gaits = _gaits(scene)
     counts, tiers = [len(reachable(scene, gait)) for gait in gaits], methods(scene.system)
-    with_metric = "path" in tiers and scene.system.joints == 2 and not effort.why_none(scene.system)
+    with_metric = {"path", "area"} & {*tiers} and scene.system.joints in (2, 3) and not effort.why_none(scene.system)
     metric = (
         [job for job in of_metric(scene) if job.what != "balances" or "harmonic" not in tiers] if with_metric else []
     )
@@ -142,10 +148,25 @@ def text_table(title: str, table: dict, scene: Scene) -> str:
         lines.append(
             f"medium: one standard deviation by its covariance, carried on by {' and '.join(rules)} propagation"
         )
+    lines += _surfaces(table, scene)
     lines += _effort(title, table, tiers)
     amplitude = re.sub(r"[$\\]", "", table["units"]["amplitude"])
     lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
     return "\n".join([*lines, _times(table), ""])
+
+
+def _surfaces(table: dict, scene: Scene) -> list[str]:
+    """How far tiers hang on the surface that a loop of three and more joints spans."""
+    lines = []
+    for m, spread in table.get("surface_spread", {}).items():
+        lines.append(
+            f"{m}: over a cone from the loop's mean shape; other surfaces that it spans differ by, which is in the error,"
+        )
+        lines.append(f"amplitude position ({scene.system.unit})  heading (rad)")
+        turned = table["surface_spread_heading"][m]
+        rows = zip(table["amplitude"], np.array(spread) * scene.system.length, turned)
+        lines += [f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows]
+    return lines
 
 
 def _effort(title: str, table: dict, tiers: list[str]) -> list[str]:

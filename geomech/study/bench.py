@@ -17,6 +17,7 @@ from geomech.field import Field, inside
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.metric import Finsler, Metric
+from geomech.plane import Plane
 from geomech.progress import progress as shown
 from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
@@ -26,7 +27,7 @@ from geomech.study.results import Displacements
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
-from geomech.tiers.path import axes
+from geomech.tiers.path import axes, plane
 from geomech.two_form import TwoForm, two_form
 
 
@@ -120,6 +121,14 @@ class Study:
         """The least-squares connection on the scene's grid."""
         return self.table("path")
 
+    def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
+        """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
+        that pair, without a field of all joints (`geomech.plane`)."""
+        s, at = self.scene, self.scene.gait.middle if at is None else at
+        with named(s.name):
+            make = lambda: plane(s.system, s.numerics, tuple(pair), at, progress)
+            return self._kept("plane", TIERS["path"].depends_on, (*pair, *at), make)[0]
+
     @property
     def two_form(self) -> TwoForm:
         """The CCF of all pairs of joints, of any number (`geomech.two_form`)."""
@@ -183,6 +192,13 @@ class Study:
             table = None if tier.is_direct(scene.system) else self.table(method, gait, amplitudes)
             return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
 
+    def choice(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
+        """(B, 2), body lengths and rad: how far `displacement` hangs on a choice of the tier's own, such as a surface that the
+        loop spans; None without one. Part of every estimate."""
+        s, tier, gait = self.scene, TIERS[method], self.scene.gait if gait is None else gait
+        table = None if tier.is_direct(s.system) else self.table(method, gait, amplitudes)
+        return None if table is None else tier.choice(table, s.system, gait, amplitudes, s.numerics)
+
     def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
         system, n = self.scene.system, self.scene.numerics
@@ -218,7 +234,7 @@ class Study:
         seconds, kept = self._built(chosen, gait, amplitudes, progress)
         if medium:
             seconds["medium"] = took
-        poses, errors, reference = {}, {}, None
+        poses, errors, choices, reference = {}, {}, {}, None
         for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
             if chosen[method].is_direct(self.scene.system):
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
@@ -228,10 +244,13 @@ class Study:
                 poses[method], seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
                 check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
                 errors[method], took = timed(check)
+                if (choice := self.choice(method, gait, amplitudes)) is not None:
+                    choices[method], errors[method] = choice, np.maximum(errors[method], choice)
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        table = tables.table(self.scene, gait, amplitudes, poses, errors, medium, seconds=seconds, kept=kept)
+        told = tables.of_choices({m: choices[m] for m in methods if m in choices})
+        table = tables.table(self.scene, gait, amplitudes, poses, errors, medium, **told, seconds=seconds, kept=kept)
         return Displacements(table, self.scene, gait)
 
     def _built(self, chosen: dict, gait: Gait, amplitudes, progress) -> tuple[dict[str, float], list[str]]:

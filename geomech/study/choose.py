@@ -65,7 +65,9 @@ def cheapest(
             continue
         if (apart(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
             poses = study.displacement(method, gait, amplitudes)
-            error = against_direct(scene, poses, gait, amplitudes)
+            error, choice = against_direct(scene, poses, gait, amplitudes), study.choice(method, gait, amplitudes)
+            if choice is not None:
+                error = np.maximum(error, choice)
             if error[:, 0].max() <= tol:
                 return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)

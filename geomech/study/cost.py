@@ -165,6 +165,14 @@ def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     return Job("balances", scene, gait if family else None, how.solves(system, n, 1, n.phases), memory=memory)
 
 
+def of_planes(scene: Scene, count: int) -> list[Job]:
+    """So many planes of two joints (`Study.plane`)."""
+    if scene.system.stored("connection"):
+        return []
+    solves = count * scene.numerics.grid**2 * TIERS["path"].directions(scene.system, scene.numerics)
+    return [Job("balances", scene, None, float(solves))]
+
+
 def of_metric(scene: Scene) -> list[Job]:
     """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics

@@ -36,6 +36,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     found = {m: of_pose(p) for m, p in poses.items()}
     units = {"amplitude": gait.amplitude_label, **dict.fromkeys(("x", "y", "net_distance"), unit), "heading": "rad"}
     units |= {"estimate": "BL", "estimate_heading": "rad", "seconds": "s"}
+    units |= {"surface_spread": "BL", "surface_spread_heading": "rad"} if "surface_spread" in more else {}
     if frequency is not None:
         units |= {"frequency": "Hz", "speed": f"{unit}/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s"}
         more = {"frequency": frequency, **_speeds(found, frequency, scene.system.length), **more}
@@ -50,6 +51,13 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
         "units": units,
         **more,
     }
+
+
+def of_choices(choices: Mapping) -> dict:
+    """{"surface_spread": {tier: [...]}, "surface_spread_heading": {tier: [...]}}, body lengths and rad, of tiers whose answer
+    hangs on the surface that a loop of three and more joints spans (B, 2); nothing for none."""
+    keys = ("surface_spread", "surface_spread_heading") if choices else ()
+    return {key: {m: c[:, k].tolist() for m, c in choices.items()} for k, key in enumerate(keys)}
 
 
 def _speeds(found: Mapping, frequency: float, length: float) -> dict:

@@ -1,4 +1,5 @@
-"""The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel."""
+"""The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel. A loop of
+three and more joints encloses no area but spans surfaces, and what hangs on their choice is told."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import Path, zeros
+from geomech.two_form import RADII, spanned, two_form
 from rft import se2
 
 
@@ -39,19 +41,34 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
 
 
 class Area(Path):
-    """Shares the connection of the path tier."""
+    """Shares the connection of the path tier. Of more than two joints it integrates the two-form over one of the surfaces that
+    the loop spans (`geomech.two_form`), and tells how far others are from it."""
 
     name, label = "area", "area integral of the CCF"
     style = {"color": "#D55E00", "linestyle": "--"}
-    joints = offered = range(2, 3)
+    joints, offered = range(2, 10_001), range(2, 4)
+    takes_joints, instead = "takes two joints and more, of which a loop encloses area", "use path or direct"
     whole = True
 
     def is_direct(self, system) -> bool:
         return False
 
+    def size(self, system, numerics) -> int:
+        d = system.joints
+        return super().size(system, numerics) + 3 * (d * (d - 1) // 2) * numerics.grid**d
+
     def sample(self, system, numerics) -> Callable | None:
-        field = zeros(system, numerics, (3, 1))
-        return lambda n: field(np.zeros((n, 2)))
+        d, nodes = system.joints, 1 if system.joints == 2 else RADII
+        field = zeros(system, numerics, (d * (d - 1) // 2, 3))
+        return lambda n: field(np.zeros((n * nodes, d)))
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
-        return area(ccf(table), gait, amplitudes, numerics.phases)
+        if system.joints == 2:
+            return area(ccf(table), gait, amplitudes, numerics.phases)
+        shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
+        return spanned(two_form(table), gait, amplitudes, numerics.phases, tips=0).net.reshape(*shape, 3)
+
+    def choice(self, table, system, gait, amplitudes, numerics) -> np.ndarray | None:
+        if system.joints == 2:
+            return None
+        return spanned(two_form(table), gait, amplitudes, numerics.phases).spread / [system.length, 1.0]

@@ -51,8 +51,8 @@ class Numerics:
 class Tier:
     """Base of all tiers. name: in scenes, options and tables. label: for legends. style: of its line. rests_on: premises
     without which it says nothing. needs: what these are lost for. joints: shape variables that it takes; offered: those
-    for which a plain study asks for it. looks_up: its table's name, of which tiers may share one, "" for none.
-    depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. on_grid: the table is a
+    for which a plain study asks for it; takes_joints, instead: in words, and what to do with others. looks_up: its table's
+    name, of which tiers may share one, "" for none. depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. on_grid: the table is a
     field on the scene's grid. whole: it must have no singular shapes. plain: a plain study asks for it.
     """
 
@@ -64,6 +64,7 @@ class Tier:
     joints = offered = range(1, 10_001)
     looks_up = ""
     depends_on: tuple[str, ...] = ()
+    takes_joints, instead = "takes a body of joints", "use direct"
     on_grid = False
     whole = False
     plain = True
@@ -77,7 +78,7 @@ class Tier:
         """ValueError if it says nothing of this system."""
         system.refuse(self.needs, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
-            raise ValueError(f"the {self.name} tier takes a body of two joints: use path, adapted or direct")
+            raise ValueError(f"the {self.name} tier {self.takes_joints}, this body has {system.joints}: {self.instead}")
         if self.whole and system.singularity is not None:
             raise ValueError(
                 f"the {self.name} tier sums a field up, and the {system.kind} has singular shapes: use path or direct"
@@ -115,6 +116,10 @@ class Tier:
     def predict(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray:
         """Net poses (..., 3) for amplitudes (...,), or the gait's own."""
         raise NotImplementedError
+
+    def choice(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray | None:
+        """(B, 2), body lengths and rad: how far positions and headings at amplitudes (B,) hang on what is no part of the
+        question, as a spanning surface; None where there is nothing to choose."""
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

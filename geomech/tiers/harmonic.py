@@ -17,6 +17,7 @@ class Harmonic(Path):
     name, label = "harmonic", "path integral, odd harmonics"
     style = {"color": "#009E73", "linestyle": ":"}
     joints = offered = range(2, 3)
+    takes_joints, instead = "takes a body of two joints", "use path, adapted or direct"
     looks_up = "harmonics"
     depends_on = ("grid", "extent", "harmonics", "interpolation")
     whole = True

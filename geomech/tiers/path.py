@@ -9,8 +9,10 @@ import numpy as np
 
 from geomech import connection
 from geomech.connection import Connection, Velocity
-from geomech.field import Field
+from geomech.field import Field, inside
 from geomech.gaits import Gait
+from geomech.plane import Plane, looked_up
+from geomech.plane import plane as fit_plane
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
 
@@ -33,6 +35,19 @@ def axes(system, numerics) -> tuple[np.ndarray, ...]:
             "methods = direct, which needs no field"
         )
     return connection.grid(system.joints, numerics.grid, numerics.extent)
+
+
+def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
+    """The plane of shape space on which two joints move (`geomech.plane`), looked up in a stored field; ValueError if there is
+    no connection, or if the plane lies outside the field."""
+    tier = Path()
+    tier.refuse(system)
+    if own := system.stored("connection"):
+        return looked_up(own, pair, at)
+    axis = connection.grid(1, numerics.grid, numerics.extent)[0]
+    at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
+    count, how = tier.directions(system, numerics), (system.mirror, system.singularity)
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how)
 
 
 def shapes(system, numerics) -> int:

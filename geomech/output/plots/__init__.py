@@ -4,7 +4,13 @@ you have a figure of pyplot open, else on a new one, which a notebook shows. Not
 
 from geomech.output.plots.displacements import displacement, displacement_figure, medium_band, net
 from geomech.output.plots.drag import drag_figure
-from geomech.output.plots.figures import ccf_figure, connection_figure, pairs_figure
+from geomech.output.plots.figures import (
+    ccf_figure,
+    connection_figure,
+    pairs_figure,
+    plane_connection_figure,
+    planes_figure,
+)
 from geomech.output.plots.maps import (
     COMPONENTS,
     FINEST,
@@ -73,6 +79,8 @@ __all__ = [
     "optimum_figure",
     "optimum_map",
     "pairs_figure", "penetration_figure",
+    "plane_connection_figure",
+    "planes_figure",
     "plates_figure",
     "quantity",
     "save",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from geomech.errors import choose
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.metric import Finsler, Metric
-from geomech.output.plots.maps import ANGLES, TITLES, Labels, ccf_map, largest, vector_field
+from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest, vector_field
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.output.plots.styles import (
     CCF_STYLES,
@@ -21,7 +22,10 @@ from geomech.output.plots.styles import (
     ccf_surface,
     streamlines,
 )
+from geomech.plane import Plane, Seen
 from geomech.two_form import TwoForm
+
+SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 
 @styled
@@ -68,6 +72,16 @@ def pairs_figure(
     return fig
 
 
+class Row(NamedTuple):
+    """Of maps of a CCF. error: of the field, or None. shadows: curves of gaits that move elsewhere, seen on the plane."""
+
+    field: Field
+    error: Field | None
+    gaits: Sequence = ()
+    labels: Labels = ANGLES
+    shadows: Sequence = ()
+
+
 @styled
 def ccf_figure(
     field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None, labels: Labels = ANGLES,
@@ -77,19 +91,75 @@ def ccf_figure(
     """All three components of the CCF side by side, with gaits drawn on them, as colours ("map"), "contours" or a "surface".
     metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
     frames."""
-    rows = [(field, error)] if beside is None else [(field, error), beside]
+    rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
+    return _ccf_rows(rows, unit, style, metric, names, same=True)
+
+
+@styled
+def planes_figure(
+    planes: Sequence[Plane], gait: Gait | None = None, unit: str = "BL", labels: Labels | None = None, style: str = "map",
+    beside: Plane | None = None, names: Sequence[str] = (),
+):  # fmt: skip
+    """The CCF of pairs of joints on planes of shape space, a row a pair, as `ccf_figure`. gait: of all joints; where it leaves
+    the plane it is dashed, as it is seen along the joints that are held, and has no area. labels: (name, unit) of all shape
+    variables. beside: the plane of a single one in another body frame, below on the same scales. names: of the two frames."""
+    labels, rows = labels or _angles(planes), []
+    for one in [*planes, *([] if beside is None else [beside])]:
+        seen = [] if gait is None else [Seen(gait, one)]
+        on, off = ([x for x in seen if x.lies == lies] for lies in (True, False))
+        rows.append(Row(one.ccf, one.error, on, [labels[k] for k in one.pair], off))
+    told = [f"{told_at(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
+    return _ccf_rows(rows, unit, style, None, told or [told_at(one, labels) for one in planes], same=beside is not None)
+
+
+@styled
+def plane_connection_figure(
+    planes: Sequence[Plane], unit: str = "BL", labels: Labels | None = None, style: str = "quiver"
+):
+    """The rows of A on planes of shape space, a row a pair of joints, as `connection_figure`: of the two that move. labels: as
+    for `planes_figure`."""
+    draw = {"quiver": vector_field, "streamlines": streamlines}[choose("style", style, CONNECTION_STYLES)]
+    labels = labels or _angles(planes)
+    fig, axes = figure(10.8, 3.0 + 2.7 * (len(planes) - 1), 3, len(planes), layout="compressed")
+    for one, row in zip(planes, axes):
+        for component, ax in enumerate(row):
+            draw(one.connection, component, unit, ax, labels=[labels[k] for k in one.pair])
+    _name(axes, [told_at(one, labels) for one in planes])
+    return fig
+
+
+def _angles(planes: Sequence[Plane]) -> Labels:
+    """Of shape variables that are joint angles."""
+    return [(f"alpha_{k + 1}", "rad") for k in range(len(planes[0].at))]
+
+
+def told_at(plane: Plane, labels: Labels) -> str:
+    """Where the joints are that are held on a plane."""
+    told = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.held)
+    return f"{told} {labels[plane.held[0]][1]}" if plane.held else ""
+
+
+def _ccf_rows(rows: Sequence[Row], unit: str, style: str, metric, names: Sequence[str], same: bool):
+    """Maps of the three components, a line of them for each row. same: on the same scales."""
     if choose("style", style, CCF_STYLES) == "surface":
-        fig = blank(11.4, 3.6 * len(rows))
+        fig = blank(11.8, 3.6 * len(rows))
         axes = fig.subplots(len(rows), 3, squeeze=False, subplot_kw={"projection": "3d"})
         fig.get_layout_engine().set(w_pad=0.25)
     else:
-        fig, axes = figure(10.8, 3.2 * len(rows), 3, len(rows), layout="compressed")
+        fig, axes = figure(10.8, 3.2 + 2.75 * (len(rows) - 1), 3, len(rows), layout="compressed")
     draw = {"map": ccf_map, "contours": ccf_contours, "surface": ccf_surface}[style]
     more = {"metric": metric} if style == "map" else {}
     for component in range(len(TITLES)):
-        top = None if beside is None else max(largest(f.values[component]) for f, _ in rows)
-        for (f, e), ax in zip(rows, axes[:, component]):
-            draw(f, component, gaits, unit, ax, e, labels, top=top, **more)
+        top = max(largest(r.field.values[component]) for r in rows) if same and len(rows) > 1 else None
+        for r, ax in zip(rows, axes[:, component]):
+            draw(r.field, component, r.gaits, unit, ax, r.error, r.labels, top=top, **more)
+            for shadow in r.shadows:
+                if style == "surface":
+                    ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
+                else:
+                    draw_gait(shadow, ax, within=r.field.axes, line="--")
+    if any(r.shadows for r in rows):
+        fig.supxlabel(SHADOW, fontsize=8)
     _name(axes, names)
     return fig
 
@@ -99,4 +169,4 @@ def _name(axes, names: Sequence[str]) -> None:
     for row, name in zip(axes, names):
         told = {"transform": row[0].transAxes, "rotation": 90, "ha": "center", "va": "center", "fontsize": 10}
         put = row[0].text2D if hasattr(row[0], "text2D") else row[0].text
-        put(-0.33 if put.__name__ == "text" else -0.1, 0.5, name, **told)
+        put(-0.33 if put.__name__ == "text" else -0.04, 0.5, name, **told)

@@ -248,11 +248,12 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 @styled
-def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None):
-    """The gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid."""
+def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None, line: str = "-"):
+    """The gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid. line: its
+    style."""
     ax, curve = axes_of(ax), gait.shape(PHASES)
     curve[~inside_of(curve, within or ())] = np.nan
-    ax.plot(*curve.T, color=color, lw=1.2)
+    ax.plot(*curve.T, line, color=color, lw=1.2)
     ax.plot(*curve[0], "o", color=color, ms=3)
     ahead = np.roll(np.arange(392), -50)  # an eighth of the way, or the next place inside
     start = next((k for k in ahead if np.isfinite(curve[[k, k + 8]]).all() and (curve[k] != curve[k + 8]).any()), None)

@@ -1,0 +1,216 @@
+"""Planes of shape space on which two joints of many move, the area tier of three joints, and what commands draw of them."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from test_cli import geomech
+
+from geomech import Numerics, Scene, Study, connection
+from geomech.gaits import Circle, Fourier, Wave
+from geomech.output import plots
+from geomech.plane import Plane, Seen, looked_up, plane
+from geomech.systems import Plain, Swimmer
+from geomech.two_form import spanned, two_form
+from rft import CATALOGUE, Chain, Viscous, se2
+
+GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+LOOP = Fourier(
+    cos=((0.5, 0.0), (0.1, 0.1), (-0.3, 0.1)), sin=((0.1, 0.1), (0.6, 0.0), (0.2, -0.2)), centre=(0.1, -0.2, 0.15)
+)
+SCENE = """[medium]
+law = "viscous"
+ratio = 2.3
+[body]
+kind = "chain"
+lengths = [0.7, 1.4, 0.9, 0.6]
+length = 0.5
+[gait]
+kind = "fourier"
+cos = [[0.5, 0.0], [0.1, 0.1], [-0.3, 0.1]]
+sin = [[0.1, 0.1], [0.6, 0.0], [0.2, -0.2]]
+centre = [0.1, -0.2, 0.15]
+[numerics]
+grid = 7
+extent = 1.2
+"""
+
+
+@dataclass(frozen=True)
+class Cubic(Plain):
+    """A of three joints in closed form. turns (-): scales its row of headings."""
+
+    turns: float = 1.0
+    kind, joints, linear, length = "cubic", 3, True, 0.5
+
+    def A(self, alpha):
+        a, b, c = np.moveaxis(np.asarray(alpha, float), -1, 0)
+        rows = [[b * c, 0.3 * a**2, 0.4 * b], [0.2 * c, 0.1 * a, a * b], [0.7 * b, a * c, 0.5 * b**2]]
+        return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1)) * [
+            [1],
+            [1],
+            [self.turns],
+        ]
+
+    def velocity(self, alpha, alphadot):
+        return np.einsum("...ij,...j->...i", self.A(alpha), alphadot)
+
+    def ccf(self, alpha, i, j):
+        """By hand."""
+        a, b, c = np.moveaxis(np.asarray(alpha, float), -1, 0)
+        d = {
+            (0, 1): [0.6 * a - c, 0.1 + 0 * a, self.turns * (c - 0.7)],
+            (0, 2): [-b, b - 0.2, 0 * a],
+            (1, 2): [0.4 + 0 * a, a, self.turns * (b - a)],
+        }[i, j]
+        A = self.A(alpha)
+        x, y = A[..., i], A[..., j]
+        bracket = [y[..., 2] * x[..., 1] - x[..., 2] * y[..., 1], x[..., 2] * y[..., 0] - y[..., 2] * x[..., 0], 0 * a]
+        return np.moveaxis(np.array(d) + np.array(bracket), 0, -1)
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2), (2, 0)])
+def test_planes_have_the_curvature_of_the_pair(pair):
+    system, at, (i, j) = Cubic(), [0.3, -0.2, 0.4], pair
+    study = Study(Scene(system, LOOP, Numerics(grid=7, extent=1.2)))
+    cut = study.plane(pair, at)
+    shapes = np.broadcast_to(at, (7, 7, 3)).copy()
+    shapes[..., i], shapes[..., j] = np.meshgrid(*cut.ccf.axes, indexing="ij")
+    right = system.ccf(shapes, i, j) if i < j else -system.ccf(shapes, j, i)
+    np.testing.assert_allclose(np.moveaxis(cut.ccf.values, 0, -1), right, atol=1e-12)
+    np.testing.assert_allclose(study.two_form.slice(i, j, at).values, cut.ccf.values, atol=1e-12)
+    np.testing.assert_allclose(looked_up(study.fitted, pair, at).connection.A, cut.connection.A, atol=1e-12)
+    assert study.plane(pair, at) is cut and cut.held == [k for k in range(3) if k not in pair]
+
+
+def test_a_plane_is_that_of_the_whole_field_in_sand():
+    system, axes = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6))), connection.grid(3, 5, 1.2)
+    fitted = system.fitted(axes, 16, 3)
+    for at, half in (([0.6, 0.6, -1.2], False), ([0.0, 0.0, 0.0], True)):
+        asked = []
+        velocity = lambda a, u: asked.append(len(a)) or system.velocity(a, u)
+        cut = plane(velocity, (axes[0], axes[2]), (0, 2), at, 16, mirror=True)
+        k = np.abs(axes[1] - at[1]).argmin()
+        for name in ("A", "residual", "speed"):
+            whole = getattr(fitted, name)[..., k, :]
+            np.testing.assert_allclose(
+                getattr(cut.connection, name), whole[:, [0, 2]] if name == "A" else whole, atol=1e-9
+            )
+        assert sum(asked) == (13 if half else 25)  # through the straight shape, left and right are alike
+
+
+def test_the_area_of_three_joints_is_the_integral_over_a_surface():
+    """Without brackets, the line integral of A on every surface (Stokes); with them positions hang on it, turning does not."""
+    sizes = np.array([0.4, 1.0])
+    flat = Study(Scene(Cubic(turns=0.0), LOOP, Numerics(grid=7, extent=1.2)))
+    along = (flat.scene.system.velocity(*LOOP.cycle(64, sizes))).mean(1) * 2 * np.pi
+    table = flat.study(sizes, ["area", "direct"])
+    np.testing.assert_allclose(table["area"], along, atol=1e-12)
+    assert np.abs(along[:, :2]).min() > 1e-3 and np.max(table["surface_spread"]["area"]) < 1e-12
+    study = Study(Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2)))
+    table = study.study(sizes, ["area", "direct"])
+    spread, turned = (np.array(table[key]["area"]) for key in ("surface_spread", "surface_spread_heading"))
+    assert (spread > 1e-4).all() and turned.max() < 1e-12
+    assert (np.array(table["estimate"]["area"]) >= spread).all()
+    off = np.array(table["area"]) - table["direct"]
+    np.testing.assert_allclose(table["estimate"]["area"], np.hypot(*off[:, :2].T) / 0.5, rtol=1e-6)
+    np.testing.assert_allclose(off[:, 2], 0.0, atol=1e-12)
+    small = study.study([0.05, 0.1], ["area"])["estimate"]["area"]
+    assert np.log2(small[1] / small[0]) == pytest.approx(3.0, abs=0.15)
+
+
+def test_the_spread_is_that_of_another_surface():
+    """The cone over the first shape of the loop, by brute force."""
+    system, sizes = Cubic(), [0.8]
+    study = Study(Scene(system, LOOP, Numerics(grid=7, extent=1.2, phases=256)))
+    found = []
+    for tip in (0, 64, 128, 192, None):
+        alpha, alphadot = (x[0] for x in LOOP.cycle(256, sizes))
+        at = alpha.mean(0) if tip is None else alpha[tip]
+        total = 0.0
+        for s in (np.arange(40) + 0.5) / 40:
+            u, v, where = alpha - at, s * alphadot, at + s * (alpha - at)
+            for i, j in ((0, 1), (0, 2), (1, 2)):
+                total += (system.ccf(where, i, j) * (u[:, i] * v[:, j] - u[:, j] * v[:, i])[:, None]).mean(0)
+        found.append(se2.exp(2 * np.pi * total / 40))
+    apart = max(np.hypot(*(x - found[-1])[:2]) for x in found) / 0.5
+    assert study.choice("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
+    np.testing.assert_allclose(study.displacement("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
+
+
+def test_commands_tell_the_surface_and_draw_slices(tmp_path):
+    (tmp_path / "s.toml").write_text(SCENE)
+    args = ("displacement", "s.toml", "--amplitudes", "0.5,1", "--methods")
+    code, out, err = geomech(*args, "area,direct", "--json", cwd=tmp_path)
+    table = json.loads(out)
+    assert (code, err) == (0, "") and table["units"]["surface_spread"] == "BL"
+    spread = table["surface_spread"]["area"]
+    assert 0 < spread[0] < spread[1] < table["estimate"]["area"][1]
+    lines = geomech(*args, "area", cwd=tmp_path)[1].splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("area: over a cone from the loop's mean shape"))
+    assert lines[at + 1].split()[:3] == ["amplitude", "position", "(m)"]
+    assert float(lines[at + 3].split()[1]) == pytest.approx(0.5 * spread[1], rel=0.06)
+    code, _, err = geomech(
+        "ccf", "s.toml", "--plot", "a.png", "--pair", "3,1", "--slice", "20deg", "--style", "contours", cwd=tmp_path
+    )
+    assert (code, err) == (0, "") and (tmp_path / "a.png").stat().st_size > 20_000
+    code, _, err = geomech("connection", "s.toml", "-o", "a.nc", "--plot", "b.svg", "--pair", "2,3", cwd=tmp_path)
+    assert (code, err) == (0, "") and "0.1 rad" in (tmp_path / "b.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["--pair", "1,4"], "s.toml: --pair: '1,4' must be two different joints from 1 to 3"),
+        (["--pair", "2,2"], "s.toml: --pair: '2,2' must be two different joints from 1 to 3"),
+        (["--pair", "one"], "s.toml: --pair: 'one' is not two joints such as 1,3"),
+        (["--slice", "0,1"], "s.toml: --slice takes one angle for all joints that are held, or 3 for a shape, got 2"),
+        (["--slice", "1.3"], "s.toml: --slice: the angles must lie within the field's 1.2 rad: give others, or raise --extent"),
+        (["--slice", "x"], "--slice: 'x' is not a list of numbers such as 0.5,0.3 or 30deg,20deg"),
+        (["--metric"], "--metric and --stretch are those of two joints: drop them for slices"),
+        (["--beside", "link-1"], "--beside draws one pair of joints: say which with --pair"),
+    ],
+)  # fmt: skip
+def test_what_is_no_slice_is_refused(args, said, tmp_path):
+    (tmp_path / "s.toml").write_text(SCENE)
+    code, _, err = geomech("ccf", "s.toml", "--plot", "a.png", *args, cwd=tmp_path)
+    assert code == 2 and said in err and len(err.splitlines()) == 1 and not (tmp_path / "a.png").exists()
+
+
+def test_rows_of_planes_say_what_is_held_and_gaits_cast_shadows():
+    system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
+    study = Study(Scene(system, LOOP, Numerics(grid=6, extent=1.2)))
+    fig = plots.planes_figure([study.plane((0, 1)), study.plane((2, 0), [0.0, 0.3, 0.0])], LOOP)
+    first, last = fig.axes[0], fig.axes[5]
+    assert (first.get_xlabel(), last.get_xlabel(), last.get_ylabel()) == (
+        r"$\alpha_{1}$ (rad)", r"$\alpha_{3}$ (rad)", r"$\alpha_{1}$ (rad)",
+    )  # fmt: skip
+    assert [t.get_text() for ax in (fig.axes[0], fig.axes[3]) for t in ax.texts if "=" in t.get_text()] == [
+        r"$\alpha_{3}$ = 0.15 rad", r"$\alpha_{2}$ = 0.3 rad",
+    ]  # fmt: skip
+    dashed = [line for line in last.lines if line.get_linestyle() == "--"]
+    assert len(dashed) == 1 and "dashed" in fig.get_supxlabel()
+    curve = LOOP.shape(np.linspace(0, 2 * np.pi, 400))
+    np.testing.assert_allclose(np.column_stack(dashed[0].get_data()), curve[:, [2, 0]])
+    flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
+    for at, lies in ((-0.2, True), (-0.1, False)):
+        cut = Plane((0, 2), (0.0, at, 0.0), study.plane((0, 2)).connection)
+        assert Seen(flat, cut).lies == lies
+        fig = plots.planes_figure([cut], flat)
+        assert bool(fig.get_supxlabel()) != lies
+
+
+def test_many_joints_have_planes_and_no_field():
+    study = Study(
+        Scene(Swimmer(Viscous(2.0), Chain((1,) * 9)), Wave(amplitude=0.5, joints=8), Numerics(grid=5, extent=1.0))
+    )
+    assert study.plane((6, 2)).ccf.values.shape == (3, 5, 5)
+    with pytest.raises(ValueError, match="a pair must be two of the joints 1 to 8, got 3, 9"):
+        study.plane((2, 8))
+    with pytest.raises(ValueError, match="lies outside the field"):
+        study.plane((0, 1), np.full(8, 1.1))
+    assert len(two_form(study.plane((0, 1)).connection).pairs) == 1
+    form = two_form(connection.fit(Cubic().velocity, connection.grid(3, 5, 1.0), 12))
+    with pytest.raises(ValueError, match="moves 2 joints"):
+        spanned(form, Circle())
