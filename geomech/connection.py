@@ -266,6 +266,20 @@ def fit(
     return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, singularity), degree)
 
 
+def fitted_at(velocity: Velocity, joints: int, count: int, degree_one: bool = False) -> Callable:
+    """The least-squares A (..., 3, d) as a function of shapes (..., d), solved where it is asked for, from ``count``
+    directions; of a velocity that is linear in alphadot, ``degree_one``, from d."""
+    unit = np.eye(joints) if degree_one else directions(joints, count)
+    keep = least_squares(unit)
+
+    def A(alpha):
+        alpha = real_array("alpha", alpha)
+        found = sampled_at(velocity, alpha.reshape(-1, joints), unit, lambda xi: keep(xi)[:1])[0]
+        return np.moveaxis(found, -1, 0).reshape(*alpha.shape[:-1], 3, joints)
+
+    return A
+
+
 def least_squares(unit: np.ndarray) -> Callable:
     """A `keep` of `sampled_at`: A (3, d, s) that fits best, rms (3, s) of what it leaves and of xi itself."""
     inverse = np.linalg.pinv(unit)

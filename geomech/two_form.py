@@ -15,6 +15,7 @@ to save a force balance of some microseconds. So the harmonic tier stays with tw
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -29,7 +30,7 @@ from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from rft import se2
 
-RADII = 8  # nodes of Gauss's rule along a cone
+RADII = 6  # nodes of Gauss's rule along a cone
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,36 @@ def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips:
     at_once = max(1, SAMPLES_TOGETHER // int(phases))
     groups = [amplitudes[k : k + at_once] for k in range(0, max(1, len(amplitudes)), at_once)]
     net, other = map(np.concatenate, zip(*(_cones(form, gait, some, int(phases), int(tips)) for some in groups)))
+    return _apart(net, other)
+
+
+def spanned_by(A: Callable, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 2, around: int = 64) -> Spanned:
+    """`spanned` without a field: A (..., 3, d) is asked for at shapes (..., d) of the cones. By Stokes's theorem the integral
+    of dA is that of A along the loop, of ``phases``, whatever the surface; left on each cone is [A, A], at ``around``."""
+    number("phases", phases, 8, 1e6, whole=True)
+    number("tips", tips, 0, around, whole=True)
+    amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
+    alpha, alphadot = checked_gait(gait).cycle(int(phases), amplitudes)
+    along = np.einsum("...ij,...j->...i", A(alpha), alphadot).mean(1)
+    alpha, alphadot = gait.cycle(max(int(around), 4 * gait.harmonics + 2), amplitudes)
+    at = [alpha.mean(1, keepdims=True), *(alpha[:, k * alpha.shape[1] // max(1, tips), None] for k in range(tips))]
+    net, *others = (se2.exp(2 * np.pi * (along + _brackets(A, alpha, alphadot, tip))) for tip in at)
+    return _apart(net, np.stack(others, 1) if others else np.zeros((len(net), 0, 3)))
+
+
+def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
+    """Integral (B, 3) of [A, A] over tip + s (alpha - tip), over 2 pi."""
+    nodes, weights = np.polynomial.legendre.leggauss(RADII)
+    total = 0.0
+    for s, w in zip((nodes + 1) / 2, weights / 2):
+        there = A(tip + s * (alpha - tip))
+        u, v = (np.einsum("...ij,...j->...i", there, x) for x in (alpha - tip, s * alphadot))
+        total = total + w * se2.bracket(u, v).mean(1)
+    return total
+
+
+def _apart(net: np.ndarray, other: np.ndarray) -> Spanned:
+    """With the spread of poses (B, tips, 3) from net (B, 3)."""
     apart = other - net[:, None]
     spread = np.stack([np.hypot(apart[..., 0], apart[..., 1]), np.abs(apart[..., 2])], -1).max(1, initial=0.0)
     return Spanned(net, other, spread)

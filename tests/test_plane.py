@@ -12,7 +12,8 @@ from geomech.gaits import Circle, Fourier, Wave
 from geomech.output import plots
 from geomech.plane import Plane, Seen, looked_up, plane
 from geomech.systems import Plain, Swimmer
-from geomech.two_form import spanned, two_form
+from geomech.tiers import TIERS
+from geomech.two_form import spanned, spanned_by, two_form
 from rft import CATALOGUE, Chain, Viscous, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -214,3 +215,71 @@ def test_many_joints_have_planes_and_no_field():
     form = two_form(connection.fit(Cubic().velocity, connection.grid(3, 5, 1.0), 12))
     with pytest.raises(ValueError, match="moves 2 joints"):
         spanned(form, Circle())
+
+
+@dataclass(frozen=True)
+class Sandy(Plain):
+    """Of four joints, not linear in alphadot."""
+
+    kind, joints = "sandy", 4
+
+    def velocity(self, alpha, alphadot):
+        a, u = np.broadcast_arrays(alpha, alphadot)
+        speed2 = (u**2).sum(-1) + 1e-300
+        linear = [np.cos(a[..., 1]) * u[..., 0] + 0.3 * u[..., 3], np.sin(a[..., 0]) * u[..., 2], a[..., 3] * u[..., 1]]
+        return np.stack([x + 0.4 * u[..., k] ** 3 * np.cos(a[..., k]) / speed2 for k, x in enumerate(linear)], -1)
+
+
+def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
+    """As from a fine field, of A and of its two-form; the loop's integral of A and the brackets of a surface, for that."""
+    gait = Fourier(
+        cos=((0.5, 0.1), (0.1, 0.2), (-0.3, 0.1), (0.2, 0.0)),
+        sin=((0.1, 0.2), (0.6, 0.0), (0.2, 0.1), (-0.4, 0.0)),
+        centre=(0.1, 0.2, 0.0, -0.1),
+    )
+    scene = Scene(Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64))
+    looked_up, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
+    found = looked_up.study(*asked)
+    assert "field" in found["seconds"]
+    monkeypatch.setattr("geomech.tiers.path.FIELD", 9_999)
+    study = Study(scene)
+    around = study.study(*asked)
+    assert "field" not in around["seconds"] and not any(key[0] == "connection" for key in study.computed)
+    for tier in ("area", "path"):
+        np.testing.assert_allclose(around[tier], found[tier], atol=3e-5)
+        assert np.abs(np.array(around[tier]) - found["direct"]).max() > 1e-3
+    assert around["surface_spread"]["area"] == pytest.approx(found["surface_spread"]["area"], rel=0.3)  # fewer surfaces
+    jobs = study.cost(*asked)
+    assert jobs.balances >= TIERS["path"].along(scene.system, scene.numerics, 2, 256)
+    assert study.displacement("area").shape == study.displacement("path").shape == (3,)
+
+
+def test_the_integral_by_stokes_is_that_of_the_two_form():
+    system = Cubic()
+    form = two_form(connection.fit(system.velocity, connection.grid(3, 6, 1.2), 12, 5))
+    here, there = spanned(form, LOOP, [0.5, 1.0], 128, 2), spanned_by(system.A, LOOP, [0.5, 1.0], 128, 2, 128)
+    for a, b in zip(here, there):
+        np.testing.assert_allclose(a, b, atol=1e-12)
+    assert here.spread[:, 0].min() > 1e-4
+
+
+def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
+    chain = SCENE.partition("[gait]")[0].replace("[0.7, 1.4, 0.9, 0.6]", "[0.7, 1.4, 0.9, 0.6, 1.1, 0.8]")
+    (tmp_path / "six.toml").write_text(chain + '[gait]\nkind = "wave"\namplitude = 0.8\njoints = 5\n')
+    code, out, err = geomech("displacement", "six.toml", "--amplitudes", "0.2,0.4", "--json", cwd=tmp_path)
+    table = json.loads(out)
+    assert (code, err) == (0, "") and {"area", "path", "direct"} < {*table}
+    area, direct = np.array(table["area"]), np.array(table["direct"])
+    off = np.hypot(*(area - direct)[:, :2].T)
+    assert np.log2(off[1] / off[0]) == pytest.approx(3.0, abs=0.3) and off[1] < 0.1 * np.hypot(*direct[1, :2])
+    np.testing.assert_allclose(area[:, 2], direct[:, 2], atol=1e-5)
+    code, _, err = geomech("connection", "six.toml", "-o", "a.nc", cwd=tmp_path)
+    assert (
+        code == 2 and "a field of 31^5 shapes is too large (3.4 GB for A): lower [numerics] grid, to 7 or less" in err
+    )
+    four = chain.replace(", 0.8]", "]") + '[gait]\nkind = "wave"\njoints = 4\n'
+    (tmp_path / "five.toml").write_text(four.replace('law = "viscous"\nratio = 2.3', 'name = "glass-0.3mm-loose"'))
+    code, _, err = geomech("connection", "five.toml", "-o", "a.nc", cwd=tmp_path)
+    assert (
+        code == 2 and err.endswith("say --yes, or lower --grid, to 13 or less\n") and not (tmp_path / "a.nc").exists()
+    )

@@ -12,10 +12,10 @@ from geomech.errors import Note, SceneError, check_angle, named
 WORTH_SAYING = 1.0  # s that a field takes
 
 
-def allow(scene, cost, yes: bool, worth_saying: float | None = None) -> None:
-    """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError if it takes too
-    long to be begun without --yes."""
-    cost.check(scene.name, yes)
+def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
+    """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError, which says what to do
+    else, if it takes too long to be begun without --yes."""
+    cost.check(scene.name, yes, less)
     for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
     if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
@@ -81,6 +81,7 @@ def field(
     from geomech.study.cost import built, of_metric, price
     from geomech.study.effort import shared, why_none
     from geomech.tiers import TIERS
+    from geomech.tiers.path import fits
 
     scene = loaded(name, grid, extent)
     study, joints = Study(scene), scene.system.joints
@@ -101,7 +102,8 @@ def field(
         if harmonics and "harmonic" in study.lookups:
             parts.append(lambda progress: study.table("harmonic", progress=progress))
             jobs += [] if costed and shared(scene.system) else [built(scene, "harmonic")]
-        allow(scene, price(jobs), yes, WORTH_SAYING)
+        less = f"lower --grid, to {fits(joints)} or less" if joints > 2 else "ask for less"
+        allow(scene, price(jobs), yes, WORTH_SAYING, less)
     with terminal.progress(f"field of {scene.name}") as bar:
         for k, part in enumerate(parts):
             part(progress=lambda done: bar((k + done) / len(parts)))

@@ -7,6 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,12 @@ from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort, tables
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, of_metric, price
+from geomech.study.cost import Cost, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.study.offer import methods
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
+from geomech.tiers.path import around
 from geomech.tiers.path import axes as field_axes
 
 AMPLITUDES = 10  # or so, in the study that `run` makes of each gait
@@ -61,10 +63,10 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         if scene.system.carried:
             _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
         _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
-    elif "area" in study.methods:
+    elif "area" in study.methods and scene.system.joints == 3:  # of more there are many slices: `geomech ccf --pair`
         study.compute_field(progress)
         save_connection(folder / "connection.nc", study)
-        planes = [study.plane(pair) for pair in study.two_form.pairs]
+        planes = [study.plane(pair) for pair in combinations(range(scene.system.joints), 2)]
         _save(plots.plane_connection_figure(planes, unit, scene.system.shape_labels), folder / "connection")
         _save(plots.planes_figure(planes, scene.gait, unit, scene.system.shape_labels), folder / "ccf")
     tables = {}
@@ -82,12 +84,14 @@ def cost(scene: Scene) -> Cost:
     """Of `write`; SceneError, before anything is computed, for what it refuses."""
     gaits = _gaits(scene)
     counts, tiers = [len(reachable(scene, gait)) for gait in gaits], methods(scene.system)
-    with_metric = {"path", "area"} & {*tiers} and scene.system.joints in (2, 3) and not effort.why_none(scene.system)
+    more = of_planes(scene, 3) if scene.system.joints == 3 and "area" in tiers else []
+    field = {"path", "area"} & {*tiers} and scene.system.joints in (2, 3)
+    with_metric = field and not effort.why_none(scene.system)
     metric = (
         [job for job in of_metric(scene) if job.what != "balances" or "harmonic" not in tiers] if with_metric else []
     )
     return price(
-        metric + [job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])]
+        more + metric + [job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])]
     )
 
 
@@ -102,7 +106,8 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     """Round amplitudes (`steps`), of the sign of the gait's own, up to the largest that keeps it inside the field; where there
     is no field, or one with singular shapes, up to its own, which is the last.
     SceneError for a gait that does not move or lies outside."""
-    own = "path" not in methods(scene.system) or scene.system.singularity is not None
+    system, n = scene.system, scene.numerics
+    own = "path" not in methods(system) or system.singularity is not None or around(system, n)
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")

@@ -59,7 +59,8 @@ class Knob:
             return False
         if self.setting == "regularisation" and system.solver is None:
             return False
-        if self.setting in (*TIERS["path"].depends_on, *TIERS["harmonic"].depends_on) and system.stored("connection"):
+        of_a_field = self.setting in (*TIERS["path"].depends_on, *TIERS["harmonic"].depends_on)
+        if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
             return False
         if self.tier != "direct" and TIERS[self.tier].is_direct(system):
             return False

@@ -65,7 +65,7 @@ class Study:
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
     def in_frame(self, frame: str) -> Study:
-        """The bench of the scene in another body frame; SceneError if there is none of that name, or it is the scene's own."""
+        """The bench of the scene in another body frame; SceneError for one of no such name, or the scene's own."""
         s = self.scene
         with named(s.name):
             if frame == s.frame:
@@ -110,7 +110,10 @@ class Study:
     def needs_field(self, method: str) -> bool:
         """Whether a tier looks the fitted connection up on the grid."""
         tier = TIERS[choose("methods", method, METHODS)]
-        return tier.looks_up == "connection" and not tier.is_direct(self.scene.system)
+        return tier.looks_up == "connection" and self._looked_up(tier)
+
+    def _looked_up(self, tier) -> bool:
+        return not (tier.is_direct(self.scene.system) or tier.around(self.scene.system, self.scene.numerics))
 
     def compute_field(self, progress: Callable | None = None) -> None:
         """Fill `fitted` now, telling ``progress`` the fraction done."""
@@ -189,23 +192,21 @@ class Study:
             tier.refuse(scene.system)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(tier, gait, amplitudes)
-            table = None if tier.is_direct(scene.system) else self.table(method, gait, amplitudes)
+            table = self.table(method, gait, amplitudes) if self._looked_up(tier) else None
             return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
 
     def choice(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
         """(B, 2), body lengths and rad: how far `displacement` hangs on a choice of the tier's own, such as a surface that the
         loop spans; None without one. Part of every estimate."""
         s, tier, gait = self.scene, TIERS[method], self.scene.gait if gait is None else gait
-        table = None if tier.is_direct(s.system) else self.table(method, gait, amplitudes)
-        return None if table is None else tier.choice(table, s.system, gait, amplitudes, s.numerics)
+        table = self.table(method, gait, amplitudes) if self._looked_up(tier) else None
+        return tier.choice(table, s.system, gait, amplitudes, s.numerics)
 
     def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
-        system, n = self.scene.system, self.scene.numerics
-        gait = self.scene.gait if gait is None else gait
+        system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        names = [name for name, _ in system.shape_labels]
-        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], names)[:, 0]
+        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in system.shape_labels])[:, 0]
         in_groups(shapes, every, system.at_once(n.phases))
 
     def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
@@ -223,11 +224,10 @@ class Study:
         """A table (`geomech.study.tables.table`) of the net poses by tiers of METHODS, with their errors, and besides
         {"seconds": {...}, "kept": [...]}.
 
-        estimate: error of each position, body lengths; estimate_heading: of each theta, rad (`geomech.study.estimate`).
-        seconds: what building each table took, by its name ("field", "harmonic table" ...), whenever that was, and
-        what each tier took from there, the direct one with its errors; "errors" of the others, where it is not asked for;
-        "medium" of the errors of an uncertain one.
-        kept: the tables that were there before, whose seconds are not of this call.
+        estimate, estimate_heading: errors, body lengths and rad (`geomech.study.estimate`).
+        seconds: what building each table took, by its name ("field", "harmonic table" ...), whenever that was, and what each
+        tier took from there, the direct one with its errors; "errors" of the others, where it is not asked for; "medium" of
+        the errors of an uncertain one. kept: the tables that were there before, whose seconds are not of this call.
         """
         gait, amplitudes, chosen = self._asked(gait, amplitudes, methods)
         medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # refuses, before the rest
@@ -256,7 +256,7 @@ class Study:
     def _built(self, chosen: dict, gait: Gait, amplitudes, progress) -> tuple[dict[str, float], list[str]]:
         """The tables of tiers, built: seconds that each took, whenever that was, and the names of those that were there."""
         seconds, kept = {}, []
-        looked_up = [m for m in chosen if not chosen[m].is_direct(self.scene.system)]
+        looked_up = [m for m in chosen if self._looked_up(chosen[m])]
         for method in sorted(
             looked_up, key=lambda m: chosen[m].looks_up != "connection"
         ):  # the field is the picture, too
@@ -288,7 +288,7 @@ class Study:
             for tier in chosen.values():
                 tier.refuse(scene.system)
                 self._refuse_singular(tier, gait, amplitudes)
-                if tier.on_grid and not tier.is_direct(scene.system):
+                if tier.on_grid and self._looked_up(tier):
                     self.refuse_outside(gait, amplitudes)
         return gait, amplitudes, chosen
 

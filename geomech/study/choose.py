@@ -54,7 +54,10 @@ def cheapest(
     if study.lookups:
         pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
         phases = settings["phases"]
-    solves = lambda m: TIERS[m].solves(system, scene.numerics, len(amplitudes), phases)
+    around = lambda m: TIERS[m].around(system, scene.numerics)
+    solves = lambda m: (TIERS[m].along if around(m) else TIERS[m].solves)(
+        system, scene.numerics, len(amplitudes), phases
+    )
     for method in sorted(study.lookups, key=solves):
         if solves(method) >= solves("direct"):
             break

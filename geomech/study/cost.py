@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.connection import SAMPLES_TOGETHER
 from geomech.errors import SceneError
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
@@ -52,11 +53,11 @@ class Cost(NamedTuple):
         """Not worth saying."""
         return self.seconds < WORTH_SAYING and self.memory < LARGEST
 
-    def check(self, place: str, yes: bool) -> None:
-        """SceneError where it goes beyond the limits and ``yes`` does not allow that."""
+    def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
+        """SceneError where it goes beyond the limits and ``yes`` does not allow that. less: what to do else."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
-            raise SceneError(f"{place}: {self}: to compute for more than {limits} say --yes, or ask for less")
+            raise SceneError(f"{place}: {self}: to compute for more than {limits} say --yes, or {less}")
 
 
 class Job(NamedTuple):
@@ -110,9 +111,12 @@ def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = 
     """`Study.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
     gait, phases = gait or scene.gait, scene.numerics.phases
     lookups = [m for m in methods if not TIERS[m].is_direct(scene.system)]
-    shared = {TIERS[m].looks_up: m for m in reversed(lookups)}
+    around = [m for m in lookups if TIERS[m].around(scene.system, scene.numerics)]
+    shared = {TIERS[m].looks_up: m for m in reversed(lookups) if m not in around}
     jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
-    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups]
+    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m not in around]
+    along = lambda m: TIERS[m].along(scene.system, scene.numerics, count, phases)
+    jobs += [Job("balances", scene, None, float(along(m)), memory=BASE + 8 * COPIES * SAMPLES_TOGETHER) for m in around]
     jobs += of_medium(scene, gait, count)
     if len(lookups) < len(methods):
         return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)

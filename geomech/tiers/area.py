@@ -15,8 +15,10 @@ from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import Path, zeros
-from geomech.two_form import RADII, spanned, two_form
+from geomech.two_form import RADII, spanned, spanned_by, two_form
 from rft import se2
+
+TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one where there is no field
 
 
 def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -46,7 +48,7 @@ class Area(Path):
 
     name, label = "area", "area integral of the CCF"
     style = {"color": "#D55E00", "linestyle": "--"}
-    joints, offered = range(2, 10_001), range(2, 4)
+    joints, offered = range(2, 10_001), range(2, 6)
     takes_joints, instead = "takes two joints and more, of which a loop encloses area", "use path or direct"
     whole = True
 
@@ -66,9 +68,18 @@ class Area(Path):
         if system.joints == 2:
             return area(ccf(table), gait, amplitudes, numerics.phases)
         shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
-        return spanned(two_form(table), gait, amplitudes, numerics.phases, tips=0).net.reshape(*shape, 3)
+        return self._spanned(table, system, gait, amplitudes, numerics, 0).net.reshape(*shape, 3)
 
     def choice(self, table, system, gait, amplitudes, numerics) -> np.ndarray | None:
         if system.joints == 2:
             return None
-        return spanned(two_form(table), gait, amplitudes, numerics.phases).spread / [system.length, 1.0]
+        return self._spanned(table, system, gait, amplitudes, numerics, TIPS).spread / [system.length, 1.0]
+
+    def along(self, system, numerics, count, phases) -> int:
+        shapes = 2 * phases + (2 + TIPS) * RADII * AROUND  # for the displacement, and once more with its spread
+        return count * shapes * (system.joints if system.linear else self.directions(system, numerics))
+
+    def _spanned(self, table, system, gait, amplitudes, numerics, tips: int):
+        if table is None:
+            return spanned_by(self.A(system, numerics), gait, amplitudes, numerics.phases, tips, AROUND)
+        return spanned(two_form(table), gait, amplitudes, numerics.phases, tips)

@@ -52,8 +52,9 @@ class Tier:
     """Base of all tiers. name: in scenes, options and tables. label: for legends. style: of its line. rests_on: premises
     without which it says nothing. needs: what these are lost for. joints: shape variables that it takes; offered: those
     for which a plain study asks for it; takes_joints, instead: in words, and what to do with others. looks_up: its table's
-    name, of which tiers may share one, "" for none. depends_on: entries of [numerics] that the table depends on, beside the system and `reach`. on_grid: the table is a
-    field on the scene's grid. whole: it must have no singular shapes. plain: a plain study asks for it.
+    name, of which tiers may share one, "" for none. depends_on: entries of [numerics] that the table depends on, beside the
+    system and `reach`. on_grid: the table is a field on the scene's grid. whole: it must have no singular shapes. plain: a
+    plain study asks for it.
     """
 
     name = "tier"
@@ -97,6 +98,14 @@ class Tier:
     def reach(self, gait: Gait, amplitudes) -> tuple:
         """What of a gait the table depends on: nothing."""
         return ()
+
+    def around(self, system: System, numerics: Numerics) -> bool:
+        """Whether it has no table of so many joints, and asks for velocities at shapes around the gait instead."""
+        return False
+
+    def along(self, system: System, numerics: Numerics, count: int, phases: int) -> int:
+        """How many, where it does."""
+        return 0
 
     def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None) -> Any:
         """What is computed once for a system; None for nothing."""

@@ -16,7 +16,10 @@ from geomech.plane import plane as fit_plane
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
 
+INSTEAD = ", draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
+
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
 
 
 def path(fitted: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -29,12 +32,23 @@ def axes(system, numerics) -> tuple[np.ndarray, ...]:
     system.refuse(Tier.needs, Tier.rests_on, "use the direct tier")
     if own := system.stored("connection"):
         return own.axes
-    if numerics.grid**system.joints > LARGEST_GRID:
+    if (count := numerics.grid**system.joints) > LARGEST_GRID:
         raise ValueError(
-            f"a field of {numerics.grid}^{system.joints} shapes is too large: lower [numerics] grid, or use "
-            "methods = direct, which needs no field"
+            f"a field of {numerics.grid}^{system.joints} shapes is too large ({24e-9 * count * system.joints:.2g} GB for A): "
+            f"lower [numerics] grid, to {fits(system.joints)} or less{INSTEAD}"
         )
     return connection.grid(system.joints, numerics.grid, numerics.extent)
+
+
+def fits(joints: int) -> int:
+    """The finest grid, odd, of which a field of so many joints is quick."""
+    return max(4, next((n for n in range(31, 4, -2) if n**joints <= FIELD), 4))
+
+
+def around(system, numerics) -> bool:
+    """Whether the grid that is asked for is too large a field of so many joints, so that its tiers solve for A at shapes of
+    the gait and of the surfaces that it spans, and look nothing up."""
+    return system.joints > 3 and not system.stored("connection") and numerics.grid**system.joints > FIELD
 
 
 def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
@@ -66,7 +80,7 @@ class Path(Tier):
 
     name, label = "path", "path integral of A"
     style = {"color": "#0072B2", "linestyle": "-."}
-    offered = range(1, 4)  # no more joints than a grid can span
+    offered = range(1, 6)
     looks_up = "connection"
     on_grid = True
     depends_on = ("grid", "extent", "directions", "interpolation")
@@ -77,6 +91,16 @@ class Path(Tier):
     def directions(self, system, numerics) -> int:
         """Of alphadot at each shape."""
         return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
+
+    def around(self, system, numerics) -> bool:
+        return around(system, numerics)
+
+    def along(self, system, numerics, count, phases) -> int:
+        return count * phases * self.directions(system, numerics)
+
+    def A(self, system, numerics) -> Callable:
+        """The connection at shapes (..., d), without a field."""
+        return connection.fitted_at(system.velocity, system.joints, self.directions(system, numerics), system.linear)
 
     def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
@@ -96,4 +120,7 @@ class Path(Tier):
         return lambda n: field(np.zeros((n, system.joints)))
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
+        if table is None and not self.is_direct(system):
+            A = self.A(system, numerics)
+            return path(lambda a, u: np.einsum("...ij,...j->...i", A(a), u), gait, amplitudes, numerics.phases)
         return path(system.velocity if self.is_direct(system) else table, gait, amplitudes, numerics.phases)
