@@ -7,13 +7,19 @@ plane of two joint rates, f odd under beta -> beta + pi. Its Fourier series has 
 
 and (a_1, b_1) is the uniform least-squares connection. Kept on a grid up to some k they give the velocity at the cost
 of a look-up. Links that stick put kinks in f, so the coefficients fall off like 1/k^2 there.
+
+With three and more joints directions are those of a sphere. The odd spherical harmonics up to degree k on it are the
+homogeneous polynomials of degree k, of which there are (k + d - 1 choose d - 1): products of powers, each times the root of its
+multinomial coefficient, are the basis here, fitted by least squares.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import combinations
+from math import comb, factorial, prod
 
 import numpy as np
 
@@ -28,7 +34,8 @@ VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 @dataclass(frozen=True)
 class Harmonics:
     """Coefficients on a grid. coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in the
-    velocity's units and frame. residual: (3, N_1, N_2), rms over the sampled directions of what the series leaves."""
+    velocity's units and frame; of more joints (3, terms, N_1, ..., N_d), of `powers`. residual: (3, N_1, ..., N_d), rms over
+    directions of what the series leaves."""
 
     axes: tuple[np.ndarray, ...]
     coefficients: np.ndarray
@@ -45,7 +52,8 @@ class Harmonics:
 
     @property
     def highest(self) -> int:
-        return self.coefficients.shape[1] - 1
+        count, d = self.coefficients.shape[1], len(self.axes)
+        return count - 1 if d == 2 else next(k for k in range(1, count + 1) if terms(d, k) == count)
 
     def half(self, first: int) -> Harmonics:
         """As `Connection.half`."""
@@ -53,17 +61,47 @@ class Harmonics:
         return Harmonics(axes, *arrays, degree)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) at alpha, alphadot (..., 2); ValueError outside the grid."""
+        """xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
         alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), real_array("alphadot", alphadot))
-        points = [x.reshape(-1, 2) for x in (alpha, alphadot)]
+        points = [x.reshape(-1, len(self.axes)) for x in (alpha, alphadot)]
         step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
         parts = [self._at(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
         return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
 
     def _at(self, alpha, alphadot) -> np.ndarray:
-        beta = np.arctan2(alphadot[..., 1], alphadot[..., 0])
-        speed = np.hypot(alphadot[..., 0], alphadot[..., 1])
-        return np.einsum("...ij,...j->...i", self.field(alpha), _basis(beta, self.highest)) * speed[..., None]
+        speed = np.linalg.norm(alphadot, axis=-1)
+        unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
+        return np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest)) * speed[..., None]
+
+
+def terms(joints: int, highest: int) -> int:
+    """Coefficients of the odd harmonics up to ``highest`` of so many joint rates."""
+    return comb(highest + joints - 1, joints - 1)
+
+
+@lru_cache(maxsize=16)
+def powers(joints: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """(powers (terms, d) of the products, the roots (terms,) of their multinomial coefficients)."""
+    bars = np.array(list(combinations(range(degree + joints - 1), joints - 1)))
+    ends = np.full((len(bars), 1), degree + joints - 1)
+    found = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
+    return found, np.array([np.sqrt(factorial(degree) / prod(map(factorial, map(int, row)))) for row in found])
+
+
+def basis(unit: np.ndarray, highest: int) -> np.ndarray:
+    """At directions (..., d): (..., terms)."""
+    if unit.shape[-1] == 2:
+        return _basis(np.arctan2(unit[..., 1], unit[..., 0]), highest)
+    each, roots = powers(unit.shape[-1], highest)
+    ladder = np.cumprod(np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]), 0)
+    found = (
+        roots * ladder[each[:, 0], ..., 0].T
+        if unit.ndim == 1
+        else roots * np.moveaxis(ladder[each[:, 0], ..., 0], 0, -1)
+    )
+    for k in range(1, unit.shape[-1]):
+        found = found * np.moveaxis(ladder[each[:, k], ..., k], 0, -1)
+    return found
 
 
 def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
@@ -87,20 +125,30 @@ def fit(
     as in `connection.fit`.
 
     The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
-    it (k onto 2 count - k); so keep ``highest`` well below. ValueError if it is even or not below ``count``.
+    it (k onto 2 count - k); so keep ``highest`` well below. Of more than two joints a fit takes as many directions as it has
+    `terms`, and better twice that. ValueError if ``highest`` is even or asks for more directions.
     """
     number("directions", count, 2, 1e6, whole=True)
     if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
         raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {short(highest)}")
     axes = as_axes(axes)
     check_knobs(degree, progress)
-    if len(axes) != 2:
-        raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
-    unit = directions(2, count)
-    basis = _basis(np.arctan2(unit[:, 1], unit[:, 0]), highest)
+    d = len(axes)
+    if d < 2:
+        raise ValueError("harmonics are those of two joint rates or more, got 1 joint")
+    if d > 2 and count < terms(d, highest):
+        raise ValueError(
+            f"harmonics of {d} joints up to {highest} take {terms(d, highest)} directions or more, got {count}"
+        )
+    unit = directions(d, count)
+    at = basis(unit, highest)
+    inverse = at.T * (2.0 / count) if d == 2 else np.linalg.pinv(at)
+    unseen = (
+        1.0 if d == 2 else count / max(1, count - at.shape[1])
+    )  # what the fit leaves of directions that it has not seen
 
     def keep(xi):
-        coefficients = np.einsum("cj,sci->ijs", basis * (2.0 / count), xi)
-        return coefficients, np.sqrt(((xi - np.einsum("cj,ijs->sci", basis, coefficients)) ** 2).mean(1)).T
+        coefficients = np.einsum("jc,sci->ijs", inverse, xi)
+        return coefficients, unseen * np.sqrt(((xi - np.einsum("cj,ijs->sci", at, coefficients)) ** 2).mean(1)).T
 
     return Harmonics(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror), degree)

@@ -8,9 +8,9 @@ identity its derivative is the bracket of A and CCF. So x and y hang on the surf
 is what the estimate leaves out; by none for a loop in a plane and surfaces there. Turning, which has no bracket, is closed.
 `spanned` tells how much, from cones over the loop with different tips.
 
-Harmonics of the velocity in the direction of alphadot are those of a circle, of two joints. Of more they would be spherical
-harmonics: up to the 15th 136 for each component of three joints, 3,876 of five, at each shape of a grid that is large already,
-to save a force balance of some microseconds. So the harmonic tier stays with two joints; more take the path or the direct one.
+Where a field of so many joints does not fit, `spanned_by` asks for A on the surfaces alone. Sparse grids are no help: of a
+viscous chain of five links within 2.5 rad one of 2,929 shapes (Smolyak's) leaves 40 to 50 % of the rows of x and y, a tensor
+grid of 2,401 with quintic splines 11 %; within 1.2 rad 0.5 to 1 %, and 0.1 to 0.3 %.
 """
 
 from __future__ import annotations

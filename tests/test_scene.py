@@ -161,13 +161,14 @@ def test_the_path_of_a_linear_medium_needs_no_field():
     assert table["path"] == table["direct"]
 
 
-def test_four_links_have_no_area_tier():
+def test_four_links_have_an_area_tier_and_two_have_none():
     text = GOOD.replace("[1, 2, 1]", "[1, 1, 1, 1]").split("[gait]")[0]
     four = scenes.parse(text + '[gait]\nkind = "fourier"\ncos = [[1.0], [0.5], [0.0]]\nsin = [[0.0], [0.5], [1.0]]')
-    assert Study(four).methods == ("path", "direct")
+    assert Study(four).methods == ("area", "path", "direct")
     assert np.isfinite(Study(four).displacement("direct")).all()
-    with pytest.raises(SceneError, match="two joints"):
-        Study(four).displacement("area")
+    two = scenes.parse(text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n')
+    with pytest.raises(SceneError, match="the area tier takes two joints and more"):
+        Study(two).displacement("area")
 
 
 def test_loose_glass_circles():

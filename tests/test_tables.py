@@ -67,7 +67,7 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     five = Study(Scene(Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))), wave, Numerics(grid=5, extent=1.1, interpolation=2)))
     netcdf.save_connection(tmp_path / "a.nc", five)
     same(Connection.load(tmp_path / "a.nc"), five.fitted)
-    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == ("adapted", "path", "direct")
+    assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == ("area", "adapted", "path", "direct")
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     netcdf.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)

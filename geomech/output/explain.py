@@ -21,7 +21,9 @@ def explain(scene: Scene | Intruding) -> str:
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
     lines.append(f"engine: {system.engine} {system.because}")
-    lines.append("tiers: " + ", ".join(tiers(system)))
+    by_name = [t.name for t in TIERS.values() if system.joints in t.joints and system.joints not in t.offered]
+    by_name = by_name if "path" in tiers(system) else []
+    lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
     return "\n".join([*lines, *_lost(system)])
 
 
@@ -34,7 +36,7 @@ def _lost(system) -> list[str]:
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     for tier in TIERS.values():
-        if not tier.takes(system):
+        if not tier.takes(system) and not (system.joints in tier.joints and system.joints not in tier.offered):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
     return [f"not available: {_listed(lost)}: {why}" for why, lost in reasons.items()]
 

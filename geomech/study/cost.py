@@ -164,7 +164,7 @@ def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     how, system, n, gait = TIERS[tier], scene.system, scene.numerics, gait or scene.gait
     family = how.reach(gait, [0.0])
     if not family:
-        axes(system, n)  # refuses a field that is too large
+        how.axes(system, n)  # refuses a field that is too large
     memory = BASE + 8 * TABLES * how.size(system, n)
     return Job("balances", scene, gait if family else None, how.solves(system, n, 1, n.phases), memory=memory)
 

@@ -24,7 +24,8 @@ class Numerics:
 
     directions (-): of alphadot in the least-squares fit; if left out 8 for up to two joints, 16 a joint beyond.
     grid (-): points per joint. extent (rad): of the field, on either side of 0. interpolation (-): degree of its splines.
-    phases (-): per cycle. harmonics (-): the highest kept, odd. curves (-): in the table of a family of gaits.
+    phases (-): per cycle. harmonics (-): the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond.
+    curves (-): in the table of a family of gaits.
     """
 
     directions: int | None = None
@@ -32,7 +33,7 @@ class Numerics:
     extent: float = 2.5
     interpolation: int = 3
     phases: int = 256
-    harmonics: int = 15
+    harmonics: int | None = None
     curves: int = 24
 
     angles = ("extent",)
@@ -40,9 +41,9 @@ class Numerics:
     def __post_init__(self):
         number("extent", self.extent, 1e-6, 100)
         for name, (low, high) in WHOLE.items():
-            if name != "directions" or self.directions is not None:
+            if name not in ("directions", "harmonics") or getattr(self, name) is not None:
                 number(name, getattr(self, name), low, high, whole=True)
-        if self.harmonics % 2 == 0:
+        if self.harmonics is not None and self.harmonics % 2 == 0:
             raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
         if self.interpolation >= self.grid:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")

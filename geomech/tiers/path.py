@@ -92,6 +92,10 @@ class Path(Tier):
         """Of alphadot at each shape."""
         return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
 
+    def axes(self, system, numerics) -> tuple[np.ndarray, ...]:
+        """Of its field; ValueError if that is too large."""
+        return axes(system, numerics)
+
     def around(self, system, numerics) -> bool:
         return around(system, numerics)
 
