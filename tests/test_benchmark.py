@@ -9,6 +9,8 @@ import pytest
 from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
 from geomech import connection
 from geomech.gaits import Circle, Sine
+from geomech.scene import load
+from geomech.study.bench import Study
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
 
@@ -99,3 +101,29 @@ def test_direct_tier_of_a_circle_to_four_digits():
             told = f"{n} phases, {1e3 * np.median(times):.2f} ms"
             print(f"\n{NAMES[how]}: circle of {radius} rad to 1e-4: {told}", end="")
             assert n <= 128
+
+
+def test_the_geometers_pipeline():
+    """Connection, metric, CCF, minimum-perturbation coordinates and the displacement on a circle of the viscous three-link
+    swimmer, 31 x 31, against an fsolve loop that gives nothing but a connection, that of loose glass."""
+    scene = load("three-link-viscous").with_numerics(grid=31)
+
+    def pipeline():
+        study = Study(scene)
+        seen = study.in_frame("minimum-perturbation")
+        tables = study.fitted, study.metric, study.curvature, seen.fitted, seen.curvature
+        return tables, seen.displacement("area", amplitudes=[1.0]), study.displacement("direct", amplitudes=[1.0])
+
+    def cpu(f, count=1):
+        start = time.process_time()
+        for _ in range(count):
+            f()
+        return (time.process_time() - start) / count
+
+    alpha, alphadot = (x.reshape(-1, 2) for x in field_samples(count=2))
+    some = np.random.default_rng(0).choice(len(alpha), 50, replace=False)
+    loop = lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]
+    pipeline(), loop()  # loads what is loaded once
+    a_loop, ours = cpu(loop) * len(alpha) / len(some), min(cpu(pipeline) for _ in range(5))
+    print(f"\npipeline: {ours:.3f} CPU seconds, the loop for A alone {a_loop:.1f}, ratio {a_loop / ours:.0f}")
+    assert a_loop > 10 * ours

@@ -100,7 +100,7 @@ LARGE = {
     "amplitudes of a sweep": ["sweep", "three-link-glass", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
-    "a tier that looks it up": ["displacement", "five.toml", "--amplitudes", "0.5", "--methods", "path"],
+    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:999", "--methods", "path"],
     "a map": ["ccf", "three-link-glass", "--grid", "1414", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],

@@ -70,6 +70,21 @@ def test_in_sand_length_is_work():
     assert metric.path_length(table.norm, gait, [0.5, 1.0]) == pytest.approx(work, rel=2e-3)
 
 
+@pytest.mark.parametrize(("degree", "order"), [(3, 4), (5, 6)])
+def test_it_converges_with_the_grid(degree, order):
+    """Length of the path of an off-centre loop, of unequal links, against the power itself."""
+    body, gait = Chain((0.7, 1.4, 0.9)), Ellipse(semi_axes=(1.0, 0.6), tilt=0.7, centre=(0.2, -0.1))
+    F = power(FLUID, body)
+    truth = metric.path_length(lambda *a: np.sqrt(F(*a)), gait, [1.0])
+    grids = np.array([11, 21, 41])
+    off = [
+        np.abs(metric.path_length(metric.fit(F, connection.grid(2, n, 2.0), degree).norm, gait, [1.0]) - truth)[0]
+        for n in grids
+    ]
+    assert np.log(off[0] / off[-1]) / np.log(40 / 10) > order - 0.7
+    assert 0 < off[-1] < 1e-6
+
+
 def test_length_does_not_depend_on_pacing(viscous):
     """The same loop run faster here and slower there."""
     t = 2 * np.pi * np.arange(400) / 400

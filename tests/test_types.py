@@ -64,7 +64,8 @@ PARTS = {
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
     ("Rhex", "inertia", "None"),
-    ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("harmonics", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
+    ("harmonics", "None"),
+    ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
     ("covariance", "None"), ("Granular", "covariance", "array"), ("Viscous", "covariance", "deep"),
     *((type(gait).__name__, "frequency", "None") for gait in (*GAITS.values(), Sine(elements=8))),
     ("Chain", "lengths", "list"), ("masses", "empty"), ("inertias", "empty"),

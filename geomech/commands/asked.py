@@ -130,7 +130,7 @@ def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
         pairs = [_pair(pair, joints)] if pair is not None else list(combinations(range(joints), 2))
         if len(pairs) > MOST_PAIRS:
             raise SceneError(
-                f"{joints} joints have {len(pairs)} pairs: say which with --pair, such as --pair 1,{joints}"
+                f"{joints} joints have {len(pairs)} pairs: say which, such as --pair 1,{joints}, or give a chain [body] modes"
             )
         angles = numbers("--slice", slice_, angle=None) if slice_ is not None else None
         at = [_held(scene, one, angles, pair is not None) for one in pairs]

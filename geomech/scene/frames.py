@@ -15,7 +15,8 @@ def framed(system: System, numerics: Numerics) -> Framed:
     inner = system.inner if isinstance(system, Framed) else system
     if numerics.grid**inner.joints > LARGEST_GRID:
         raise ValueError(
-            f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large: lower [numerics] grid"
+            f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large: lower [numerics] grid, or "
+            "take a body of two shape variables, such as a chain with [body] modes or a serpenoid"
         )
     axes = connection.grid(inner.joints, numerics.grid, numerics.extent)
     grid = tuple(tuple(a.tolist()) for a in axes)

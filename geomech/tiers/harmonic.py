@@ -40,7 +40,7 @@ class Harmonic(Path):
     def around(self, system, numerics) -> bool:
         return False
 
-    def axes(self, system, numerics):
+    def axes(self, system, numerics) -> tuple:
         d, n = system.joints, numerics.grid
         if around(system, numerics):
             raise ValueError(

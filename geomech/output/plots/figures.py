@@ -37,7 +37,7 @@ def connection_figure(
     drawn below on the same scales. names: of the two frames."""
     draw = {"quiver": vector_field, "streamlines": streamlines}[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
-    fig, axes = figure(10.8, 3.0 * len(rows), 3, len(rows), layout="compressed")
+    fig, axes = figure(10.8, 3.0 + 2.7 * (len(rows) - 1), 3, len(rows), layout="compressed")
     for component in range(3):
         sizes = [largest(np.hypot(*c.A[component])) for c in rows]
         top = None if beside is None else max(sizes)
@@ -169,4 +169,4 @@ def _name(axes, names: Sequence[str]) -> None:
     for row, name in zip(axes, names):
         told = {"transform": row[0].transAxes, "rotation": 90, "ha": "center", "va": "center", "fontsize": 10}
         put = row[0].text2D if hasattr(row[0], "text2D") else row[0].text
-        put(-0.33 if put.__name__ == "text" else -0.04, 0.5, name, **told)
+        put(-0.33 if put.__name__ == "text" else 0.03, 0.5, name, in_layout=put.__name__ == "text", **told)

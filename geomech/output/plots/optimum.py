@@ -19,6 +19,7 @@ from geomech.study.bench import Study
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
 NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is held by them
 PHASES = 721
+LONG = 12  # letters of a name: a legend of longer ones has a line for each
 HOLDS = {  # what holds a loop: colour, text
     "zero": ("black", "runs along the zero line"),
     "limit": ("#D55E00", "at the joint limit"),
@@ -87,7 +88,7 @@ def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
         field = drawable(along(optimum) if field is None else field)
         ccf_map(field, 0, (), unit_of_gain(optimum), ax, labels=system.shape_labels)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
-        ax.set_title(f"CCF of the {gain(optimum)}, {frame}")
+        ax.set_title(f"CCF of the {gain(optimum)},\n{frame}")
         bar = ax.collections[0].colorbar
         bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
     draw_start_and_best(optimum, ax, lambda curve: curve, field)
@@ -155,8 +156,9 @@ def angles(optimum: Optimum, ax=None):
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
     best, aim = optimum.best, optimum.request.aim
     start = optimum.start.value
-    ax.set_title(f"{aim.name}: {best.value:.4g} (start {start if start > 1e-9 else 0.0:.4g})\n{aim.unit}")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3 if max(len(n) for n, _ in names) < 12 else 1)
+    ax.set_title(f"{aim.name}: {best.value:.4g} {aim.unit}\n(start {start if start > 1e-9 else 0.0:.4g})")
+    long = max(len(name) for name, _ in names) > LONG
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=1 if long else 3)
     return ax
 
 

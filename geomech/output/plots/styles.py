@@ -68,7 +68,6 @@ def ccf_contours(
     """A component of the CCF as contours, dashed below zero, and the area of each gait shaded by the sign of what it adds to
     the displacement: CCF times how often, and which way, the gait winds around it. error: shapes where it exceeds the value
     have no shade. Other arguments as for `ccf_map`."""
-    from matplotlib.patches import Patch
     from matplotlib.ticker import MaxNLocator
 
     ax, field = axes_of(ax), drawable(field)
@@ -84,12 +83,18 @@ def ccf_contours(
     for gait in gaits:
         signs |= _shaded(ax, field, component, gait, error)
         draw_gait(gait, ax, within=field.axes)
-    words = {s: (colour, _WAYS[component][k]) for k, (s, colour) in enumerate(((1, PLUS), (-1, MINUS)))}
-    told = [Patch(facecolor=words[s][0], alpha=0.35, label=words[s][1]) for s in (1, -1) if s in signs]
-    if told:
-        ax.legend(handles=told, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    if signs:
+        ax.legend(handles=_ways(component, signs), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     ax.set_title(f"{ccf_label(component, unit, labels)}: {TITLES[component]}")
     return ax
+
+
+def _ways(component: int, signs: set[int]) -> list:
+    """What a legend needs of the shades of these signs."""
+    from matplotlib.patches import Patch
+
+    looks = ((1, PLUS), (-1, MINUS))
+    return [Patch(facecolor=c, alpha=0.35, label=_WAYS[component][k]) for k, (s, c) in enumerate(looks) if s in signs]
 
 
 def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -> set[int]:
@@ -142,7 +147,7 @@ def ccf_surface(
         *np.meshgrid(*axes, indexing="ij"), shown, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,
         antialiased=False, rasterized=True, alpha=0.9,
     )  # fmt: skip
-    floor = -1.6 * most
+    floor, signs = -1.6 * most, set()
     for gait in gaits:
         curve = gait.shape(PHASES)
         ax.plot(*curve.T, floor, color="black", lw=1.0)
@@ -151,7 +156,9 @@ def ccf_surface(
             height = np.full(len(curve), np.nan)
             height[inside] = Field(field.axes, field.values[component], field.degree)(curve[inside])
             ax.plot(*curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10)
-            _floor(ax, field, component, gait, floor, error)
+            signs |= _floor(ax, field, component, gait, floor)
+    if signs:
+        ax.legend(handles=_ways(component, signs), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2)
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
         title=f"{ccf_name(component)}: {TITLES[component]}",
@@ -164,8 +171,8 @@ def ccf_surface(
     return ax
 
 
-def _floor(ax, field: Field, component: int, gait: Gait, floor: float, error: Field | None) -> None:
-    """The area of a gait on the plane below a surface."""
+def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[int]:
+    """The area of a gait on the plane below a surface; the signs there are."""
     x, y = (np.linspace(a[0], a[-1], AREA // 2) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
     density = Field(field.axes, field.values[component], 1)(shapes) * winding(gait.shape(PHASES), x, y)
@@ -175,6 +182,7 @@ def _floor(ax, field: Field, component: int, gait: Gait, floor: float, error: Fi
                 *np.moveaxis(shapes, -1, 0), (s * density > 0).astype(float), zdir="z", offset=floor, levels=[0.5, 2.0],
                 colors=[colour], alpha=0.35,
             )  # fmt: skip
+    return {s for s in (1, -1) if (s * density > 0).any()}
 
 
 CONNECTION_STYLES = ("quiver", "streamlines")
