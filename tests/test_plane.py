@@ -1,5 +1,6 @@
 """Planes of shape space on which two joints of many move, the area tier of three joints, and what commands draw of them."""
 
+import copy
 import json
 from dataclasses import dataclass
 
@@ -8,11 +9,15 @@ import pytest
 from test_cli import geomech
 
 from geomech import Numerics, Scene, Study, connection
+from geomech.commands.asked import _held
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.output import plots
 from geomech.plane import Plane, Seen, looked_up, plane
+from geomech.scene.frames import framed
+from geomech.study.choose import cheapest
 from geomech.systems import Plain, Swimmer
 from geomech.tiers import TIERS
+from geomech.tiers.path import around, fits
 from geomech.two_form import spanned, spanned_by, two_form
 from rft import CATALOGUE, Chain, Viscous, se2
 
@@ -283,3 +288,48 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
     assert (
         code == 2 and err.endswith("say --yes, or lower --grid, to 13 or less\n") and not (tmp_path / "a.nc").exists()
     )
+
+
+def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
+    """Even where the force balance is near by chance."""
+    monkeypatch.setattr(TIERS["area"].__class__, "choice", lambda *asked: np.array([[0.3, 0.2], [1e-9, 0.4]]))
+    scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
+    table = Study(scene).study([0.4, 0.5], ["area"])
+    assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
+    assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
+    costly = {name: dear(TIERS[name], 10**k) for k, name in ((8, "adapted"), (9, "direct"))}
+    monkeypatch.setattr("geomech.study.choose.TIERS", TIERS | costly)
+    assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
+    monkeypatch.setattr(TIERS["area"].__class__, "choice", lambda *asked: np.full((2, 2), 0.01))
+    found = cheapest(scene, [0.4, 0.5], 0.02)
+    assert found["tier"] == "area" and min(found["estimate"]["area"]) == 0.01
+
+
+def dear(tier, solves):
+    """The tier, as if it asked for so many velocities."""
+    other = copy.copy(tier)
+    other.solves = lambda *asked: solves
+    return other
+
+
+def test_three_joints_keep_their_field_and_more_have_one_that_fits():
+    three, four = Cubic(), Sandy()
+    assert not any(around(three, Numerics(grid=n)) for n in (31, 61))
+    assert [around(four, Numerics(grid=n)) for n in (13, 15)] == [False, True] and fits(4) == 13 and fits(5) == 7
+    chain = Swimmer(Viscous(2.0), Chain((1,) * 5))
+    with pytest.raises(ValueError, match=r"a frame on a grid of 15\^4 shapes is too large: lower \[numerics\] grid"):
+        framed(chain, Numerics(grid=15))
+    scene = Scene(framed(chain, Numerics(grid=7)), Wave(joints=4), Numerics(grid=7))
+    assert Study(scene).cost([1.0], ["direct"]).balances > 7**4 * 16 / 2
+
+
+def test_slices_hold_joints_in_their_order():
+    scene = Scene(Sandy(), Wave(joints=4, offset=0.7))
+    assert _held(scene, (3, 1), [0.3, -0.1], True).tolist() == [0.3, 0.7, -0.1, 0.7]
+    assert _held(scene, (3, 1), [0.3], False).tolist() == [0.3, 0.7, 0.3, 0.7]
+    assert _held(scene, (3, 1), [0.3, 0.1, 0.2, 0.4], False).tolist() == [0.3, 0.1, 0.2, 0.4]
+    assert _held(scene, (0, 2), None, True).tolist() == [0.7] * 4
+    with pytest.raises(
+        ValueError, match="one angle for all joints that are held, 2 one by one, or 4 for a shape, got 3"
+    ):
+        _held(scene, (3, 1), [0.3, 0.1, 0.2], True)

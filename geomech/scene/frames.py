@@ -7,13 +7,13 @@ from geomech.systems.base import System
 from geomech.systems.framed import Framed
 from geomech.tiers import TIERS
 from geomech.tiers.base import Numerics
-from geomech.tiers.path import LARGEST_GRID
+from geomech.tiers.path import FIELD, LARGEST_GRID
 
 
 def framed(system: System, numerics: Numerics) -> Framed:
     """A system in its minimum-perturbation frame, on the grid of the numerics; the same one where these change nothing."""
     inner = system.inner if isinstance(system, Framed) else system
-    if numerics.grid**inner.joints > LARGEST_GRID:
+    if (count := numerics.grid**inner.joints) > LARGEST_GRID or (inner.joints > 3 and count > FIELD):
         raise ValueError(
             f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large: lower [numerics] grid, or "
             "take a body of two shape variables, such as a chain with [body] modes or a serpenoid"

@@ -114,6 +114,7 @@ def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = 
     around = [m for m in lookups if TIERS[m].around(scene.system, scene.numerics)]
     shared = {TIERS[m].looks_up: m for m in reversed(lookups) if m not in around}
     jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
+    jobs += frame(scene) if "connection" not in shared else []
     jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m not in around]
     along = lambda m: TIERS[m].along(scene.system, scene.numerics, count, phases)
     jobs += [Job("balances", scene, None, float(along(m)), memory=BASE + 8 * COPIES * SAMPLES_TOGETHER) for m in around]
@@ -122,6 +123,11 @@ def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = 
         return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
     return jobs + len(lookups) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+
+
+def frame(scene: Scene) -> list[Job]:
+    """The field that a frame is made of which is one itself, as "minimum-perturbation" is: of two joints a trifle."""
+    return [built(scene, "path")] if scene.system.carried and scene.system.joints > 2 else []
 
 
 def of_medium(scene: Scene, gait: Gait, count: int) -> list[Job]:
@@ -174,7 +180,7 @@ def of_planes(scene: Scene, count: int) -> list[Job]:
     if scene.system.stored("connection"):
         return []
     solves = count * scene.numerics.grid**2 * TIERS["path"].directions(scene.system, scene.numerics)
-    return [Job("balances", scene, None, float(solves))]
+    return [Job("balances", scene, None, float(solves)), *frame(scene)]
 
 
 def of_metric(scene: Scene) -> list[Job]:
