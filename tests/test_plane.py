@@ -157,10 +157,8 @@ def test_commands_tell_the_surface_and_draw_slices(tmp_path):
     at = next(k for k, line in enumerate(lines) if line.startswith("area: over a cone from the loop's mean shape"))
     assert lines[at + 1].split()[:3] == ["amplitude", "position", "(m)"]
     assert float(lines[at + 3].split()[1]) == pytest.approx(0.5 * spread[1], rel=0.06)
-    code, _, err = geomech(
-        "ccf", "s.toml", "--plot", "a.png", "--pair", "3,1", "--slice", "20deg", "--style", "contours", cwd=tmp_path
-    )
-    assert (code, err) == (0, "") and (tmp_path / "a.png").stat().st_size > 20_000
+    code, _, err = geomech("ccf", "s.toml", "--plot", "a.svg", "--pair", "3,1", "--slice", "20deg", cwd=tmp_path)
+    assert (code, err) == (0, "") and "0.349 rad" in (tmp_path / "a.svg").read_text()
     code, _, err = geomech("connection", "s.toml", "-o", "a.nc", "--plot", "b.svg", "--pair", "2,3", cwd=tmp_path)
     assert (code, err) == (0, "") and "0.1 rad" in (tmp_path / "b.svg").read_text()
 
@@ -333,3 +331,29 @@ def test_slices_hold_joints_in_their_order():
         ValueError, match="one angle for all joints that are held, 2 one by one, or 4 for a shape, got 3"
     ):
         _held(scene, (3, 1), [0.3, 0.1, 0.2], True)
+
+
+def test_a_surface_says_what_its_shades_mean():
+    study = Study(Scene(Cubic(), LOOP, Numerics(grid=6, extent=1.2)))
+    flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
+    cut = study.plane((0, 2))
+    drawn = plots.ccf_surface(cut.ccf, 1, [Seen(flat, cut)])
+    signs = np.sign(cut.ccf(Seen(flat, cut).shape(np.linspace(0, 6, 50), np.linspace(0, 1, 9)))[..., 1])
+    found = [text.get_text() for text in drawn.get_legend().get_texts()]
+    assert found == [way for sign, way in ((1, "to the left"), (-1, "to the right")) if (sign * signs > 0).any()]
+
+
+def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatch):
+    from geomech.output import report
+
+    system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
+    drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
+    monkeypatch.setattr(report, "_save", lambda fig, stem: drawn.update({stem.name: fig}))
+    for name in ("plane_connection_figure", "planes_figure"):
+        monkeypatch.setattr(report.plots, name, lambda planes, *told: [one.pair for one in planes])
+    monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told: [*tables])
+    found = report.write(Study(scene), tmp_path, None)
+    pairs = [(0, 1), (0, 2), (1, 2)]
+    assert drawn == {"connection": pairs, "ccf": pairs, "displacement": ["fourier"]}
+    assert (tmp_path / "connection.nc").exists() and {"area", "path", "direct"} <= {*found["fourier"]}
+    assert report.cost(scene).balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12

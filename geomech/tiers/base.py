@@ -22,7 +22,8 @@ WHOLE = {  # numbers of [numerics], from and to
 class Numerics:
     """How finely tiers compute; all optional, and part of [numerics] beside the system's own.
 
-    directions (-): of alphadot in the least-squares fit; if left out 8 for up to two joints, 16 a joint beyond.
+    directions (-): of alphadot in the least-squares fit; if left out 8 for up to two joints, beyond 16 a joint, or
+    4 where xi is linear in alphadot.
     grid (-): points per joint. extent (rad): of the field, on either side of 0. interpolation (-): degree of its splines.
     phases (-): per cycle. harmonics (-): the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond.
     curves (-): in the table of a family of gaits.

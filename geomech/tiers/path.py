@@ -90,7 +90,7 @@ class Path(Tier):
 
     def directions(self, system, numerics) -> int:
         """Of alphadot at each shape."""
-        return numerics.directions or (8 if system.joints <= 2 else 16 * system.joints)
+        return numerics.directions or (8 if system.joints <= 2 else (4 if system.linear else 16) * system.joints)
 
     def axes(self, system, numerics) -> tuple[np.ndarray, ...]:
         """Of its field; ValueError if that is too large."""
