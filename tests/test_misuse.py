@@ -212,9 +212,14 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
     three = scenes.parse(PLAIN.replace('"circle"', '"fourier"\ncos = [[1], [0], [0]]\nsin = [[0], [1], [0]]').replace(
         'kind = "chain"', 'kind = "chain"\nlengths = [1, 1, 1, 1]'
     ))  # fmt: skip
-    assert "not available: CCF maps, area and harmonic tiers: they take 2 joints, this body has 3" in explain(three)
+    assert "tiers: area, adapted, path, direct; by name: harmonic" == explain(three).splitlines()[-1]
     fish = explain(scenes.load("sandfish-loose")).splitlines()
-    assert "not available: path tier: they take 1 to 3 joints, this body has 99" in fish
+    assert "tiers: adapted, direct; by name: area, path" in fish
+    assert "not available: harmonic tier: they take 2 to 5 joints, this body has 99" in fish
+    two = PLAIN.replace('kind = "chain"', 'kind = "chain"\nlengths = [1, 1]').replace('"circle"', '"wave"\njoints = 1')
+    one = explain(scenes.parse(two)).splitlines()
+    assert "not available: CCF maps: a loop of one joint encloses no area" in one
+    assert "not available: area tier: they take 2 joints and more, this body has 1" in one
     assert "not available: area and harmonic tiers: the field has singular shapes" in explain(
         scenes.load("no-slip-snake")
     )

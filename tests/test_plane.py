@@ -278,7 +278,7 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
     np.testing.assert_allclose(area[:, 2], direct[:, 2], atol=1e-5)
     code, _, err = geomech("connection", "six.toml", "-o", "a.nc", cwd=tmp_path)
     assert (
-        code == 2 and "a field of 31^5 shapes is too large (3.4 GB for A): lower [numerics] grid, to 7 or less" in err
+        code == 2 and "a field of 31^5 shapes is too large (3.44 GB for A): lower [numerics] grid, to 7 or less" in err
     )
     four = chain.replace(", 0.8]", "]") + '[gait]\nkind = "wave"\njoints = 4\n'
     (tmp_path / "five.toml").write_text(four.replace('law = "viscous"\nratio = 2.3', 'name = "glass-0.3mm-loose"'))

@@ -62,7 +62,9 @@ PairOption = Annotated[
 SliceOption = Annotated[
     Optional[str],
     typer.Option(
-        "--slice", metavar="ANGLES", help="of the joints that are held: 0.3 for each, or one by one 0.3,-20deg"
+        "--slice",
+        metavar="ANGLES",
+        help="of the joints that are held: 0.3 for each, or one by one 0.3,-20deg (the gait's middle if left out)",
     ),
 ]
 PluginOption = Annotated[

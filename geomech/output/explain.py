@@ -21,8 +21,7 @@ def explain(scene: Scene | Intruding) -> str:
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
     lines.append(f"engine: {system.engine} {system.because}")
-    by_name = [t.name for t in TIERS.values() if system.joints in t.joints and system.joints not in t.offered]
-    by_name = by_name if "path" in tiers(system) else []
+    by_name = [name for name, tier in TIERS.items() if _by_name(tier, system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
     return "\n".join([*lines, *_lost(system)])
 
@@ -36,9 +35,15 @@ def _lost(system) -> list[str]:
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     for tier in TIERS.values():
-        if not tier.takes(system) and not (system.joints in tier.joints and system.joints not in tier.offered):
+        if not (tier.takes(system) or _by_name(tier, system)):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
     return [f"not available: {_listed(lost)}: {why}" for why, lost in reasons.items()]
+
+
+def _by_name(tier, system) -> bool:
+    """Whether a tier says something of a system that no plain study asks for, as it takes long."""
+    possible = system.joints in tier.joints and not system.lacks & tier.rests_on
+    return possible and system.joints not in tier.offered and not (tier.whole and system.singularity is not None)
 
 
 def _listed(lost: list[str]) -> str:
@@ -53,8 +58,8 @@ def _why(tier, system) -> str:
     """Why a tier says nothing of a system."""
     if system.lacks & tier.rests_on:
         return f"{system.blames} takes away what they rest on"
-    if system.joints not in tier.offered:
-        return _joints(system, tier.offered)
+    if system.joints not in tier.joints:
+        return _joints(system, tier.joints)
     return (
         f"the field has singular shapes, where {system.singular}; maps and files leave these out, and gaits that meet "
         "one are refused"
@@ -62,5 +67,5 @@ def _why(tier, system) -> str:
 
 
 def _joints(system, taken: range) -> str:
-    count = f"{taken[0]} joints" if len(taken) == 1 else f"{taken[0]} to {taken[-1]} joints"
+    count = f"{taken[0]} to {taken[-1]} joints" if taken[-1] < 100 else f"{taken[0]} joints and more"
     return f"they take {count}, this body has {system.joints}"

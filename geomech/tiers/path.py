@@ -16,7 +16,7 @@ from geomech.plane import plane as fit_plane
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
 
-INSTEAD = ", draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
+INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
 
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
@@ -32,11 +32,12 @@ def axes(system, numerics) -> tuple[np.ndarray, ...]:
     system.refuse(Tier.needs, Tier.rests_on, "use the direct tier")
     if own := system.stored("connection"):
         return own.axes
-    if (count := numerics.grid**system.joints) > LARGEST_GRID:
-        raise ValueError(
-            f"a field of {numerics.grid}^{system.joints} shapes is too large ({24e-9 * count * system.joints:.2g} GB for A): "
-            f"lower [numerics] grid, to {fits(system.joints)} or less{INSTEAD}"
-        )
+    d, n = system.joints, numerics.grid
+    if n**d > LARGEST_GRID:
+        few = 4**d <= LARGEST_GRID
+        cost = f" ({24e-9 * d * n**d:.3g} GB for A)" if few else ""
+        lower = f"lower [numerics] grid, to {fits(d)} or less, " if few else "give a chain two [body] modes, "
+        raise ValueError(f"a field of {n}^{d} shapes is too large{cost}: {lower}{INSTEAD}")
     return connection.grid(system.joints, numerics.grid, numerics.extent)
 
 
