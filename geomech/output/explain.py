@@ -9,6 +9,8 @@ from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
 
+MOST_JOINTS = 5  # of which all pairs are drawn side by side
+
 
 def explain(scene: Scene | Intruding) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
@@ -34,6 +36,8 @@ def _lost(system) -> list[str]:
         first += ["velocity at a single shape"] if system.steps else []
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
+    elif system.joints > MOST_JOINTS:
+        reasons[f"of {system.joints} joints there are slices, pair by pair (geomech ccf --pair)"] = ["CCF maps"]
     for tier in TIERS.values():
         if not (tier.takes(system) or _by_name(tier, system)):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
