@@ -628,7 +628,7 @@ def test_loops_on_maps_of_all_kinds(stroke):
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
     titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
-    assert "CCF of the displacement, frame mean" in titles
+    assert "CCF of the displacement,\nframe mean" in titles
     assert "singular shapes" in snake.active
     assert 0.1 < (held(snake, along(snake)) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
