@@ -126,8 +126,16 @@ class Spatial:
         """`stress` for n and v (3, N), upwards being along ``up`` (3,)."""
         speed = np.sqrt(np.einsum("iN,iN->N", v, v))
         v = v / np.where(speed > 0, speed, 1.0)
-        leads = self._leads(np.einsum("iN,iN->N", n, v)) * (speed > 0)
-        return self._limited(_alpha(n, v, up), n) * (self.xi_n * leads)
+        return self.traction(n, v, up) * (self._leads(np.einsum("iN,iN->N", n, v)) * (speed > 0))
+
+    def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
+        """The same for unit velocities v (3, N), whether or not the faces lead."""
+        return self._limited(_alpha(n, v, up), n) * self.xi_n
+
+    def share(self, along: np.ndarray, sheet: np.ndarray) -> np.ndarray:
+        """Of that on faces of which n . v is ``along`` (N,), where ``sheet`` (N,) those of a thin sheet, either side of which
+        may lead."""
+        return self._leads(np.where(sheet, np.abs(along), along))
 
     def _leads(self, along: np.ndarray) -> np.ndarray:
         """0 for faces that trail to 1 for those that lead, from n . v of unit vectors."""

@@ -1,0 +1,54 @@
+"""The stress map of the vertical plane for faces that point and move in any direction.
+
+In the plane the nine-term map (`rft.vertical.stress.StressMap`) has trigonometric functions of the tilt beta and of the
+direction of motion gamma. With n the normal of a face, v the unit vector of its velocity, both cut into a part along the
+vertical, n_z and v_z, and a horizontal vector, n_h and v_h, they read
+
+    cos 2 beta = n_z^2 - n_h^2,    sin 2 beta = -2 n_z n_h,    sin gamma = -v_z,    cos gamma = v_h,
+    sin 2 beta cos gamma = -2 n_z n_h . v_h,    cos 2 beta cos gamma = n_z^2 v_h - n_h (n_h . v_h).
+
+Read so they need no plane: the map turns with n and v about the vertical, takes either normal of a face, and is that of the
+vertical plane wherever n and v lie in one. What the plane cannot tell is chosen so that an upright face that moves along
+itself bears nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.media.base import require, shown
+from rft.vertical.stress import PER_CUBIC_METRE, StressMap
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Extruded:
+    """A stress map in three dimensions."""
+
+    stress: StressMap
+
+    def __post_init__(self):
+        told = f"stress must be a StressMap, nine coefficients, got {shown(self.stress)}: fit some to plate drags"
+        require(isinstance(self.stress, StressMap), told)
+
+    def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
+        """Force per area and depth, N/m^3 (3, N), on faces with unit normals n and unit velocities v (3, N), whether or not
+        they lead; upwards is along ``up`` (3,)."""
+        s, n_z, v_z, along = self.stress, up @ n, up @ v, (n * v).sum(0)
+        n_h, v_h, inner = n - n_z * up[:, None], v - v_z * up[:, None], along - n_z * v_z
+        cos_2b = n_z * n_z - (n_h * n_h).sum(0)
+        both, ahead = s.C11 + s.Cm11, s.Cm11 - s.C11
+        a_z = s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2 * n_z * inner - s.B01 * v_z
+        a_h = (s.C01 + both) * n_z * n_z * v_h
+        a_h = a_h + ((s.C01 - both) * inner + 2 * n_z * (ahead * v_z - s.D10)) * n_h
+        found = PER_CUBIC_METRE * s.zeta * (a_z * up[:, None] - a_h)
+        return found if s.tension == "keep" else np.where((found * n).sum(0) * along <= 0.0, found, 0.0)
+
+    def share(self, along: np.ndarray, sheet: np.ndarray) -> np.ndarray:
+        """Of the stress on faces of which n . v is ``along`` (N,): 0 on those that trail, rising by degrees on those that lead
+        (`PlateStress.grazing`); 1 on a thin sheet, of which one side or the other leads."""
+        scale = np.sqrt(along * along + np.sin(self.stress.grazing) ** 2)
+        return np.where(sheet, 1.0, np.maximum(along, 0.0) / np.where(scale == 0.0, 1.0, scale))

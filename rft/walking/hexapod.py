@@ -1,0 +1,114 @@
+"""Robots of the vertical plane as MuJoCo models: a box on rotary legs on both sides, in an alternating tripod.
+
+The left leg of a hip is the first of the planar engine's two, the right one half a cycle behind. What the plane does not
+tell is assumed: legs are beside the body, with no room between, and roll and yaw have the inertia of the box, or what is to
+that as the pitch inertia is to the box's. Legs have hardly any mass, and are turned by servos so stiff that the weight of
+the robot at the end of a leg turns it by 1e-4 rad.
+"""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rft.media.catalogue import GRAVITY
+from rft.walking.facets import Surface
+from rft.walking.robot import Rhex, Robot
+
+LIGHT = 1e-6  # of the robot's mass, that of a leg
+GIVES = 1e-4  # rad, that a leg turns by with the robot's weight at its end
+QUICK = 1e-3  # s, in which a servo settles
+THICK = 0.02  # of a leg's reach, as drawn
+
+PLANAR = (("slide", "1 0 0"), ("slide", "0 0 1"), ("hinge", "0 1 0"))
+
+
+def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
+    """The model as XML: a body "hull", "leg0", "leg1", ... hinged to it at hips from the first to the last, left and right in
+    turn, with position actuators of the same names. planar: the hull keeps to the plane: no roll, no yaw, nothing sideways."""
+    legs = robot.leg(elements)
+    reach = float(np.abs(legs.points).max())
+    root = ET.Element("mujoco", model="robot")
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(root, "option", gravity=f"0 0 {-GRAVITY!r}")
+    ET.SubElement(ET.SubElement(root, "visual"), "global", offwidth="1280", offheight="960")
+    world = ET.SubElement(root, "worldbody")
+    ET.SubElement(world, "light", pos="0 0 2", dir="0.2 0.3 -1", directional="true")
+    hull = ET.SubElement(world, "body", name="hull")
+    for kind, axis in PLANAR if planar else ():
+        ET.SubElement(hull, "joint", type=kind, axis=axis)
+    if not planar:
+        ET.SubElement(hull, "freejoint")
+    sides = inertia(robot)
+    count = 2 * len(robot.hips)
+    _inertial(hull, robot.mass * (1 - count * LIGHT), sides)
+    box = [robot.length, robot.width, robot.height]
+    ET.SubElement(hull, "geom", type="box", size=_text(np.array(box) / 2), rgba="0.25 0.3 0.4 1", **UNTOUCHED)
+    stiff = robot.mass * GRAVITY * reach / GIVES
+    motors = ET.SubElement(root, "actuator")
+    for k, place in enumerate(hips(robot)):
+        leg = ET.SubElement(hull, "body", name=f"leg{k}", pos=_text(place))
+        ET.SubElement(leg, "joint", name=f"leg{k}", type="hinge", axis="0 1 0")
+        light = robot.mass * LIGHT
+        _inertial(leg, light, np.full(3, light * reach**2 / 3))
+        for geom in _drawn(legs, THICK * reach):
+            ET.SubElement(leg, "geom", rgba="0.8 0.35 0.2 1" if _tripod(k) else "0.2 0.5 0.7 1", **geom, **UNTOUCHED)
+        ET.SubElement(motors, "position", name=f"leg{k}", joint=f"leg{k}", kp=repr(stiff), kv=repr(stiff * QUICK))
+    return ET.tostring(root, encoding="unicode")
+
+
+UNTOUCHED = {"contype": "0", "conaffinity": "0"}
+
+
+def inertia(robot: Rhex) -> np.ndarray:
+    """(3,): about x, y, z; that of the box, as far as it is that about y."""
+    square = np.array([robot.length, robot.width, robot.height]) ** 2
+    box = square.sum() - square
+    return robot.inertia * box / box[1]
+
+
+def hips(robot: Rhex) -> list[tuple[float, float, float]]:
+    """Of each leg, from the hull's middle: left (y > 0) and right of hip after hip."""
+    return [(x, side * y, robot.hip_height) for x, y in zip(robot.hips, aside(robot)) for side in (1, -1)]
+
+
+def aside(robot: Rhex) -> np.ndarray:
+    """Of each hip, m, its legs from the middle plane: as given, or beside the body with every other hip's so much farther out,
+    where hips are odd in number, that a tripod whose legs bear alike neither rolls nor yaws the body."""
+    count = len(robot.hips)
+    near = (robot.width + robot.legs.width) / 2
+    out = (count + 1) / (count - 1) if count > 1 and count % 2 else 1.0
+    return np.array([near * (out if k % 2 else 1.0) for k in range(count)])
+
+
+def phases(robot: Rhex) -> np.ndarray:
+    """Of each leg, in cycles."""
+    return np.array([_tripod(k) / 2 for k in range(2 * len(robot.hips))])
+
+
+def _tripod(k: int) -> int:
+    return (k // 2 + k % 2) % 2
+
+
+def surfaces(robot: Robot, elements: int = 12) -> list[Surface]:
+    """What touches the ground: the hull, body 1 of the model, and its legs."""
+    leg = robot.leg(elements)
+    count = 2 * len(robot.hips)
+    return [Surface.of_outline(1, robot.belly(elements)), *(Surface.of_outline(2 + k, leg) for k in range(count))]
+
+
+def _drawn(legs, thick: float):
+    """Geoms that show an outline: a box for each of its elements."""
+    along = np.diff(legs.points, axis=0)
+    for (x, z), (dx, dz), length in zip(legs.midpoints, along, legs.lengths):
+        size = np.array([length, legs.width, thick]) / 2
+        yield {"type": "box", "size": _text(size), "pos": _text((x, 0.0, z)), "euler": _text((0.0, -np.arctan2(dz, dx), 0.0))}
+
+
+def _inertial(body, mass: float, sides) -> None:
+    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=_text(sides))
+
+
+def _text(numbers) -> str:
+    return " ".join(repr(float(x)) for x in numbers)
