@@ -64,14 +64,21 @@ class Surface(NamedTuple):
 
     @classmethod
     def of_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0)) -> Surface:
-        """An outline of the vertical plane across its width, without the sides that close it; two triangles an element."""
+        """An outline of the vertical plane across its width: two triangles an element, and, where it is closed, a fan of
+        triangles on either side. Those of a fan may count as negative (`Facets`), so that it need not be convex."""
         low, high = (np.insert(outline.points, 1, y, axis=1) for y in (-outline.width / 2, outline.width / 2))
         a, b, c, d = low[:-1], low[1:], high[1:], high[:-1]
-        corners = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]) + place
+        corners = np.concatenate([np.stack([a, c, b], 1), np.stack([a, d, c], 1)]) + place
         near, far = (outline.end_normals[:, k] for k in (0, 1))
         normals = [np.insert((1 - t) * near + t * far, 1, 0.0, axis=1) for t in (2 / 3, 1 / 3)]
         normals = np.concatenate(normals)
-        return cls(body, corners, normals / np.linalg.norm(normals, axis=1, keepdims=True), not outline.closed)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        if outline.closed:
+            for ring, out in ((low, (0.0, -1.0, 0.0)), (high[::-1], (0.0, 1.0, 0.0))):
+                fan = [np.broadcast_to(ring[0], ring[1:-2].shape), ring[1:-2], ring[2:-1]]
+                corners = np.concatenate([corners, np.stack(fan, 1) + place])
+                normals = np.concatenate([normals, np.broadcast_to(out, (len(ring) - 3, 3))])
+        return cls(body, corners, normals, not outline.closed)
 
 
 class Poses(NamedTuple):
@@ -84,7 +91,8 @@ class Poses(NamedTuple):
 
 
 class Facets:
-    """All surfaces; ``bodies``: (B,) the numbers they name, in the order of what is given and returned."""
+    """All surfaces; ``bodies``: (B,) the numbers they name, in the order of what is given and returned. A triangle whose
+    corners turn clockwise seen from where its normal points counts as negative."""
 
     def __init__(self, surfaces: Sequence[Surface]):
         require(len(surfaces) > 0, "no geoms that touch the ground")
@@ -95,7 +103,8 @@ class Facets:
         self.normals = np.concatenate([s.normals for s in surfaces])
         self.sheet, self.of = np.repeat([s.sheet for s in surfaces], sizes), np.repeat(counts, sizes)
         a, b, c = self.corners.swapaxes(0, 1)
-        self.areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        across = np.cross(b - a, c - a)
+        self.areas = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * self.normals).sum(1))
         self.first = np.searchsorted(self.of, np.arange(len(self.bodies)))
         self.reach = np.maximum.reduceat(np.linalg.norm(self.corners, axis=2).max(1), self.first)
 
