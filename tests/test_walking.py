@@ -297,7 +297,6 @@ def test_other_refusals(geomech, tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
     for args, said in (
         (("walk", "bad.toml"), "a robot without legs: add the table [robot.legs]"),
-        (("walk", "small.toml", "--engine", "mujoco"), "the mujoco engine is not"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),
         (("walk", "small.toml", "--animate", "film.avi"), "end the name in"),

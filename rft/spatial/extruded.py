@@ -41,7 +41,9 @@ class Extruded:
         n_h, v_h, inner = n - n_z * up[:, None], v - v_z * up[:, None], along - n_z * v_z
         cos_2b = n_z * n_z - (n_h * n_h).sum(0)
         both, ahead = s.C11 + s.Cm11, s.Cm11 - s.C11
-        a_z = s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2 * n_z * inner - s.B01 * v_z
+        a_z = (
+            s.A00 + s.A10 * cos_2b - (s.B11 + s.Bm11) * cos_2b * v_z - (s.B11 - s.Bm11) * 2 * n_z * inner - s.B01 * v_z
+        )
         a_h = (s.C01 + both) * n_z * n_z * v_h
         a_h = a_h + ((s.C01 - both) * inner + 2 * n_z * (ahead * v_z - s.D10)) * n_h
         found = PER_CUBIC_METRE * s.zeta * (a_z * up[:, None] - a_h)

@@ -61,6 +61,33 @@ def screw(
     return _tube(np.array(rings), _count("across", across, 1))
 
 
+def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mesh:
+    """A rod along z of length 2 ``half`` with a half sphere at either end, so many triangles around and along the rod. Its
+    poles are cut off flat within a quarter of a triangle's angle of the axis."""
+    _sizes(radius=radius, half=half)
+    turn = 2 * np.pi * np.arange(_count("around", around, 4)) / around
+    polar = np.linspace(0.25, around / 4, max(2, around // 4)) * 2 * np.pi / around
+    z = [-half - radius * np.cos(polar), np.linspace(-half, half, _count("along", along, 1) + 1)[1:-1]]
+    z = np.concatenate([*z, -z[0][::-1]])
+    r = np.concatenate([radius * np.sin(polar), np.full(along - 1, radius), radius * np.sin(polar)[::-1]])
+    return _tube(np.stack([np.outer(r, np.cos(turn)), np.outer(r, np.sin(turn)), z[:, None] + 0 * turn], -1), 1)
+
+
+def box(sides, m: int = 1) -> Mesh:
+    """Along the axes, about the origin; each face cut into m x m rectangles."""
+    half = np.asarray(sides, float) / 2
+    s, points, faces = np.linspace(-1.0, 1.0, _count("m", m, 1) + 1), [], []
+    for axis in range(3):
+        for out in (-1.0, 1.0):
+            u, v = np.meshgrid(s, out * s, indexing="ij")
+            n = len(faces) // 2 * (m + 1) ** 2 + np.arange((m + 1) ** 2).reshape(m + 1, m + 1)
+            a, b, c, d = n[:-1, :-1].ravel(), n[1:, :-1].ravel(), n[1:, 1:].ravel(), n[:-1, 1:].ravel()
+            points.append(np.roll(np.stack([out + 0 * u, u, v], -1).reshape(-1, 3), axis, 1) * half)
+            faces += [np.stack([a, b, c], -1), np.stack([a, c, d], -1)]
+    vertices, where = np.unique(np.concatenate(points), axis=0, return_inverse=True)
+    return Mesh(vertices, where.reshape(-1)[np.concatenate(faces)])
+
+
 def leg(
     reach: float, curvature: float, thickness: float, width: float, along: int = 64, across: int = 8, thick: int = 2
 ) -> Mesh:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+AHEAD, BEHIND = [1, 2, 0], [2, 0, 1]
+
 
 def submerged(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(share (...,), middle (3, ...), moments (3, ...), m) of triangles whose corners are at ``heights`` (3, ...), m: of the
@@ -17,21 +19,11 @@ def submerged(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     sum_i moments_i x_i, so the integral of depth is area times the sum of the moments."""
     depth = -np.asarray(heights, float)
     under = depth > 0.0
-    count = under.sum(0)
-    alone = np.argmax(under == (count == 1), 0)
-    order = [alone, (alone + 1) % 3, (alone + 2) % 3]
-    d, e, f = (np.take_along_axis(depth, k[None], 0)[0] for k in order)
-    cut = (count == 1) | (count == 2)
-    s, t = (d / np.where(cut, d - x, 1.0) * cut for x in (e, f))
-    tip = s * t
-    middles = [tip * x / 3 for x in (3 - s - t, s, t)]
-    moments = [tip * d * x / 12 for x in (4 - s - t, s, t)]
-    sign, most = np.where(count == 1, 1.0, -1.0), count > 1
-    middle, moment = np.empty_like(depth), np.empty_like(depth)
-    for k, x, y in zip(order, middles, moments):
-        np.put_along_axis(middle, k[None], (sign * x)[None], 0)
-        np.put_along_axis(moment, k[None], (sign * y)[None], 0)
-    share = sign * tip + most
-    middle += most / 3
-    moment += most * (depth + depth.sum(0)) / 12
-    return share, middle / np.where(share > 0.0, share, 1.0), moment
+    most = under.sum(0) > 1
+    alone = (under != under[AHEAD]) & (under != under[BEHIND])  # at most one of three
+    s, t = (np.where(alone, depth, 0.0) / np.where(alone, depth - depth[k], 1.0) for k in (AHEAD, BEHIND))
+    tip = np.where(under, 1.0, -1.0) * s * t
+    middle, d = tip * (3 - s - t) + (tip * s)[BEHIND] + (tip * t)[AHEAD] + most, tip * depth
+    moment = d * (4 - s - t) + (d * s)[BEHIND] + (d * t)[AHEAD] + most * (depth + depth.sum(0))
+    share = tip.sum(0) + most
+    return share, middle / (3 * np.where(share > 0.0, share, 1.0)), moment / 12

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rft.media.base import check_ranges, in_range, require, shown
+from rft.spatial.law import Spatial
 from rft.vertical.effects import Aeration, GrainInertia, GroundEffect, checked, pressure, strength
 from rft.vertical.stress import PlateStress
 from rft.walking.robot import Robot, Tripod
@@ -16,17 +17,18 @@ from rft.walking.stride import Walk
 
 @dataclass(frozen=True)
 class Walker:
-    """A robot, its clock and its ground. effects: aeration and grain inertia."""
+    """A robot, its clock and its ground: a stress map of the vertical plane, or a law of three dimensions. effects: aeration
+    and grain inertia."""
 
     robot: Robot
     gait: Tripod
-    stress: PlateStress
+    stress: PlateStress | Spatial
     effects: tuple[GroundEffect, ...] = ()
 
     def __post_init__(self):
-        for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress)):
-            value = getattr(self, name)
-            require(isinstance(value, kind), f"{name} must be a {kind.__name__}, got {shown(value)}")
+        for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress | Spatial)):
+            value, such = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
+            require(isinstance(value, kind), f"{name} must be a {such}, got {shown(value)}")
         object.__setattr__(self, "effects", checked(self.effects))
         for effect in self.effects:
             good = isinstance(effect, Aeration | GrainInertia)
@@ -61,7 +63,11 @@ class Fineness:
 
 
 class Engine(Protocol):
-    """A module with these two."""
+    """A module with these three."""
+
+    def refuse(self, walker: Walker) -> None:
+        """ValueError for a walker that this engine does not take."""
+        ...
 
     def walk(self, walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
         """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
@@ -77,9 +83,12 @@ class Engine(Protocol):
 def engine(name: str) -> Engine:
     """The engine of that name; ValueError for one that is not here."""
     require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}, got {shown(name)}")
-    module = ENGINES[name]
-    require(module is not None, f"the {name} engine is not available here: use --engine planar")
-    return importlib.import_module(module)
+    try:
+        return importlib.import_module(ENGINES[name])
+    except ModuleNotFoundError as error:
+        if error.name != name:
+            raise
+        raise ValueError(f"the {name} engine is not installed: pip install 'geomech[{name}]'") from None
 
 
-ENGINES = {"planar": "rft.walking.planar_walk", "mujoco": None}
+ENGINES = {"planar": "rft.walking.planar_walk", "mujoco": "rft.walking.mujoco_walk"}

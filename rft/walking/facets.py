@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import check_ranges, is_number, require, shown
+from rft.media.base import check_ranges, require, shown
 from rft.spatial.extruded import Extruded
 from rft.spatial.law import Spatial
 from rft.spatial.mesh import Mesh
@@ -164,4 +164,7 @@ class Facets:
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a x b, components first."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.subtract(a[j] * b[k], a[k] * b[j], out=out[i])
+    return out

@@ -14,7 +14,7 @@ import numpy as np
 
 from rft.media.catalogue import GRAVITY
 from rft.walking.facets import Surface
-from rft.walking.robot import Rhex, Robot
+from rft.walking.robot import Robot, Roller
 
 LIGHT = 1e-6  # of the robot's mass, that of a leg
 GIVES = 1e-4  # rad, that a leg turns by with the robot's weight at its end
@@ -36,66 +36,62 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 2", dir="0.2 0.3 -1", directional="true")
     hull = ET.SubElement(world, "body", name="hull")
-    for kind, axis in PLANAR if planar else ():
+    level = isinstance(robot, Roller)
+    for kind, axis in PLANAR[: 2 if level else 3] if planar or level else ():
         ET.SubElement(hull, "joint", type=kind, axis=axis)
-    if not planar:
+    if not (planar or level):
         ET.SubElement(hull, "freejoint")
-    sides = inertia(robot)
-    count = 2 * len(robot.hips)
-    _inertial(hull, robot.mass * (1 - count * LIGHT), sides)
-    box = [robot.length, robot.width, robot.height]
-    ET.SubElement(hull, "geom", type="box", size=_text(np.array(box) / 2), rgba="0.25 0.3 0.4 1", **UNTOUCHED)
+    _inertial(hull, robot.mass * (1 - len(hips(robot)) * LIGHT), inertia(robot, reach))
+    if not level:
+        half = np.array([robot.length, robot.width, robot.height]) / 2
+        ET.SubElement(hull, "geom", type="box", size=_text(half), rgba="0.25 0.3 0.4 1", **UNTOUCHED)
     stiff = robot.mass * GRAVITY * reach / GIVES
     motors = ET.SubElement(root, "actuator")
-    for k, place in enumerate(hips(robot)):
+    for k, (place, phase) in enumerate(zip(hips(robot), phases(robot))):
         leg = ET.SubElement(hull, "body", name=f"leg{k}", pos=_text(place))
         ET.SubElement(leg, "joint", name=f"leg{k}", type="hinge", axis="0 1 0")
         light = robot.mass * LIGHT
         _inertial(leg, light, np.full(3, light * reach**2 / 3))
         for geom in _drawn(legs, THICK * reach):
-            ET.SubElement(leg, "geom", rgba="0.8 0.35 0.2 1" if _tripod(k) else "0.2 0.5 0.7 1", **geom, **UNTOUCHED)
+            ET.SubElement(leg, "geom", rgba=COLOURS[bool(phase)], **geom, **UNTOUCHED)
         ET.SubElement(motors, "position", name=f"leg{k}", joint=f"leg{k}", kp=repr(stiff), kv=repr(stiff * QUICK))
     return ET.tostring(root, encoding="unicode")
 
 
 UNTOUCHED = {"contype": "0", "conaffinity": "0"}
+COLOURS = "0.2 0.5 0.7 1", "0.8 0.35 0.2 1"  # of the two tripods
 
 
-def inertia(robot: Rhex) -> np.ndarray:
-    """(3,): about x, y, z; that of the box, as far as it is that about y."""
+def inertia(robot: Robot, reach: float) -> np.ndarray:
+    """(3,): about x, y, z; that of the box, as far as it is that about y. Of one that is kept level it does not count."""
+    if isinstance(robot, Roller):
+        return np.full(3, robot.mass * reach**2)
     square = np.array([robot.length, robot.width, robot.height]) ** 2
     box = square.sum() - square
     return robot.inertia * box / box[1]
 
 
-def hips(robot: Rhex) -> list[tuple[float, float, float]]:
+def hips(robot: Robot) -> list[tuple[float, float, float]]:
     """Of each leg, from the hull's middle: left (y > 0) and right of hip after hip."""
-    return [(x, side * y, robot.hip_height) for x, y in zip(robot.hips, aside(robot)) for side in (1, -1)]
+    sides = (0.0,) if isinstance(robot, Roller) else robot.sides
+    return [(x, side * y, robot.hip_height) for x, y in zip(robot.hips, sides) for side in _sides(robot)]
 
 
-def aside(robot: Rhex) -> np.ndarray:
-    """Of each hip, m, its legs from the middle plane: as given, or beside the body with every other hip's so much farther out,
-    where hips are odd in number, that a tripod whose legs bear alike neither rolls nor yaws the body."""
-    count = len(robot.hips)
-    near = (robot.width + robot.legs.width) / 2
-    out = (count + 1) / (count - 1) if count > 1 and count % 2 else 1.0
-    return np.array([near * (out if k % 2 else 1.0) for k in range(count)])
+def _sides(robot: Robot) -> tuple[int, ...]:
+    return (1, -1)[: len(robot.apart)]
 
 
-def phases(robot: Rhex) -> np.ndarray:
+def phases(robot: Robot) -> np.ndarray:
     """Of each leg, in cycles."""
-    return np.array([_tripod(k) / 2 for k in range(2 * len(robot.hips))])
-
-
-def _tripod(k: int) -> int:
-    return (k // 2 + k % 2) % 2
+    each = len(robot.apart)
+    return np.array([(k // each + k % each) % each / each for k in range(each * len(robot.hips))])
 
 
 def surfaces(robot: Robot, elements: int = 12) -> list[Surface]:
     """What touches the ground: the hull, body 1 of the model, and its legs."""
-    leg = robot.leg(elements)
-    count = 2 * len(robot.hips)
-    return [Surface.of_outline(1, robot.belly(elements)), *(Surface.of_outline(2 + k, leg) for k in range(count))]
+    leg, belly = robot.leg(elements), robot.belly(elements)
+    hull = [Surface.of_outline(1, belly)] if belly else []
+    return hull + [Surface.of_outline(2 + k, leg) for k in range(len(hips(robot)))]
 
 
 def _drawn(legs, thick: float):
@@ -103,7 +99,12 @@ def _drawn(legs, thick: float):
     along = np.diff(legs.points, axis=0)
     for (x, z), (dx, dz), length in zip(legs.midpoints, along, legs.lengths):
         size = np.array([length, legs.width, thick]) / 2
-        yield {"type": "box", "size": _text(size), "pos": _text((x, 0.0, z)), "euler": _text((0.0, -np.arctan2(dz, dx), 0.0))}
+        yield {
+            "type": "box",
+            "size": _text(size),
+            "pos": _text((x, 0.0, z)),
+            "euler": _text((0.0, -np.arctan2(dz, dx), 0.0)),
+        }
 
 
 def _inertial(body, mass: float, sides) -> None:

@@ -12,13 +12,12 @@ them, as well, once a step.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 
 from rft.media.base import require
-from rft.spatial.mesh import Mesh
 from rft.walking.facets import Facets, Grains, Poses, Surface
 
 GAMMA = 1.0 - math.sqrt(0.5)  # of SDIRK2
@@ -30,26 +29,14 @@ ENOUGH = 0.1  # of the fall of the correction that Newton's method foretells
 NUDGE = 1e-6  # of a velocity, for differences of MuJoCo's forces
 
 
-def surfaces_of(model: mujoco.MjModel, meshes: Mapping[str, Mesh]) -> list[Surface]:
-    """Meshes in the frames of the geoms that they are named after. ValueError for geoms that are not in the model."""
-    out = []
-    for name, mesh in meshes.items():
-        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-        require(geom >= 0, f"there is no geom {name!r}")
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-        out.append(Surface.of_mesh(int(model.geom_bodyid[geom]), mesh, turn, model.geom_pos[geom]))
-    return out
-
-
 class Multibody:
     """A MuJoCo model on grains, step after step.
 
-    model: compiled; gravity along -z, the surface at z = 0. surfaces: what touches the ground, of `surfaces_of` or
-    `Surface`. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a time, s, with
+    model: compiled; gravity along -z, the surface at z = 0. surfaces: what touches the ground, of `rft.walking.geoms.named`
+    or `Surface`. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a time, s, with
     the rates that hold at the time ``of``, on whose side of a kink it is; None: those of the data as they are.
 
-        craft = Multibody(model, surfaces_of(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
+        craft = Multibody(model, named(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
         while craft.data.time < 10.0:
             craft.step(0.01)
 
@@ -120,7 +107,7 @@ class Multibody:
         k = GAMMA * h
         first, good, *powers = self._stage(q, v, v, k, t + k, of)
         q_2, v_2 = self._moved(q, first, h - k), v + (h - k) / k * (first - v)
-        last, also, *others = self._stage(q_2, v_2, first, k, t + h, of)
+        _, also, *others = self._stage(q_2, v_2, first, k, t + h, of)
         work, loss = (h * ((1 - GAMMA) * a + GAMMA * b) for a, b in zip(powers, others))
         self.work, self.loss = self.work + work, self.loss + loss
         return good and also

@@ -8,15 +8,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rft.media.base import require
+from rft.vertical.stress import PlateStress
 from rft.walking.engines import Fineness, Walker
 from rft.walking.ground import Ground
 from rft.walking.planar import Robots, State
+from rft.walking.robot import Rhex, Roller
 from rft.walking.stride import FEW_STRIDES, MOST_STRIDES, STUCK, Strides, Walk, from_rest, limit_cycle
+
+
+def refuse(walker: Walker) -> None:
+    """ValueError for a walker that this engine does not take."""
+    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes --engine mujoco")
+    planar = isinstance(walker.robot, Rhex | Roller)
+    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot: use --engine mujoco")
 
 
 def walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
     """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
     found: list = [None] * len(walkers)
+    for walker in walkers:
+        refuse(walker)
     for members in _alike(walkers, numerics):
         for k, one in zip(members, _walk([walkers[k] for k in members], numerics, settling)):
             found[k] = one

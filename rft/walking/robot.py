@@ -108,7 +108,9 @@ class Rhex(Robot):
     """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
 
     length, height, width: of the box about the centre of mass, m. hip_height: of the hips above it. inertia: that of the box
-    where none is given.
+    where none is given. aside: of the legs at each hip from the middle plane, m, one on either side, for the engine of three
+    dimensions; where none are given, beside the box, and at every other one of an odd number of hips so much farther out
+    that a tripod whose legs bear alike neither rolls nor yaws the body.
     """
 
     mass: float
@@ -120,6 +122,7 @@ class Rhex(Robot):
     hip_height: float = 0.0
     inertia: float | None = None
     axle: float = 0.0
+    aside: tuple[float, ...] | None = None
     apart = (0.0, 0.5)
     period = 1.0
 
@@ -138,6 +141,23 @@ class Rhex(Robot):
         if self.inertia is None:
             object.__setattr__(self, "inertia", self.mass * (self.length**2 + self.height**2) / 12)
         check_ranges(self, inertia=INERTIAS)
+        if self.aside is not None:
+            aside = real_array("aside", self.aside)
+            good = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
+            told = (
+                f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip, got {shown(self.aside)}"
+            )
+            require(good, told)
+            object.__setattr__(self, "aside", tuple(map(float, aside)))
+
+    @property
+    def sides(self) -> np.ndarray:
+        """m, of each hip: its legs from the middle plane."""
+        if self.aside is not None:
+            return np.array(self.aside)
+        count, near = len(self.hips), (self.width + self.legs.width) / 2
+        out = (count + 1) / (count - 1) if count > 1 and count % 2 else 1.0
+        return np.array([near * (out if k % 2 else 1.0) for k in range(count)])
 
     def belly(self, elements: int) -> Outline:
         x, z = self.length / 2, self.height / 2

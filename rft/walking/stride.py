@@ -7,8 +7,9 @@ limit cycle is found without waiting for what dies out slowly (`rft.limit_cycle`
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,8 @@ class Walk(NamedTuple):
     (T,), J, of the body: work = loss + change of energy. speed: m/s, mean of the limit cycle, or till the robot's end. status:
     "walking", "stuck", "sunk", "flipped" or "airborne". cycles: computed in all. periodic: whether the limit cycle was
     found. drift: m/s, what the speed may still change. limit: its state there, None where there is none. unsolved: steps,
-    of all computed, that were taken unsolved (`State`).
+    of all computed, that were taken unsolved (`State`). more: of three dimensions, y (m), roll and yaw (rad), (T,), and
+    "states" (T, nq), MuJoCo's positions.
     """
 
     t: np.ndarray
@@ -44,8 +46,9 @@ class Walk(NamedTuple):
     cycles: float
     periodic: bool
     drift: float
-    limit: State | None
+    limit: Any
     unsolved: int = 0
+    more: Mapping[str, np.ndarray] | None = None
 
 
 class Strides:

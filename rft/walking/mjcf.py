@@ -1,0 +1,166 @@
+"""Robots of one's own: any MJCF, with a list of the geoms that touch the ground. Needs MuJoCo."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rft.media.base import in_range, real_array, require, shown
+from rft.walking.facets import Surface
+from rft.walking.robot import Robot
+
+LARGEST_FILE = 20_000_000  # bytes of XML
+MOST_ALIKE = 200  # geoms, and actuators
+MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
+
+
+@dataclass(frozen=True)
+class Mjcf(Robot):
+    """A robot of an MJCF file, walking along x, the ground at z = 0.
+
+    mjcf (-): name of the file; in a scene file, from the folder of that. geoms (-): names of those that touch the ground,
+    and nothing else. actuators (-): names of those that the gait's clock turns, <position> or <velocity> ones; if left out
+    all such. phases (-): of each of them, in cycles; if left out 0.
+
+    Other actuators keep the controls of the first keyframe, or 0. The robot starts as in the first keyframe, if there is one,
+    lifted or lowered so that the lowest of its geoms is on the ground.
+    """
+
+    mjcf: str
+    geoms: tuple[str, ...]
+    actuators: tuple[str, ...] | None = None
+    phases: tuple[float, ...] | None = None
+    digest: str = field(init=False, default="")
+    apart = ()
+    period = 1.0
+
+    def __post_init__(self):
+        require(isinstance(self.mjcf, str), f"mjcf must be the name of an MJCF file, got {shown(self.mjcf)}")
+        for name in ("geoms", "actuators"):
+            value = getattr(self, name)
+            if value is None and name == "actuators":
+                continue
+            good = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
+            require(good and len(value) <= MOST_ALIKE, f"{name} must be a list of names, got {shown(value)}")
+            require(len({*value}) == len(value), f"{name} names one twice: {shown(value)}")
+            object.__setattr__(self, name, tuple(value))
+        require(len(self.geoms) > 0, "a robot without legs: geoms must name those that touch the ground")
+        model, digest = _compiled(self.mjcf)
+        object.__setattr__(self, "digest", digest)
+        object.__setattr__(self, "model", model)
+        self._find_geoms()
+        self._find_driven()
+
+    def __getstate__(self):
+        return {k: v for k, v in self.__dict__.items() if k != "model"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        object.__setattr__(self, "model", _compiled(self.mjcf)[0])
+
+    @property
+    def mass(self) -> float:
+        """kg, of all bodies."""
+        return float(self.model.body_mass.sum())
+
+    def _find_geoms(self) -> None:
+        import mujoco
+
+        model = self.model
+        require(model.nv > 0, f"{self.mjcf}: nothing can move: it has no joints")
+        found = []
+        for name in self.geoms:
+            geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+            require(geom >= 0, f"{self.mjcf} has no geom {shown(name)}: it has {_names(model, 'GEOM', model.ngeom)}")
+            still = model.body_weldid[model.geom_bodyid[geom]] == 0
+            require(not still, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
+            found.append(geom)
+        model.geom_contype[found] = model.geom_conaffinity[found] = 0  # the grains bear them, and no floor
+        object.__setattr__(self, "found", np.array(found))
+
+    def _find_driven(self) -> None:
+        import mujoco
+
+        model = self.model
+        require(
+            model.nu > 0, f"{self.mjcf} has no actuators: nothing turns its legs; add <position> or <velocity> ones"
+        )
+        require(model.na == 0, f"{self.mjcf} has actuators with a state of their own: drop their dyntype")
+        affine = (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE) & (
+            model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
+        )
+        able = affine & (model.actuator_biasprm[:, 1:3] != 0.0).any(1) & (model.actuator_gainprm[:, 0] != 0.0)
+        cure = "make it <position> or <velocity>"
+        if self.actuators is None:
+            driven = np.flatnonzero(able)
+            told = f"{self.mjcf}: no actuator can follow the clock: {cure}, or actuators = [] for the first keyframe's controls"
+            require(len(driven) > 0, told)
+        else:
+            ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in self.actuators]
+            for name, k in zip(self.actuators, ids):
+                told = f"it has {_names(model, 'ACTUATOR', model.nu)}"
+                require(k >= 0, f"{self.mjcf} has no actuator {shown(name)}: {told}")
+                require(bool(able[k]), f"{self.mjcf}: the actuator {shown(name)} cannot follow the clock: {cure}")
+            driven = np.array(ids, int)
+        limited = [k for k in driven if model.actuator_ctrllimited[k]]
+        told = f"{self.mjcf}: the actuator {limited[:1]} has a ctrlrange: a leg that turns round needs none; drop it"
+        require(not limited, told)
+        phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
+        good = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
+        require(good, f"phases must be {len(driven)} numbers, one for each actuator, got {shown(self.phases)}")
+        object.__setattr__(self, "phases", tuple(map(float, phases)))
+        object.__setattr__(self, "driven", driven)
+
+    def surfaces(self, elements: int) -> list[Surface]:
+        """What touches the ground, round geoms of ``elements`` edges around."""
+        from rft.walking import geoms
+
+        in_range("elements", elements, 4, 1000, whole=True)
+        out = []
+        for name, geom in zip(self.geoms, self.found):
+            try:
+                out.append(geoms.surface(self.model, geom, geoms.mesh_of(self.model, geom, elements)))
+            except ValueError as error:
+                raise ValueError(f"{self.mjcf}: geom {shown(name)}: {error}") from None
+        return out
+
+    def leg(self, elements: int) -> Any:
+        """None: what touches the ground is `surfaces`."""
+        return None
+
+
+def _compiled(file: str):
+    """(model, digest) of an ordinary file; ValueError in one line if it is none."""
+    try:
+        import mujoco
+    except ImportError:
+        raise ValueError(MISSING) from None
+    path = Path(file)
+    try:
+        require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")
+        require(path.stat().st_size <= LARGEST_FILE, f"{file} is larger than {LARGEST_FILE / 1e6:.0f} MB: no MJCF is")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"cannot read MJCF {file}: {error.strerror}") from None
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except Exception as error:  # whatever the parser makes of a file that is none
+        told = " ".join(str(error).split())
+        raise ValueError(f"{file} is no MJCF that MuJoCo reads: {told[:300]}") from None
+    down = model.opt.gravity
+    upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
+    require(bool(upright), f"{file}: gravity must be along -z, the ground is at z = 0")
+    return model, hashlib.sha256(data).hexdigest()[:16]
+
+
+def _names(model, kind: str, count: int) -> str:
+    """Of the first few."""
+    import mujoco
+
+    names = [mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), k) for k in range(count)]
+    names = [x for x in names if x]
+    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
