@@ -205,7 +205,7 @@ def parameter_kind(scene, parameter: str) -> str | None:
     """Of `numbers`: what a scene's parameter is (`geomech.study.sweep`), None if it is an angle in rad."""
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
     if hasattr(scene, "robot"):
-        of = {"robot": scene.robot.legs, "gait": scene.gait, "medium": scene.medium}.get(section)
+        of = {"robot": getattr(scene.robot, "legs", None), "gait": scene.gait, "medium": scene.medium}.get(section)
         angle = key in getattr(of, "angles", ())
         return None if angle else "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
     if parameter == "gait.amplitude":

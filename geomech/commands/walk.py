@@ -15,7 +15,9 @@ from geomech.files import whole_folder
 
 def walk(
     name: WalkerArgument,
-    engine: Annotated[str, typer.Option(metavar="planar|mujoco", help="what computes the motion")] = "planar",
+    engine: Annotated[
+        Optional[str], typer.Option(metavar="planar|mujoco", help="what computes the motion, in place of the scene's")
+    ] = None,
     as_json: JsonOption = False,
     out: Annotated[
         Optional[Path], typer.Option("-o", "--output", metavar="DIR", help="folder for the results", parser=folder)
@@ -36,7 +38,7 @@ def walk(
     if animate:
         film.check_format(animate)
     check_outputs(scene, animate, None)
-    allow(scene, walking.price(scene), yes)
+    allow(scene, walking.price(scene, by=engine), yes)
     with terminal.progress(f"walk of {scene.name}"):
         found = walking.run(scene, engine)
     if animate:

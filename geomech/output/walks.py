@@ -7,20 +7,24 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from matplotlib.colors import to_rgba
 
 from geomech.files import whole_file
 from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
+from geomech.study import walking
 from geomech.study.walking import Walked
 
+TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
 COLUMNS = ("t", "x", "z", "pitch", "v_x", "v_z", "rate", "work", "loss", "energy")
 
 
 def columns(found: Walked) -> dict[str, np.ndarray]:
-    """Of the table: SI units, radians, a positive pitch nose down."""
+    """Of the table: SI units, radians, a positive pitch nose down; y, roll and yaw too of three dimensions."""
     w = found.walk
-    return dict(zip(COLUMNS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy)))
+    more = {name: values for name, values in (w.more or {}).items() if values.ndim == 1}
+    return dict(zip(COLUMNS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
 
 
 def as_json(found: Walked) -> str:
@@ -40,9 +44,21 @@ def told(scene: WalkerScene, found: Walked) -> str:
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s ({regular}, {w.cycles:g} cycles at {f:g} Hz)",
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
+        *_aside(w),
         f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J",
         *([f"{w.unsolved} steps were taken unsolved: raise [numerics] steps or rounding"] if w.unsolved else []),
     ])  # fmt: skip
+
+
+def _aside(walk) -> list[str]:
+    """What a walk of three dimensions does besides."""
+    if not walk.more:
+        return []
+    y, roll, yaw = (walk.more[name] for name in ("y", "roll", "yaw"))
+    angles = ", ".join(
+        f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}" for name, a in (("roll", roll), ("yaw", yaw))
+    )
+    return [f"aside to y {y[-1]:.2g} m, {angles} degrees (positive: left side up, turning left)"]
 
 
 def save(folder: Path, scene: WalkerScene, found: Walked) -> None:
@@ -70,8 +86,7 @@ def draw(scene: WalkerScene, found: Walked):
         ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1]))
     axes[0, 0].axhline(w.speed, color="C3", lw=1.0, ls="--")
     axes[0, 0].set_title(f"mean {w.speed:.3g} m/s, {w.status}", color="C3")
-    put = _stage(axes[1, 1], scene, w.pose[-1:, 0])
-    put(w.pose[-1], w.t[-1])
+    _stage(axes[1, 1], scene, found, np.array([len(w.t) - 1]))(len(w.t) - 1)
     return fig
 
 
@@ -93,54 +108,106 @@ def strip(scene: WalkerScene, found: Walked):
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
     fig, axes = plots.figure(3.2 * 3, 1.9 * 2, 3, 2)
     for ax, row in zip(axes.ravel(), rows):
-        _stage(ax, scene, w.pose[[row], 0])(w.pose[row], w.t[row])
+        _stage(ax, scene, found, np.array([row]))(row)
     return fig
 
 
-@plots.styled
 def _frames(scene: WalkerScene, found: Walked) -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3), bytes, at the pace of the film."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
+    """Pictures (height, width, 3), bytes, at the pace of the film: MuJoCo's of a walk of three dimensions where there is a GL
+    to draw them with."""
     w = found.walk
     last = min(w.t[-1], FRAMES / animate.RATE)
-    times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES))
+    times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES)) if last else np.zeros(1)
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
+    pictures = w.more and walking.view(scene).pictures(w.more["states"][rows])
+    return pictures or _drawn(scene, found, rows)
+
+
+@plots.styled
+def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray) -> Iterator[np.ndarray]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     fig, axes = plots.figure(6.4, 2.4)
-    put = _stage(axes[0, 0], scene, w.pose[rows, 0])
+    put = _stage(axes[0, 0], scene, found, rows)
     fig.set_dpi(animate.DOTS)
     canvas = FigureCanvasAgg(fig)
     for row in rows:
-        put(w.pose[row], w.t[row])
+        put(row)
         canvas.draw()
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
-def _stage(ax, scene: WalkerScene, x: np.ndarray):
-    """Ground and axes that hold these places; a function that puts the robot there."""
-    robot, gait = scene.robot, scene.gait
-    leg, belly = robot.leg(40).points, robot.belly(8)
-    reach, hips = np.abs(leg).max(), [(h, robot.hip_height) for h in robot.hips]
-    room = max([reach, *(abs(h) + reach for h, _ in hips), getattr(robot, "length", 0.0) / 2]) * 1.1
-    low, high = x.min() - room, x.max() + room
+def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray):
+    """Ground and axes that hold the robot at these rows of its walk; a function that puts it there at one."""
+    shown = _Solid(scene, found) if found.walk.more else _Flat(scene, found)
+    room, reach = shown.room * 1.1, shown.reach
+    x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
-    ax.set(xlim=(low, high), ylim=(-1.2 * reach, 3.2 * reach), aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
-    turned = lambda points, angle: points @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    legs = [(k, at) for k in range(len(hips)) for at in robot.apart]
-    lines = [ax.plot([], [], color="C0" if (k + 2 * at) % 2 else "0.2", lw=1.2)[0] for k, at in legs]
-    box = ax.plot([], [], color="black", lw=1.2)[0]
-    label = ax.set_title("", loc="left", fontsize=8)
+    limits = {"xlim": (x.min() - room, x.max() + room), "ylim": (-1.2 * reach, 3.2 * reach)}
+    ax.set(**limits, aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
+    draw, label = shown.on(ax), ax.set_title("", loc="left", fontsize=8)
 
-    def put(pose, t):
-        for line, (k, at) in zip(lines, legs):
-            phase = gait.frequency * t + (k * robot.apart[-1] + at) % 1.0
-            hip = turned(np.array([hips[k]]), pose[2]) + pose[:2]
-            line.set_data(*(turned(leg, pose[2] + float(gait.angle(phase, phase))) + hip).T)
-        if belly is not None:
-            box.set_data(*(turned(belly.points, pose[2]) + pose[:2]).T)
-        label.set_text(f"t = {t:.2f} s")
+    def put(row):
+        draw(row)
+        label.set_text(f"t = {found.walk.t[row]:.2f} s")
 
     return put
+
+
+class _Flat:
+    """Outlines of a robot in the vertical plane. room: that it takes to both sides; reach: of its legs, m."""
+
+    def __init__(self, scene: WalkerScene, found: Walked):
+        self.robot, self.gait, self.walk = scene.robot, scene.gait, found.walk
+        self.leg, self.belly = scene.robot.leg(40).points, scene.robot.belly(8)
+        self.reach, self.hips = np.abs(self.leg).max(), [(h, scene.robot.hip_height) for h in scene.robot.hips]
+        away = [self.reach, *(abs(h) + self.reach for h, _ in self.hips), getattr(scene.robot, "length", 0.0) / 2]
+        self.room = max(away)
+
+    def on(self, ax):
+        legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.apart]
+        lines = [ax.plot([], [], color=TRIPODS[int((k + 2 * at) % 2)], lw=1.2)[0] for k, at in legs]
+        box = ax.plot([], [], color="black", lw=1.2)[0]
+
+        def draw(row):
+            pose, t = self.walk.pose[row], self.walk.t[row]
+            for line, (k, at) in zip(lines, legs):
+                phase = self.gait.frequency * t + (k * self.robot.apart[-1] + at) % 1.0
+                hip = _turned(np.array([self.hips[k]]), pose[2]) + pose[:2]
+                line.set_data(*(_turned(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
+            if self.belly is not None:
+                box.set_data(*(_turned(self.belly.points, pose[2]) + pose[:2]).T)
+
+        return draw
+
+
+class _Solid:
+    """Triangles of a robot in three dimensions, seen from its right. room, reach: as of `_Flat`."""
+
+    def __init__(self, scene: WalkerScene, found: Walked):
+        self.view, self.walk = walking.view(scene), found.walk
+        first = self.view.triangles(self.walk.more["states"][0]).reshape(-1, 3)
+        self.room = float(np.abs(first[:, [0, 1]] - [self.walk.pose[0, 0], 0.0]).max())
+        self.reach = max(float(np.ptp(first[:, 2])), self.room / 4) / 2
+
+    def on(self, ax):
+        from matplotlib.collections import PolyCollection
+
+        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.of]
+        drawn = ax.add_collection(PolyCollection([], lw=1.0))  # sheets are seen by their edges
+
+        def draw(row):
+            triangles = self.view.triangles(self.walk.more["states"][row])
+            order = np.argsort(-triangles[..., 1].mean(1), kind="stable")  # what is farther off first
+            drawn.set_verts(triangles[order][..., [0, 2]])
+            drawn.set_facecolor(colours[order])
+            drawn.set_edgecolor(colours[order])
+
+        return draw
+
+
+def _turned(points: np.ndarray, angle: float) -> np.ndarray:
+    return points @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 @plots.styled

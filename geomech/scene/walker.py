@@ -8,25 +8,29 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from geomech.errors import SceneError, choose, named, short
+from geomech.scene import solid
 from geomech.scene.intruder import _intruder, read_medium
 from geomech.scene.intruding import located
 from geomech.scene.read import _build, _kind
+from rft.spatial import Spatial
 from rft.vertical import SHAPES, PlateStress, StressMap
 from rft.vertical.effects import KINDS as EFFECTS
 from rft.vertical.effects import GroundEffect
-from rft.walking import ROBOTS, Fineness, Robot, Tripod, Walker
+from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Tripod, Walker
 
 TABLES = ("medium", "robot", "gait", "numerics", "effects")
 KINDS = {"aeration", "grain-inertia"}  # of effects
+LAWS = ("planar", "3d")
+OF_THREE = {"xi_n", "density", "internal_friction", "surface_friction"}  # keys of a [medium] of three dimensions alone
 CURE = "see 'geomech scenes --show xplorer'"
 
 
 @dataclass(frozen=True)
 class WalkerScene:
-    """A stress map, a robot and its gait, and effects on the ground. numerics: how finely. text: its TOML. files: those that
-    the scene names."""
+    """A stress map or a law of three dimensions, a robot and its gait, and effects on the ground. numerics: how finely. text:
+    its TOML. files: those that the scene names."""
 
-    medium: PlateStress
+    medium: PlateStress | Spatial
     robot: Robot
     gait: Tripod
     effects: tuple[GroundEffect, ...] = ()
@@ -43,7 +47,13 @@ class WalkerScene:
             if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
                 raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
             object.__setattr__(self, "effects", self.walker.effects)
-            _ = self.robot.leg(self.numerics.elements)
+            self.robot.check(self.numerics.elements)
+
+    @property
+    def engine(self) -> str:
+        """What computes it, where nothing else is asked for."""
+        spatial = isinstance(self.robot, Mjcf) or isinstance(self.medium, Spatial)
+        return self.numerics.engine or ("mujoco" if spatial else "planar")
 
     @property
     def walker(self) -> Walker:
@@ -51,11 +61,14 @@ class WalkerScene:
 
     def tables(self) -> dict:
         """Those of a scene file that reads the same; SceneError for measured drags, which are files of their own."""
-        if not isinstance(self.medium, StressMap):
+        if not isinstance(self.medium, StressMap | Spatial):
             raise SceneError(f"{self.name}: plate drags are CSV files: write the scene that names them by hand")
         kind = lambda thing, kinds: {"kind": next(k for k, v in kinds.items() if v is type(thing))}
-        robot = kind(self.robot, ROBOTS) | _plain(self.robot)
-        robot["legs"] = kind(self.robot.legs, SHAPES) | _plain(self.robot.legs)
+        if isinstance(self.robot, Mjcf):
+            robot = _plain(self.robot)
+        else:
+            robot = kind(self.robot, ROBOTS) | _plain(self.robot)
+            robot["legs"] = kind(self.robot.legs, SHAPES) | _plain(self.robot.legs)
         tables = {
             "medium": _plain(self.medium),
             "robot": robot,
@@ -69,8 +82,9 @@ class WalkerScene:
 
 def _plain(thing) -> dict:
     """Its fields, as they stand in a file."""
+    names = {f.name for f in dataclasses.fields(thing) if f.init}
     fields = dataclasses.asdict(thing).items()
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in fields if v is not None}
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in fields if v is not None and k in names}
 
 
 def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerScene:
@@ -85,7 +99,7 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerS
     at = lambda table: located(table, Path(name).absolute().parent, files)
     with named(name):
         return WalkerScene(
-            medium=read_medium(f"{name}: [medium]", at(tables["medium"])),
+            medium=_medium(f"{name}: [medium]", at(tables["medium"])),
             robot=_robot(name, tables["robot"], at),
             gait=_build(f"{name}: [gait]", _gait(name, tables["gait"]), Tripod),
             effects=tuple(_effects(name, tables.get("effects", []))),
@@ -96,8 +110,19 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerS
         )
 
 
+def _medium(place: str, table: dict) -> PlateStress | Spatial:
+    """A stress map, as of outlines, or the law of three dimensions, as of meshes: where law = "3d", or what tells its
+    strength is of that alone."""
+    law = choose(f"{place} law", table.pop("law"), LAWS) if "law" in table else None
+    if law == "3d" or (law is None and {*table} & OF_THREE):
+        return solid.read_medium(place, table, read_medium)[0]
+    return read_medium(place, table)
+
+
 def _robot(name: str, table: Mapping, at) -> Robot:
     place, rest = f"{name}: [robot]", dict(table)
+    if "mjcf" in rest:
+        return _machine(place, rest, at)
     kind = ROBOTS[_kind(place, rest, "kind", ROBOTS)]
     del rest["kind"]
     if not rest.get("legs") or not isinstance(rest["legs"], Mapping):
@@ -111,6 +136,19 @@ def _robot(name: str, table: Mapping, at) -> Robot:
         raise SceneError(f"{place} has no {', '.join(lacking)}: add it, {CURE}")
     with named(place):
         return kind(legs=legs, **{k: tuple(v) if isinstance(v, list) else v for k, v in rest.items()})
+
+
+def _machine(place: str, table: dict, at) -> Mjcf:
+    """A robot of an MJCF file."""
+    if not table.get("geoms"):
+        raise SceneError(f"{place} is a robot without legs: give geoms, a list of those that touch the ground")
+    names = [f.name for f in dataclasses.fields(Mjcf) if f.init]
+    for key in table:
+        choose(f"{place} key", key, names)
+    if isinstance(table["mjcf"], str):
+        table["mjcf"] = at({"file": table["mjcf"]})["file"]
+    with named(place):
+        return Mjcf(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
 
 
 def _gait(name: str, table: Mapping) -> dict:

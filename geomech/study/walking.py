@@ -28,6 +28,7 @@ TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = 3e-3  # s of computing, for a robot by itself,
 MORE = 1e-3  # and for each beside it, measured
+ALONE = 8e-3  # s, in three dimensions
 LIMIT = 6  # cycles on the way to the limit cycle, and half as many for each of two errors
 KNOBS = {
     "steps": (12, 16, 24, 32, 48, 64, 96),
@@ -47,9 +48,9 @@ class Walked(NamedTuple):
     estimate: float
 
 
-def walked(scenes: Sequence[WalkerScene], by: str = "planar", settling: bool = False) -> list[Walked]:
-    """Scenes of equal numerics, side by side. settling: a few cycles from rest are enough."""
-    numerics, how, walkers = scenes[0].numerics, engine(by), [s.walker for s in scenes]
+def walked(scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False) -> list[Walked]:
+    """Scenes of equal numerics and engines, side by side. settling: a few cycles from rest are enough."""
+    numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
     walks = how.walk(walkers, numerics, SETTLING if settling else None)
     error = np.array([w.drift for w in walks])
     for name, fewest in (("steps", 8), ("elements", 4)):
@@ -59,7 +60,7 @@ def walked(scenes: Sequence[WalkerScene], by: str = "planar", settling: bool = F
     return [Walked(w, float(e)) for w, e in zip(walks, error)]
 
 
-def run(scene: WalkerScene, by: str = "planar") -> Walked:
+def run(scene: WalkerScene, by: str | None = None) -> Walked:
     """One scene."""
     with named(scene.name):
         return walked([scene], by)[0]
@@ -72,12 +73,14 @@ class Steps(Cost):
         return f"{self.balances:,} time steps, about {max(1.0, self.seconds):.0f} s of computing"
 
 
-def price(scene: WalkerScene, count: int = 1, settling: bool = False) -> Steps:
+def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
     """Of ``count`` scenes like this one."""
+    together = TOGETHER if (by or scene.engine) == "planar" else 1
+    per_step = PER_STEP if together > 1 else ALONE
     cycles = SETTLING if settling else min(scene.numerics.duration * scene.gait.frequency, 2 * LIMIT)
     steps = (cycles + 2 * LIMIT) * scene.numerics.steps
-    batches = -(-count // TOGETHER)
-    seconds = steps * (batches * PER_STEP + (count - batches) * MORE) * (0.5 + scene.numerics.elements / 32)
+    batches = -(-count // together)
+    seconds = steps * (batches * per_step + (count - batches) * MORE) * (0.5 + scene.numerics.elements / 32)
     return Steps(round(steps * count), seconds, BASE)
 
 
@@ -89,7 +92,7 @@ def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progre
     with Rows(partial and Path(partial), question(scene, values), len(points)) as rows:
         while len(rows) < rows.total:
             scenes = [at(p) for p in points[len(rows) : len(rows) + TOGETHER]]
-            alike = itertools.groupby(scenes, key=lambda s: s.numerics)
+            alike = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
             for one in (w for _, some in alike for w in walked(list(some), settling=True)):
                 kind = float(STATUSES.index(one.walk.status))
                 rows.add([[one.walk.speed, one.estimate, kind, one.walk.cycles, 0.0]])
@@ -116,6 +119,8 @@ def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
     """Of `sweep`; SceneError if a point of the grid makes no scene."""
     tables, values, points = _grid(scene, over)
     some = [_scene_at(tables, scene, list(values), p) for p in (points[0], points[-1])]
+    for one in some:
+        refuse_engine(one)
     return max((price(s, len(points), settling=True) for s in some), key=lambda c: c.seconds)
 
 
@@ -147,7 +152,7 @@ def partial(scene: WalkerScene, over: Mapping, output: Path) -> Path:
 def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
     """{"scene", "speed", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest"}: error of the speed,
     m/s, against one as far refined as `FINEST`, for every knob."""
-    how, walkers = engine("planar"), [scene.walker]
+    how, walkers = engine(scene.engine), [scene.walker]
     walks = how.walk(walkers, scene.numerics, SETTLING)
     again = lambda name, value: how.again(
         walkers, dataclasses.replace(scene.numerics, **{name: value}), walks, SETTLING
@@ -193,6 +198,7 @@ def _cheapest(lines, tolerance: float) -> dict:
 
 def cost(scene: WalkerScene) -> Steps:
     """Of `study`."""
+    refuse_engine(scene)
     shares = sum(v / scene.numerics.steps for v in (*KNOBS["steps"], FINEST["steps"]))
     shares += sum(0.5 + v / 32 for v in (*KNOBS["elements"], FINEST["elements"])) + 2 * len(KNOBS["rounding"])
     one = price(scene, settling=True)
@@ -220,10 +226,14 @@ def sentences(results: dict) -> list[str]:
     return out
 
 
-def refuse_engine(scene: WalkerScene, by: str) -> None:
-    """SceneError unless there is such an engine here."""
+def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
+    """SceneError unless there is such an engine here, and it takes the scene."""
     with named(scene.name):
-        try:
-            engine(by)
-        except ImportError as error:
-            raise SceneError(f"the {by} engine is not installed: {error}") from None
+        engine(by or scene.engine).refuse(scene.walker)
+
+
+def view(scene: WalkerScene):
+    """What draws a walk of three dimensions (`rft.walking.view.View`)."""
+    from rft.walking.view import View
+
+    return View(scene.walker, scene.numerics)

@@ -1,6 +1,7 @@
 """Walking on grains: robots and their clocks, what computes how they walk, and wheels that are driven at a given slip."""
 
 from rft.walking.engines import ENGINES, Fineness, Walker, engine
+from rft.walking.mjcf import Mjcf
 from rft.walking.robot import ROBOTS, Rhex, Robot, Roller, Tripod
 from rft.walking.stride import Walk
 from rft.walking.wheel import Rolling, rolling
@@ -9,6 +10,7 @@ __all__ = [
     "ENGINES",
     "ROBOTS",
     "Fineness",
+    "Mjcf",
     "Rhex",
     "Robot",
     "Roller",

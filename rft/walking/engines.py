@@ -48,14 +48,18 @@ class Walker:
 @dataclass(frozen=True)
 class Fineness:
     """steps: of a cycle. elements: of a leg's outline; the belly has as many. rounding: m/s, below which drag falls off in
-    proportion to speed. duration: s of walking from rest, at most."""
+    proportion to speed. duration: s of walking from rest, at most. engine: of `ENGINES`, or None for the planar one, if that
+    takes the robot and its ground."""
 
     steps: int = 32
     elements: int = 12
     rounding: float = 3e-3
     duration: float = 10.0
+    engine: str | None = None
 
     def __post_init__(self):
+        good = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
+        require(good, f"engine must be one of {', '.join(ENGINES)}, got {shown(self.engine)}")
         for name, low, high in (("steps", 8, 10_000), ("elements", 4, 1000)):
             in_range(name, getattr(self, name), low, high, whole=True)
             object.__setattr__(self, name, int(getattr(self, name)))
@@ -89,6 +93,8 @@ def engine(name: str) -> Engine:
         if error.name != name:
             raise
         raise ValueError(f"the {name} engine is not installed: pip install 'geomech[{name}]'") from None
+    except Exception as error:  # MuJoCo loads what MUJOCO_GL names as it is imported
+        raise ValueError(f"the {name} engine cannot be loaded: {shown(str(error))}; is MUJOCO_GL right?") from None
 
 
 ENGINES = {"planar": "rft.walking.planar_walk", "mujoco": "rft.walking.mujoco_walk"}

@@ -33,6 +33,8 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", gravity=f"0 0 {-GRAVITY!r}")
     ET.SubElement(ET.SubElement(root, "visual"), "global", offwidth="1280", offheight="960")
+    sky = {"type": "skybox", "builtin": "flat", "rgb1": "1 1 1", "rgb2": "1 1 1", "width": "8", "height": "8"}
+    ET.SubElement(ET.SubElement(root, "asset"), "texture", **sky)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 2", dir="0.2 0.3 -1", directional="true")
     hull = ET.SubElement(world, "body", name="hull")

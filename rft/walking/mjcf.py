@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -128,9 +127,8 @@ class Mjcf(Robot):
                 raise ValueError(f"{self.mjcf}: geom {shown(name)}: {error}") from None
         return out
 
-    def leg(self, elements: int) -> Any:
-        """None: what touches the ground is `surfaces`."""
-        return None
+    def check(self, elements: int) -> None:
+        self.surfaces(elements)
 
 
 def _compiled(file: str):

@@ -97,6 +97,10 @@ class Robot:
         """The outline of the body, if it can touch the ground."""
         return None
 
+    def check(self, elements: int) -> None:
+        """ValueError unless what touches the ground can be cut into so many elements."""
+        self.leg(elements)
+
     def _check(self) -> None:
         check_ranges(self, mass=MASSES)
         require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {shown(self.legs)}")
