@@ -13,8 +13,8 @@ from rft.walking.mjcf import Mjcf
 from rft.walking.multibody import Multibody
 from rft.walking.robot import Robot, Tripod
 
-JOINT = mujoco.mjtTrn.mjTRN_JOINT
-FREE, SLIDE, HINGE = (getattr(mujoco.mjtJoint, f"mjJNT_{kind}") for kind in ("FREE", "SLIDE", "HINGE"))
+JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
+FREE, SLIDE, HINGE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("FREE", "SLIDE", "HINGE"))
 LEVEL = 0.99  # cosine of the angle to the vertical, of what counts as such
 
 

@@ -20,7 +20,7 @@ from rft.spatial.law import Spatial
 from rft.vertical.effects import strength
 from rft.walking.engines import Fineness, Walker
 from rft.walking.facets import Grains
-from rft.walking.machine import FREE, HINGE, SLIDE, Clock, machine
+from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
 from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk
 
@@ -204,7 +204,7 @@ class Course:
         model, qpos = self.body.model, self.body.data.qpos.copy()
         for actuator in self.machine.driven if strides else ():
             joint, gear = model.actuator_trnid[actuator, 0], model.actuator_gear[actuator, 0]
-            turns = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT and model.jnt_type[joint] == HINGE
+            turns = model.actuator_trntype[actuator] == JOINT and model.jnt_type[joint] == HINGE
             if turns and gear:
                 qpos[model.jnt_qposadr[joint]] -= 2 * np.pi * strides / gear
         return qpos

@@ -71,7 +71,7 @@ class Multibody:
         model, data = self.model, self.data
         places = data.xpos[self.facets.bodies]
         reach = float((np.linalg.norm(places - places.mean(0), axis=1) + self.facets.reach).max())
-        turns = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_BALL)
+        turns = [int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)]  # numpy compares no enumerations
         size = np.where(np.isin(model.jnt_type[model.dof_jntid], turns), reach, 1.0)
         for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
             first = model.jnt_dofadr[joint] + 3
