@@ -76,7 +76,7 @@ def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mes
 def box(sides, m: int = 1) -> Mesh:
     """Along the axes, about the origin; each face cut into m x m rectangles."""
     half = np.asarray(sides, float) / 2
-    s, points, faces = np.linspace(-1.0, 1.0, _count("m", m, 1) + 1), [], []
+    s, points, faces = np.arange(-_count("m", m, 1), m + 1, 2) / m, [], []
     for axis in range(3):
         for out in (-1.0, 1.0):
             u, v = np.meshgrid(s, out * s, indexing="ij")

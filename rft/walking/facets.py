@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -63,22 +64,34 @@ class Surface(NamedTuple):
         return cls(body, mesh.vertices[mesh.faces] @ turn.T + place, mesh.facing @ turn.T, not mesh.closed)
 
     @classmethod
-    def of_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0)) -> Surface:
-        """An outline of the vertical plane across its width: two triangles an element, and, where it is closed, a fan of
-        triangles on either side. Those of a fan may count as negative (`Facets`), so that it need not be convex."""
-        low, high = (np.insert(outline.points, 1, y, axis=1) for y in (-outline.width / 2, outline.width / 2))
-        a, b, c, d = low[:-1], low[1:], high[1:], high[:-1]
-        corners = np.concatenate([np.stack([a, c, b], 1), np.stack([a, d, c], 1)]) + place
-        near, far = (outline.end_normals[:, k] for k in (0, 1))
-        normals = [np.insert((1 - t) * near + t * far, 1, 0.0, axis=1) for t in (2 / 3, 1 / 3)]
+    def of_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0), side: int = 0) -> Surface:
+        """An outline of the vertical plane across its width, and the sides of a closed one. side: 0 cuts it along its middle
+        in halves that are mirror images; 1 and -1 are cut in one piece each, the one the mirror image of the other."""
+        edges = np.linspace(-outline.width / 2, outline.width / 2, 2 if side else 3)
+        corners = [_strip(outline, a, b, (side or a + b) > 0) for a, b in pairwise(edges)]
+        near, far = (np.insert(outline.end_normals[:, k], 1, 0.0, axis=1) for k in (0, 1))
+        normals = [(1 - t) * near + t * far for t in (2 / 3, 1 / 3)] * len(corners)
+        if outline.closed:
+            corners += [_side(outline, y) for y in edges[[0, -1]]]
+            normals += [np.tile([0.0, y, 0.0], (outline.elements - 2, 1)) for y in (-1.0, 1.0)]
         normals = np.concatenate(normals)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        if outline.closed:
-            for ring, out in ((low, (0.0, -1.0, 0.0)), (high[::-1], (0.0, 1.0, 0.0))):
-                fan = [np.broadcast_to(ring[0], ring[1:-2].shape), ring[1:-2], ring[2:-1]]
-                corners = np.concatenate([corners, np.stack(fan, 1) + place])
-                normals = np.concatenate([normals, np.broadcast_to(out, (len(ring) - 3, 3))])
-        return cls(body, corners, normals, not outline.closed)
+        return cls(body, np.concatenate(corners) + place, normals, not outline.closed)
+
+
+def _strip(outline: Outline, low: float, high: float, left: bool) -> np.ndarray:
+    """(2 N, 3, 3): of an outline from y = low to high, two triangles an element, one on each of its ends."""
+    low, high = (np.insert(outline.points, 1, y, axis=1) for y in (low, high))
+    a, b, c, d = low[:-1], low[1:], high[1:], high[:-1]
+    first, second = ((a, d, b), (b, d, c)) if left else ((a, d, c), (a, c, b))
+    return np.concatenate([np.stack(first, 1), np.stack(second, 1)])
+
+
+def _side(outline: Outline, y: float) -> np.ndarray:
+    """(N - 2, 3, 3): a fan of triangles in the plane at y, looking away from the middle."""
+    ring = np.insert(outline.points[:-1], 1, y, axis=1)
+    first = np.broadcast_to(ring[0], ring[2:].shape)
+    return np.stack([first, ring[1:-1], ring[2:]] if y < 0 else [first, ring[2:], ring[1:-1]], 1)
 
 
 class Poses(NamedTuple):

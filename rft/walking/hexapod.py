@@ -91,9 +91,9 @@ def phases(robot: Robot) -> np.ndarray:
 
 def surfaces(robot: Robot, elements: int = 12) -> list[Surface]:
     """What touches the ground: the hull, body 1 of the model, and its legs."""
-    leg, belly = robot.leg(elements), robot.belly(elements)
+    leg, belly, sides = robot.leg(elements), robot.belly(elements), _sides(robot)
     hull = [Surface.of_outline(1, belly)] if belly else []
-    return hull + [Surface.of_outline(2 + k, leg) for k in range(len(hips(robot)))]
+    return hull + [Surface.of_outline(2 + k, leg, side=sides[k % len(sides)]) for k in range(len(hips(robot)))]
 
 
 def _drawn(legs, thick: float):
