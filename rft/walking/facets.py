@@ -70,7 +70,7 @@ class Surface(NamedTuple):
         edges = np.linspace(-outline.width / 2, outline.width / 2, 2 if side else 3)
         corners = [_strip(outline, a, b, (side or a + b) > 0) for a, b in pairwise(edges)]
         near, far = (np.insert(outline.end_normals[:, k], 1, 0.0, axis=1) for k in (0, 1))
-        normals = [(1 - t) * near + t * far for t in (2 / 3, 1 / 3)] * len(corners)
+        normals = [(1 - t) * near + t * far for t in (1 / 3, 2 / 3)] * len(corners)
         if outline.closed:
             corners += [_side(outline, y) for y in edges[[0, -1]]]
             normals += [np.tile([0.0, y, 0.0], (outline.elements - 2, 1)) for y in (-1.0, 1.0)]
