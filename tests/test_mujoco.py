@@ -1,7 +1,6 @@
 """The engine of three dimensions: loads against independent sums, momentum, energy, order, the planar engine; MJCF files."""
 
 import dataclasses
-import json
 import math
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geomech import scene as scenes
-from geomech.study import walking
 from rft.spatial import Cylinder, Screw, Spatial, Sphere, below, shapes, wrench
 from rft.spatial.extruded import Extruded
 from rft.spatial.submerged import submerged
@@ -23,8 +21,8 @@ from rft.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
 from rft.walking import geoms, hexapod  # noqa: E402
-from rft.walking.multibody import Multibody  # noqa: E402
 from rft.walking.mujoco_walk import Course, Start, again, walk  # noqa: E402
+from rft.walking.multibody import Multibody  # noqa: E402
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 SPATIAL = Spatial(3e5, surface_friction=0.6)
@@ -89,12 +87,17 @@ def test_loads_are_those_of_each_mesh_alone():
     np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=3e-3 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("shape", [CLeg(0.03, 0.02, 0.6), RoundRod(0.03, 0.02), Polygon(((0, 0), (0.05, 0), (0.01, 0.04)), 0.03)])
+@pytest.mark.parametrize(
+    "shape", [CLeg(0.03, 0.02, 0.6), RoundRod(0.03, 0.02), Polygon(((0, 0), (0.05, 0), (0.01, 0.04)), 0.03)]
+)
 def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
     outline = shape.outline(96)
     angle, place, motion = 0.7, np.array([0.01, 0.002, -0.01]), np.array([0.3, -0.2, 4.0])
     at = Poses(
-        Rotation.from_euler("y", angle).as_matrix()[None], place[None], np.array([[0.3, 0.0, -0.2]]), np.array([[0, 4.0, 0]])
+        Rotation.from_euler("y", angle).as_matrix()[None],
+        place[None],
+        np.array([[0.3, 0.0, -0.2]]),
+        np.array([[0, 4.0, 0]]),
     )
     facets = Facets([Surface.of_outline(0, outline)])
     found = facets.loads(Grains(Extruded(SAND), 1.0, 200.0, 1e-7), at)[0][0]
@@ -116,7 +119,10 @@ def test_what_moves_aside_is_held_back():
 
 
 def test_slopes_of_loads_are_what_moving_a_body_changes():
-    facets, k = Facets([Surface.of_mesh(0, Sphere(0.02).mesh(320)), Surface.of_outline(1, CLeg(0.03, 0.02).outline(12))]), 0.002
+    facets, k = (
+        Facets([Surface.of_mesh(0, Sphere(0.02).mesh(320)), Surface.of_outline(1, CLeg(0.03, 0.02).outline(12))]),
+        0.002,
+    )
     at, grains = poses(2), Grains(Extruded(SAND), 0.8, 200.0, 0.3)
     _, slopes = facets.loads(grains, at, k)
     for j in range(6):
@@ -168,12 +174,17 @@ def test_what_falls_free_falls_as_galilei_says():
     data.qpos[2], data.qvel[3:] = 3.0, [2.0, -1.0, 3.0]
     mujoco.mj_forward(model, data)
     mujoco.mj_subtreeVel(model, data)
-    spin, com, start, energy = data.subtree_angmom[0].copy(), data.xipos[1].copy(), data.subtree_linvel[0].copy(), body.energy()
+    spin, com, start, energy = (
+        data.subtree_angmom[0].copy(),
+        data.xipos[1].copy(),
+        data.subtree_linvel[0].copy(),
+        body.energy(),
+    )
     for _ in range(40):
         body.step(0.005)
     mujoco.mj_subtreeVel(model, data)
     np.testing.assert_allclose(data.xipos[1], com + 0.2 * start + [0, 0, -9.81 * 0.02], atol=1e-4)
-    np.testing.assert_allclose(data.subtree_angmom[0], spin, rtol=2e-4)
+    np.testing.assert_allclose(data.subtree_angmom[0], spin, atol=1e-4 * np.linalg.norm(spin))
     assert body.energy() == pytest.approx(energy, rel=1e-4) and (body.work, body.loss) == (0.0, 0.0)
 
 
@@ -212,7 +223,8 @@ def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     """Legs swapped from left to right, by half a cycle; hips so near that they roll and yaw."""
     robot = Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=(0.03, 0.04))
     right, left = (
-        Course(Walker(robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)), QUICK) for m in (0.0, math.pi)
+        Course(Walker(robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)), QUICK)
+        for m in (0.0, math.pi)
     )
     first, other = (np.zeros(0),) * 2
     for course in (right, left):

@@ -63,7 +63,7 @@ PARTS = {
 }  # fmt: skip
 FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
-    ("Rhex", "inertia", "None"),
+    ("Rhex", "inertia", "None"), ("Rhex", "aside", "None"), ("Fineness", "engine", "None"),
     ("harmonics", "None"),
     ("centre", "empty"), ("reverse", "true"), ("directions", "None"), ("cycles", "None"), ("effects", "empty"), ("k", "None"),
     ("covariance", "None"), ("Granular", "covariance", "array"), ("Viscous", "covariance", "deep"),

@@ -88,7 +88,7 @@ class Course:
         legs = facets.bodies != root
         self.reach = float(facets.reach[legs].max() if legs.any() else facets.reach.max())
         self.far = float((away + facets.reach).max() + facets.reach.max())
-        self.own = np.flatnonzero(facets.of == np.flatnonzero(~legs)) if not legs.all() else slice(None)
+        self.own = np.flatnonzero(np.isin(facets.of, np.flatnonzero(~legs)))
 
     def walk(self, most: int, duration: float | None = None, start: Start | None = None) -> Walk:
         """At most so many strides. duration: s, for which the walk is told, the rest as repetitions of the last stride."""
@@ -174,8 +174,7 @@ class Course:
             return "flipped"
         if height > self.far:
             return "airborne"
-        rotation = data.xmat[facets.bodies].reshape(-1, 3, 3)
-        top = facets.heights(rotation, data.xpos[facets.bodies])[self.own].max()
+        top = max(height, (facets.corners[self.own] @ turn[2] + height).max(initial=height))
         return "sunk" if top < 0.0 else ""
 
     def section(self) -> np.ndarray:

@@ -56,6 +56,7 @@ class Multibody:
     ):
         require(model.nv > 0, "nothing in the model can move: it has no joints")
         require(model.na == 0, "the model has actuators with a state of their own: drop their dyntype")
+        model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
         self.work = self.loss = 0.0

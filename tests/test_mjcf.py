@@ -1,0 +1,277 @@
+"""Robots of MJCF files, and the engine of three dimensions from the command line."""
+
+import dataclasses
+import json
+import sys
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+from geomech import cli
+from geomech import scene as scenes
+from geomech.errors import SceneError
+from geomech.study import walking
+from rft.spatial import Spatial
+from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
+
+mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
+from rft.walking import geoms  # noqa: E402
+from rft.walking.facets import Facets  # noqa: E402
+from rft.walking.machine import Clock, machine  # noqa: E402
+from rft.walking.mujoco_walk import Course, walk  # noqa: E402
+
+ACTUATOR = '<position name="{0}" joint="{0}" kp="40" kv="0.4"/>'
+NAMES = ("fl", "fr", "rl", "rr")
+WHEEL = """<body pos="{1} {2} 0"><joint name="{0}" axis="0 1 0"/>
+<geom name="{0}" type="cylinder" size="0.03 0.01" euler="90 0 0"/></body>"""
+CART = """<mujoco><option gravity="0 0 -9.81"/><default><geom density="250"/></default><worldbody>
+<geom name="floor" type="plane" size="3 3 1"/>
+<body name="trunk" pos="0 0 0.4"><freejoint/><geom name="trunk" type="box" size="0.06 0.03 0.01"/>{}
+</body></worldbody><actuator>{}</actuator></mujoco>""".format(
+    "".join(WHEEL.format(n, 0.05 if n[0] == "f" else -0.05, 0.05 if n[1] == "l" else -0.05) for n in NAMES),
+    "".join(map(ACTUATOR.format, NAMES)),
+)
+SCENE = """[medium]
+name = "poppy-seeds-loose"
+grazing_deg = 5
+
+[robot]
+mjcf = "parts/cart.xml"
+geoms = ["fl", "fr", "rl", "rr", "trunk"]
+
+[gait]
+frequency = 1.0
+
+[numerics]
+steps = 12
+elements = 10
+duration = 1.0
+"""
+
+
+@pytest.fixture
+def geomech(capsys, monkeypatch, tmp_path):
+    """(exit code, stdout, stderr) of a command run in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*args):
+        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
+        with pytest.raises(SystemExit) as done:
+            cli.main()
+        return done.value.code or 0, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def cart(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "cart.xml").write_text(CART)
+    (tmp_path / "cart.toml").write_text(SCENE)
+    return tmp_path
+
+
+def test_a_cart_rolls_ahead_and_with_its_gears_reversed_back(cart, geomech):
+    """From a file in another folder; wheels in step, on seeds and not on the MJCF's own floor."""
+    scene = scenes.load(cart / "cart.toml")
+    assert scene.engine == "mujoco" and scene.files == (str(cart / "parts" / "cart.xml"),)
+    robot, quick = scene.robot, scene.numerics
+    ahead = walk([scene.walker], quick, 1)[0]
+    assert ahead.status == "walking" and 0.09 < ahead.speed < 2 * np.pi * 0.03 and ahead.periodic
+    assert ahead.pose[-1, 1] < 0.03 and np.abs(ahead.more["y"]).max() < 1e-3
+    (cart / "back.xml").write_text(
+        CART.replace("/></actuator>", "/></actuator>").replace('kp="40"', 'gear="-1" kp="40"')
+    )
+    back = walk(
+        [dataclasses.replace(scene.walker, robot=dataclasses.replace(robot, mjcf=str(cart / "back.xml")))], quick, 1
+    )
+    assert back[0].speed == pytest.approx(-ahead.speed, rel=1e-3)
+    driven = CART.replace("<position", "<velocity").replace(' kp="40"', "")
+    (cart / "driven.xml").write_text(driven)
+    rolled = walk(
+        [dataclasses.replace(scene.walker, robot=dataclasses.replace(robot, mjcf=str(cart / "driven.xml")))], quick, 1
+    )
+    assert rolled[0].speed == pytest.approx(ahead.speed, rel=0.03)
+
+
+def test_the_clock_drives_what_it_is_told_to_and_the_rest_keeps_its_keyframe(cart):
+    key = '<keyframe><key qpos="0 0 9 1 0 0 0 0 0.4 0 0" ctrl="1 2 3 4"/></keyframe></mujoco>'
+    (cart / "key.xml").write_text(CART.replace("</mujoco>", key))
+    robot = Mjcf(str(cart / "key.xml"), ("fl",), ("rr", "fl"), (0.25, 0.5))
+    assert robot.mass == pytest.approx(250 * (0.12 * 0.06 * 0.02 + 4 * np.pi * 0.03**2 * 0.02))
+    course = Course(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8))
+    clock = course.clock
+    angle, rate = clock.turned(0.1, 0.1)
+    wanted = [angle[1] + rate[1] * 0.01, 2.0, 3.0, angle[0] + rate[0] * 0.01]
+    np.testing.assert_allclose(clock(0.1, 0.1), wanted)
+    np.testing.assert_allclose(clock.kinks(), [0.0, 0.35, 0.6, 0.65, 0.9, 1.0])
+    data = course.body.data
+    start = clock.turned(0.0, 1e-9)[0]
+    np.testing.assert_allclose(data.qpos[7:], [start[1], 0.4, 0.0, start[0]])
+    assert course.body.facets.heights(data.xmat[[2]].reshape(1, 3, 3), data.xpos[[2]]).min() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "volume", "size"),
+    [
+        ('type="sphere" size="0.03"', 4 / 3 * np.pi * 0.03**3, (0.06,) * 3),
+        ('type="ellipsoid" size="0.01 0.02 0.03"', 4 / 3 * np.pi * 6e-6, (0.02, 0.04, 0.06)),
+        ('type="capsule" size="0.01 0.03"', np.pi * 1e-4 * (0.06 + 4 / 3 * 0.01), (0.02, 0.02, 0.08)),
+        ('type="cylinder" size="0.01 0.03"', np.pi * 1e-4 * 0.06, (0.02, 0.02, 0.06)),
+        ('type="box" size="0.01 0.02 0.03"', 4.8e-5, (0.02, 0.04, 0.06)),
+        ('type="mesh" mesh="wedge"', 1e-5, ()),
+    ],
+)
+def test_geoms_become_triangles_of_their_size(kind, volume, size):
+    asset = '<asset><mesh name="wedge" vertex="0 0 0 .03 0 0 0 .02 0 0 0 .1"/></asset>'
+    geom = f'<geom name="g" {kind} pos="0.1 0.2 0.3" euler="0 90 0"/>'
+    text = f"<mujoco>{asset}<worldbody><body><freejoint/>{geom}</body></worldbody></mujoco>"
+    model = mujoco.MjModel.from_xml_string(text)
+    mesh = geoms.mesh_of(model, 0, 48)
+    assert mesh.volume == pytest.approx(volume, rel=0.02)
+    if size:
+        np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), size, rtol=0.01)
+    facets = Facets([geoms.surface(model, 0, mesh)])
+    np.testing.assert_allclose((facets.areas[:, None] * facets.normals).sum(0), 0.0, atol=1e-3 * facets.areas.sum())
+    if "wedge" in kind:
+        corners = np.unique(facets.corners.reshape(-1, 3).round(6), axis=0)
+        np.testing.assert_allclose(
+            corners, [[0.1, 0.2, 0.27], [0.1, 0.2, 0.3], [0.1, 0.22, 0.3], [0.2, 0.2, 0.3]], atol=1e-6
+        )
+        return
+    middle = (facets.areas[:, None] * facets.corners.mean(1)).sum(0) / facets.areas.sum()
+    np.testing.assert_allclose(middle, [0.1, 0.2, 0.3], atol=1e-6)
+
+
+WRONG = {
+    "parts/cart.xml": ("parts/none.xml", "there is no MJCF file"),
+    '"parts/cart.xml"': ('"parts"', "no ordinary file"),
+    '"fl", "fr"': ('"fl", "zz"', "has no geom 'zz': it has floor, trunk, fl"),
+    '["fl", "fr", "rl", "rr", "trunk"]': ("[]", "a robot without legs"),
+    '"trunk"]': ('"floor"]', "fixed to the world"),
+    '"rr", "trunk"]': ('"rr", "rr"]', "names one twice"),
+    "[gait]": ('actuators = ["zz"]\n[gait]', "has no actuator 'zz': it has fl, fr"),
+    "frequency = 1.0": ("frequency = 0", "frequency must be"),
+    "\n[gait]": ("phases = [0.5]\n[gait]", "phases must be 4 numbers"),
+    "geoms": ("goems", "a robot without legs"),
+    "mjcf": ("legs = 3\nmjcf", "key: 'legs' is unknown"),
+    "steps = 12": ('engine = "planar"', "use --engine mujoco"),
+}
+
+
+@pytest.mark.parametrize("right", WRONG)
+def test_what_makes_no_machine_is_refused_with_one_line(right, cart, geomech):
+    wrong, said = WRONG[right]
+    (cart / "bad.toml").write_text(SCENE.replace(right, wrong, 1))
+    code, out, err = geomech("walk", "bad.toml")
+    assert (code, out) == (2, "") and err.count("\n") == 1 and err.startswith("error: ") and said in err, err
+
+
+FILES = {
+    "no MJCF that MuJoCo reads": "<mujoco><worl",
+    "has no actuators": CART[: CART.index("<actuator>")] + "</mujoco>",
+    "no actuator can follow the clock": CART.replace("<position", "<motor").replace(' kp="40" kv="0.4"', ""),
+    "it has no joints": '<mujoco><worldbody><body><geom name="fl" size="1"/></body></worldbody></mujoco>',
+    "gravity must be along -z": CART.replace("0 0 -9.81", "0 -9.81 0"),
+    "has a ctrlrange": CART.replace('kv="0.4"', 'kv="0.4" ctrlrange="-1 1"'),
+    "state of their own": CART.replace('kv="0.4"', 'kv="0.4" timeconst="0.1"'),
+    "larger than 20 MB": " " * 20_000_001,
+}
+
+
+@pytest.mark.parametrize("said", FILES)
+def test_files_that_are_no_robot_are_refused_with_one_line(said, cart, geomech):
+    (cart / "parts" / "cart.xml").write_text(FILES[said])
+    code, out, err = geomech("walk", "cart.toml")
+    assert (code, out) == (2, "") and err.count("\n") == 1 and said in err, err
+
+
+def test_a_machine_written_is_the_machine_read(cart):
+    scene = scenes.load(cart / "cart.toml")
+    anew = dataclasses.replace(scene, text="", medium=Spatial(2e5, tension="keep"))
+    text = scenes.toml(anew)
+    assert scenes.parse(text, scene.name) == anew and "mjcf" in text and "digest" not in text
+    other = scenes.parse(SCENE.replace("grazing_deg = 5", 'law = "3d"\nzeta = 2.0'), str(cart / "cart.toml"))
+    assert isinstance(other.medium, Spatial) and other.medium.xi_n > 1e5
+    (cart / "parts" / "cart.xml").write_text(CART.replace("0.01", "0.011"))
+    assert scenes.load(cart / "cart.toml").robot != scene.robot
+    with pytest.raises(SceneError, match="law: '2d' is unknown; did you mean '3d'"):
+        scenes.parse(SCENE.replace("grazing_deg = 5", 'law = "2d"'), str(cart / "cart.toml"))
+
+
+SMALL = """[medium]
+zeta = 0.3
+grazing_deg = 5
+
+[robot]
+kind = "wheel"
+mass = 0.5
+axle = 0.01
+
+[robot.legs]
+kind = "plate"
+length = 0.06
+width = 0.03
+
+[gait]
+frequency = 2.0
+
+[numerics]
+steps = 8
+elements = 4
+duration = 0.6
+engine = "mujoco"
+"""
+
+
+def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch):
+    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 12), "elements": (4,), "rounding": (4e-3,)})
+    monkeypatch.setattr(walking, "FINEST", {"steps": 16, "elements": 8, "rounding": 2e-3})
+    (tmp_path / "small.toml").write_text(SMALL)
+    code, out, _ = geomech("walk", "small.toml", "--json", "-o", "out", "--animate", "strip.png")
+    found = json.loads(out)
+    assert code == 0 and {"speed", "status", "t", "x", "z", "pitch", "cycles", "estimate"} <= {*found}
+    assert found["status"] == "walking" and len(found["t"]) == len(found["pitch"]) and found["estimate"] > 0
+    columns = (tmp_path / "out" / "walk.csv").read_text().split("\n")[0]
+    assert columns.endswith("work,loss,energy,y,roll,yaw")
+    assert image.imread(tmp_path / "strip.png").std() > 0.05
+    code, out, _ = geomech("walk", "small.toml", "--engine", "planar", "--json")
+    assert code == 0 and json.loads(out)["speed"] != found["speed"]
+    assert json.loads(out)["speed"] == pytest.approx(found["speed"], rel=0.1)
+    code, out, _ = geomech("sweep", "small.toml", "--over", "gait.frequency=1.5,2", "-o", "s.nc")
+    assert code == 0 and f"{found['speed']:.3g}"[:5] in out
+    code, out, _ = geomech("accuracy", "small.toml", "--json", "-o", "acc")
+    assert code == 0 and json.loads(out)["speed"] == pytest.approx(found["speed"], rel=0.02)
+
+
+def test_pictures_are_those_of_a_gl_or_none(cart):
+    scene = scenes.load(cart / "cart.toml")
+    view = walking.view(scene)
+    states = np.tile(machine(scene.robot, 10).model.qpos0, (2, 1))
+    states[:, 2] = 0.03
+    assert view.triangles(states[0])[..., 2].min() == pytest.approx(0.0, abs=0.002)
+    pictures = view.pictures(states, 160, 120)
+    if pictures is None:
+        pytest.skip("no GL here: set MUJOCO_GL to egl or osmesa where there is one")
+    pictures = list(pictures)
+    assert [p.shape for p in pictures] == [(120, 160, 3)] * 2 and pictures[0].std() > 5
+
+
+def test_without_the_extra_there_is_one_line_with_the_cure(cart, geomech, monkeypatch):
+    for name in [x for x in sys.modules if x == "mujoco" or x.startswith("rft.walking.mu")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    for args in (("walk", "xplorer", "--engine", "mujoco"), ("walk", "cart.toml")):
+        code, out, err = geomech(*args)
+        assert (code, out) == (2, "") and err.count("\n") == 1 and "pip install 'geomech[mujoco]'" in err, err
+    with pytest.raises(ValueError, match="not installed"):
+        engine("mujoco")
+
+
+def test_the_clock_of_a_robot_of_the_plane_is_that_of_its_tripods():
+    robot = scenes.load("xplorer").robot
+    made = machine(robot, 6)
+    clock = Clock(made, Tripod(2.0, 0.3, 1.0))
+    assert [made.model.actuator(k).name for k in made.driven] == [f"leg{k}" for k in range(6)]
+    np.testing.assert_allclose(clock.turned(0.0, 1e-9)[0][[1, 2, 5]] - clock.turned(0.0, 1e-9)[0][[0, 3, 4]], np.pi)
