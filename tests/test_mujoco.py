@@ -266,3 +266,15 @@ def test_every_end_has_its_status_and_no_nan():
     start = Start(thrown.body.data.qpos, np.array([1.0, 0.0, 3.0, *np.zeros(9)]))
     found = thrown.walk(3, start=start)
     assert found.status == "airborne" and found.limit is None and found.speed == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_figure_compares_steps_and_engines(monkeypatch):
+    from figures import walking_mujoco
+
+    coarse = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, elements=4))
+    monkeypatch.setattr(walking_mujoco, "load", lambda name: coarse)
+    monkeypatch.setattr(walking_mujoco, "SETTLED", 1)
+    numbers = walking_mujoco.compute({"implicit": (12, 24), "held": (12,)}, 48, {"xplorer": (3.0,)})
+    (_, implicit), (_, held) = numbers["steps"].values()
+    assert implicit.max() < 0.2 < held[0]
+    assert walking_mujoco.draw(numbers).axes[0].get_ylabel() == "error of the way"

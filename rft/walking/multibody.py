@@ -56,6 +56,7 @@ class Multibody:
     ):
         require(model.nv > 0, "nothing in the model can move: it has no joints")
         require(model.na == 0, "the model has actuators with a state of their own: drop their dyntype")
+        mujoco.set_mju_user_warning(_ignored)
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
@@ -198,6 +199,10 @@ class Multibody:
         at = Poses(rotation, data.xpos[facets.bodies], twist[:, :3], twist[:, 3:])
         self.wrenches, slopes = facets.loads(self.grains, at, k)
         return np.einsum("bij,bi->j", j, self.wrenches), (j.swapaxes(1, 2) @ slopes @ j).sum(0)
+
+
+def _ignored(_warning: str) -> None:
+    """MuJoCo writes its warnings to a file in the folder where one is; steps that are not solved are counted and refused."""
 
 
 def _solved(matrix, right) -> np.ndarray:

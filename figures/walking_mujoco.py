@@ -1,0 +1,95 @@
+"""The engine of three dimensions: its step-size study, and its speeds beside those of the planar engine. Needs MuJoCo.
+
+Xplorer's way in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
+the grains' forces held as they are at the start of each: these are of order 1, and go astray below some 200 steps a cycle.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from rft.walking import Tripod, Walker, engine
+
+STEPS = {"implicit": (12, 16, 24, 32, 48, 64, 96, 128), "held": (128, 256, 512, 1024, 2048, 4096)}
+FINEST, FREQUENCY = 768, 2.0
+SETTLED = 6  # strides, at most, to the limit cycle
+HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: without, none of these steps stays finite
+FREQUENCIES = {"xplorer": (1.0, 2.0, 3.0, 4.0), "sandbot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
+
+
+def _course(steps: int):
+    from rft.walking.mujoco_walk import Course
+
+    scene = load("xplorer")
+    walker = Walker(scene.robot, Tripod(FREQUENCY), scene.medium)
+    return Course(walker, dataclasses.replace(scene.numerics, steps=steps))
+
+
+def way(start, steps: int, how: str) -> float:
+    """m, in one stride from a state."""
+    import mujoco
+
+    body, h = _course(steps).body, 1 / (FREQUENCY * steps)
+    model, data = body.model, body.data
+    data.qpos[:], data.qvel[:] = start
+    mujoco.mj_forward(model, data)
+    if how == "held":
+        model.opt.timestep, model.opt.integrator = h, int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+        model.dof_armature[6:] = HEAVY  # of what turns as it is told, and so feels nothing of it
+    for k in range(steps):
+        if how == "implicit":
+            body.step(h)
+            continue
+        data.qfrc_applied[:] = body._loads(0.0)[0]
+        data.ctrl[:] = body.control((k + 1) * h, (k + 0.5) * h)
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        if data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
+            return np.inf  # MuJoCo has begun anew
+    return float(data.qpos[0] - start.qpos[0])
+
+
+def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
+    """{"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
+    start = _course(64).walk(SETTLED).limit
+    truth = way(start, finest, "implicit")
+    study = {how: (n, np.array([abs(way(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
+    speeds = {}
+    for name, some in frequencies.items():
+        scene = load(name)
+        walkers = [
+            dataclasses.replace(scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))) for f in some
+        ]
+        each = (engine(how).walk(walkers, scene.numerics, 3) for how in ("planar", "mujoco"))
+        speeds[name] = (some, *(np.array([w.speed for w in walks]) for walks in each))
+    return {"steps": study, "speeds": speeds}
+
+
+@plots.styled
+def draw(numbers: dict):
+    fig, axes = plots.figure(8.4, 2.8, 1 + len(numbers["speeds"]))
+    ax = axes[0, 0]
+    for (how, (steps, error)), colour in zip(numbers["steps"].items(), ("C0", "C3")):
+        good = np.isfinite(error)
+        label = how if how == "implicit" else "grains' forces held"
+        ax.loglog(np.array(steps)[good], error[good], "o-", color=colour, lw=1.0, label=label)
+    steps, error = (np.array(x, float) for x in numbers["steps"]["implicit"])
+    ax.loglog(steps, error[0] * (steps / steps[0]) ** -2, color="0.6", ls="--", lw=0.8, label="order 2")
+    ax.set(xlabel="steps of a cycle", ylabel="error of the way")
+    ax.legend(loc="best", fontsize=7)
+    for ax, (name, (frequency, planar, full)) in zip(axes[0, 1:], numbers["speeds"].items()):
+        ax.plot(frequency, planar, "-", color="0.3", lw=1.2, label="planar")
+        ax.plot(frequency, full, "o", color="C0", ms=5, label="MuJoCo")
+        ax.set(xlabel="frequency (Hz)", ylabel="speed (m/s)", ylim=(0, None))
+        ax.set_title(f"{name.capitalize()}: within {100 * np.abs(full / planar - 1).max():.1f} %")
+        ax.legend(loc="best")
+    return fig
+
+
+if __name__ == "__main__":
+    main("walking_mujoco", compute, draw)
