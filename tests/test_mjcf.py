@@ -232,8 +232,8 @@ def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch)
     code, out, _ = geomech("walk", "small.toml", "--engine", "planar", "--json")
     assert code == 0 and json.loads(out)["speed"] != found["speed"]
     assert json.loads(out)["speed"] == pytest.approx(found["speed"], rel=0.08)
-    code, out, _ = geomech("sweep", "small.toml", "--over", "gait.frequency=1.5,2", "-o", "s.nc")
-    assert code == 0 and "2 walking" in out
+    code, out, _ = geomech("sweep", "small.toml", "--over", "gait.frequency=2", "-o", "s.nc")
+    assert code == 0 and "1 walking" in out
     results = walking.study(scenes.load(tmp_path / "small.toml"))
     assert results["speed"] == pytest.approx(found["speed"], rel=0.02) and 0 < results["lines"][0]["error"][0] < 0.2
 
