@@ -100,10 +100,11 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
         np.array([[0, 4.0, 0]]),
     )
     facets = Facets([Surface.of_outline(0, outline)])
-    found = facets.loads(Grains(Extruded(SAND), 1.0, 200.0, 1e-7), at)[0][0]
-    ground = Ground(SAND, *np.array([1.0, 200.0, 1e-7])[:, None, None], outline.closed)
+    found = facets.loads(Grains(Extruded(SAND), 1.0, 2000.0, 1e-7), at)[0][0]
+    ground = Ground(SAND, *np.array([1.0, 2000.0, 1e-7])[:, None, None], outline.closed)
     force, moment = _loads(ground, Outlines.of([outline]), np.array([[place[0], place[2], angle]]), motion[None])
-    np.testing.assert_allclose(found[[0, 2, 4]], [*force[0], moment[0]], rtol=3e-3, atol=2e-4 * np.abs(force).max())
+    np.testing.assert_allclose(found[[0, 2]], force[0], rtol=3e-3, atol=2e-4 * np.abs(force).max())
+    assert found[4] == pytest.approx(moment[0], abs=6e-5 * np.abs(force).max())
     np.testing.assert_allclose(found[[1, 3, 5]], 0.0, atol=1e-9)
 
 
@@ -188,6 +189,33 @@ def test_what_falls_free_falls_as_galilei_says():
     assert body.energy() == pytest.approx(energy, rel=1e-4) and (body.work, body.loss) == (0.0, 0.0)
 
 
+PENDULUM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body pos="0 0 5"><joint name="j" axis="0 1 0" stiffness="0.4"
+damping="0.02"/><geom name="g" type="sphere" size="0.05" pos="0.2 0 0" mass="0.3"/></body></worldbody></mujoco>"""
+
+
+def test_springs_keep_energy_and_dampers_take_it():
+    """To the second order of the steps, which make no difference to what a halved step does."""
+    model, left = mujoco.MjModel.from_xml_string(PENDULUM), []
+    for steps in (20, 40):
+        body = Multibody(model, geoms.named(model, {"g": geoms.mesh_of(model, 0, 8)}), Grains(SPATIAL))
+        body.data.qpos[0], body.data.qvel[0] = 0.3, 2.0
+        first = body.energy()
+        for _ in range(steps):
+            body.step(0.25 / steps)
+        left.append(abs(body.loss + body.energy() - first) / body.loss)
+        assert body.work == 0.0 and body.loss > 0.02
+    assert left[1] < 1e-4 and left[0] / left[1] > 3.5
+    ends = []
+    for fails in (0, 1):
+        body = Multibody(model, geoms.named(model, {"g": geoms.mesh_of(model, 0, 8)}), Grains(SPATIAL))
+        body.data.qvel[0], solved, tried = 2.0, body._step, iter([fails, 0, 0])
+        body._step = lambda *args: solved(*args) and not next(tried)
+        for h in (0.04,) if fails else (0.02, 0.02):
+            body.step(h)
+        ends.append([body.data.qpos[0], body.data.qvel[0], body.data.time, body.loss])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
+
+
 def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     """Xplorer in its plane at 4 Hz, after its fall: motors' work = losses + change of energy."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
@@ -216,6 +244,8 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
     assert np.abs(free.more["roll"]).max() < 0.06 and np.abs(free.more["yaw"]).max() < 0.06
     if name != "xplorer":
         return
+    assert free.pose[:, 2].min() == pytest.approx(wanted.pose[:, 2].min(), abs=0.02)  # nose up, by ten degrees
+    assert free.twist[:, 2].max() == pytest.approx(wanted.twist[:, 2].max(), rel=0.2)
     kept = Course(walker, finely, planar=True).walk(8)
     assert kept.speed == pytest.approx(wanted.speed, rel=0.025)
     assert np.abs(kept.more["roll"]).max() < 1e-12
