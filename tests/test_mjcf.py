@@ -161,6 +161,16 @@ def test_what_makes_no_machine_is_refused_with_one_line(right, cart, geomech):
     assert (code, out) == (2, "") and err.count("\n") == 1 and err.startswith("error: ") and said in err, err
 
 
+@pytest.mark.parametrize("field", ["mjcf", "geoms", "actuators", "phases"])
+def test_no_machine_takes_a_wrong_type(field, cart):
+    robot = Mjcf(str(cart / "parts" / "cart.xml"), NAMES)
+    wrong = [3, True, {"a": 1}, (1j,), (float("nan"),) * 4, [["fl"]], np.zeros(3), "fl", ("a\0b",), np.eye(2)]
+    for value in wrong + ([None] if field in ("mjcf", "geoms") else []):
+        with pytest.raises(ValueError, match=".") as caught:
+            dataclasses.replace(robot, **{field: value})
+        assert "\n" not in str(caught.value)
+
+
 FILES = {
     "no MJCF that MuJoCo reads": "<mujoco><worl",
     "has no actuators": CART[: CART.index("<actuator>")] + "</mujoco>",

@@ -48,8 +48,10 @@ class Walker:
 @dataclass(frozen=True)
 class Fineness:
     """steps: of a cycle. elements: of a leg's outline; the belly has as many. rounding: m/s, below which drag falls off in
-    proportion to speed. duration: s of walking from rest, at most. engine: of `ENGINES`, or None for the planar one, if that
-    takes the robot and its ground."""
+    proportion to speed. duration: s of walking from rest, at most.
+
+    engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three dimensions.
+    """
 
     steps: int = 32
     elements: int = 12

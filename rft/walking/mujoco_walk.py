@@ -7,7 +7,7 @@ an MJCF of one's own is taken as it is. Strides are those of the planar engine, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -36,13 +36,17 @@ def refuse(walker: Walker) -> None:
         Extruded(walker.stress)
 
 
-def walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
-    """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
-    found = []
+def walk(
+    walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None, progress: Callable | None = None
+) -> list[Walk]:
+    """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle. progress: told
+    the fraction done."""
+    found: list[Walk] = []
     for walker in walkers:
         duration = settling / walker.gait.frequency if settling else numerics.duration
         most = math.ceil(duration * walker.gait.frequency - 1e-9) + MOST_STRIDES
-        found.append(Course(walker, numerics).walk(most, duration))
+        told = (lambda done: progress((len(found) + done) / len(walkers))) if progress else None
+        found.append(Course(walker, numerics).walk(most, duration, progress=told))
     return found
 
 
@@ -90,7 +94,13 @@ class Course:
         self.far = float((away + facets.reach).max() + facets.reach.max())
         self.own = np.flatnonzero(np.isin(facets.of, np.flatnonzero(~legs)))
 
-    def walk(self, most: int, duration: float | None = None, start: Start | None = None) -> Walk:
+    def walk(
+        self,
+        most: int,
+        duration: float | None = None,
+        start: Start | None = None,
+        progress: Callable | None = None,
+    ) -> Walk:
         """At most so many strides. duration: s, for which the walk is told, the rest as repetitions of the last stride."""
         body = self.body
         if start is not None:
@@ -101,6 +111,8 @@ class Course:
         for stride in range(most):
             first, begun = rows[-1], len(rows) - 1
             ended = ended or self.stride(stride, rows, states)
+            if progress:
+                progress((stride + 1) / most)
             if ended:
                 break
             moves.append(_progress(first, rows[-1]))
@@ -123,7 +135,7 @@ class Course:
         more = {name: named[name] for name in ("y", "roll", "yaw")} | {"states": path}
         return Walk(
             named["t"], pose, twist, named["work"], named["loss"], named["energy"], speed, status,
-            float(len(moves)), periodic, drift, limit, body.unsolved, more,
+            float(len(moves)), periodic, drift, limit, unsolved=body.unsolved, more=more,
         )  # fmt: skip
 
     def told(self, rows, moves, periodic: bool, drift: float, ended: str) -> tuple[float, float, str]:

@@ -112,9 +112,11 @@ class Rhex(Robot):
     """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
 
     length, height, width: of the box about the centre of mass, m. hip_height: of the hips above it. inertia: that of the box
-    where none is given. aside: of the legs at each hip from the middle plane, m, one on either side, for the engine of three
-    dimensions; where none are given, beside the box, and at every other one of an odd number of hips so much farther out
-    that a tripod whose legs bear alike neither rolls nor yaws the body.
+    where none is given.
+
+    aside (m): of the legs at each hip from the middle plane, one on either side, for the engine of three dimensions; where
+    none are given, beside the box, and at every other one of an odd number of hips so much farther out that a tripod whose
+    legs bear alike neither rolls nor yaws the body.
     """
 
     mass: float
