@@ -21,6 +21,8 @@ import numpy as np
 from rft.media.base import require, shown
 from rft.vertical.stress import PER_CUBIC_METRE, StressMap
 
+CUT = 0.05  # of the stress times n . v: over which a cut of tension is rounded, as a sheet turns out of its motion
+SHARPEST = 2e-3  # sine of the angle over which stress rises at least: a jump no time step could end on
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -47,10 +49,13 @@ class Extruded:
         a_h = (s.C01 + both) * n_z * n_z * v_h
         a_h = a_h + ((s.C01 - both) * inner + 2 * n_z * (ahead * v_z - s.D10)) * n_h
         found = PER_CUBIC_METRE * s.zeta * (a_z * up[:, None] - a_h)
-        return found if s.tension == "keep" else np.where((found * n).sum(0) * along <= 0.0, found, 0.0)
+        if s.tension == "keep":
+            return found
+        push = -(found * n).sum(0) * along / np.maximum(np.sqrt((found * found).sum(0)), 1e-300)
+        return found * np.clip(0.5 + push / CUT, 0.0, 1.0)
 
     def share(self, along: np.ndarray, sheet: np.ndarray) -> np.ndarray:
         """Of the stress on faces of which n . v is ``along`` (N,): 0 on those that trail, rising by degrees on those that lead
         (`PlateStress.grazing`); 1 on a thin sheet, of which one side or the other leads."""
-        scale = np.sqrt(along * along + np.sin(self.stress.grazing) ** 2)
-        return np.where(sheet, 1.0, np.maximum(along, 0.0) / np.where(scale == 0.0, 1.0, scale))
+        scale = np.sqrt(along * along + max(np.sin(self.stress.grazing), SHARPEST) ** 2)
+        return np.where(sheet, 1.0, np.maximum(along, 0.0) / scale)

@@ -19,6 +19,7 @@ from rft.walking.robot import Robot, Roller
 LIGHT = 1e-6  # of the robot's mass, that of a leg
 GIVES = 1e-4  # rad, that a leg turns by with the robot's weight at its end
 QUICK = 1e-3  # s, in which a servo settles
+LEAST = 1e-14  # kg m^2, of any moment of inertia: MuJoCo takes none below 1e-15
 THICK = 0.02  # of a leg's reach, as drawn
 
 PLANAR = (("slide", "1 0 0"), ("slide", "0 0 1"), ("hinge", "0 1 0"))
@@ -110,7 +111,7 @@ def _drawn(legs, thick: float):
 
 
 def _inertial(body, mass: float, sides) -> None:
-    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=_text(sides))
+    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=_text(np.maximum(sides, LEAST)))
 
 
 def _text(numbers) -> str:
