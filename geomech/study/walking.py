@@ -28,7 +28,7 @@ TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = 3e-3  # s of computing, for a robot by itself,
 MORE = 1e-3  # and for each beside it, measured
-ALONE = 8e-3  # s, in three dimensions
+ALONE = 5e-3  # s, in three dimensions
 LIMIT = 6  # cycles on the way to the limit cycle, and half as many for each of two errors
 KNOBS = {
     "steps": (12, 16, 24, 32, 48, 64, 96),

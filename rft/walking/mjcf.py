@@ -60,6 +60,7 @@ class Mjcf(Robot):
     def __setstate__(self, state):
         self.__dict__.update(state)
         object.__setattr__(self, "model", _compiled(self.mjcf)[0])
+        self._find_geoms()
 
     @property
     def mass(self) -> float:
