@@ -179,7 +179,7 @@ FILES = {
     "it has no joints": '<mujoco><worldbody><body><geom name="fl" size="1"/></body></worldbody></mujoco>',
     "gravity must be along -z": CART.replace("0 0 -9.81", "0 -9.81 0"),
     "has a ctrlrange": CART.replace('kv="0.4"', 'kv="0.4" ctrlrange="-1 1"'),
-    "state of their own": CART.replace('kv="0.4"', 'kv="0.4" timeconst="0.1"'),
+    "state of their own": CART.replace("</actuator>", '<general joint="fl" dyntype="filter" dynprm="0.1"/></actuator>'),
     "larger than 20 MB": " " * 20_000_001,
 }
 
