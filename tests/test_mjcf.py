@@ -149,6 +149,7 @@ WRONG = {
     "frequency = 1.0": ("frequency = 0", "frequency must be"),
     "\n[gait]": ("phases = [0.5]\n[gait]", "phases must be 4 numbers"),
     "geoms": ("goems", "a robot without legs"),
+    "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file: drop one"),
     "mjcf": ("legs = 3\nmjcf", "key: 'legs' is unknown"),
     "steps = 8": ('engine = "planar"', "use --engine mujoco"),
 }
@@ -193,6 +194,7 @@ def test_files_that_are_no_robot_are_refused_with_one_line(said, cart, geomech):
 
 def test_a_machine_written_is_the_machine_read(cart):
     scene = scenes.load(cart / "cart.toml")
+    assert scenes.parse(SCENE.replace("[robot]", '[robot]\nkind = "mjcf"'), scene.name) == scene
     anew = dataclasses.replace(scene, text="", medium=Spatial(2e5, tension="keep"))
     text = scenes.toml(anew)
     assert scenes.parse(text, scene.name) == anew and "mjcf" in text and "digest" not in text

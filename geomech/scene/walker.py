@@ -142,6 +142,8 @@ def _machine(place: str, table: dict, at) -> Mjcf:
     """A robot of an MJCF file."""
     if not table.get("geoms"):
         raise SceneError(f"{place} is a robot without legs: give geoms, a list of those that touch the ground")
+    if (kind := table.pop("kind", "mjcf")) != "mjcf":
+        raise SceneError(f"{place}: kind = {short(kind)} has sizes, mjcf a file: drop one")
     names = [f.name for f in dataclasses.fields(Mjcf) if f.init]
     for key in table:
         choose(f"{place} key", key, names)
