@@ -235,7 +235,7 @@ engine = "mujoco"
 
 def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 10)})
-    monkeypatch.setattr(walking, "FINEST", {"steps": 20})
+    monkeypatch.setattr(walking, "FINEST", {"steps": 12})
     (tmp_path / "small.toml").write_text(SMALL)
     code, out, _ = geomech("walk", "small.toml", "--json", "-o", "out")
     found = json.loads(out)
@@ -244,9 +244,6 @@ def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch)
     columns = (tmp_path / "out" / "walk.csv").read_text().split("\n")[0]
     assert columns.endswith("work,loss,energy,y,roll,yaw")
     assert image.imread(tmp_path / "out" / "walk.png").std() > 0.05
-    code, out, _ = geomech("walk", "small.toml", "--engine", "planar", "--json")
-    assert code == 0 and json.loads(out)["speed"] != found["speed"]
-    assert json.loads(out)["speed"] == pytest.approx(found["speed"], rel=0.08)
     code, out, _ = geomech("sweep", "small.toml", "--over", "gait.frequency=2", "-o", "s.nc")
     assert code == 0 and "1 walking" in out
     results = walking.study(scenes.load(tmp_path / "small.toml"))
