@@ -13,6 +13,7 @@ from figures import main
 from geomech.output import plots
 from geomech.scene import load
 from rft.walking import Tripod, Walker
+from rft.walking.march import step
 from rft.walking.planar import State
 from rft.walking.planar_walk import _strides
 
@@ -26,11 +27,11 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
 
     def slope(at: State, where: float):
         a, motors, ground = robots.forces(at.pose[None], at.twist[None], *robots.turned(np.array([where]), of))
-        return State(at.twist, a[0], motors[0], ground[0], 0.0 * ground[0])
+        return State(at.twist, a[0], motors[0], ground[0], *np.zeros((3, 1)))
 
     first = slope(state, phase)
     then = State(*(x + dt * y for x, y in zip(state, first)))
-    second = slope(then, phase + dt * robots.gaits[0].frequency)
+    second = slope(then, phase + dt * robots.frequency[0, 0])
     return State(*(x + dt * (y + z) / 2 for x, y, z in zip(state, first, second)))
 
 
@@ -43,7 +44,7 @@ def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
     for k in range(count):
         phase, dt = k / steps, 1 / (steps * frequency)
         if how == "implicit":
-            state = robots.step(state, np.array([phase]), phase + 0.5 / steps, np.array([dt]))
+            state = step(robots, state, phase, phase + 0.5 / steps, dt)
         else:
             state = heun(robots, state, phase, phase + 0.5 / steps, dt)
         if not np.isfinite(state.pose).all() or np.abs(state.pose[0, :2]).max() > 10.0:

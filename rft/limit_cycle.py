@@ -43,13 +43,12 @@ class Approach:
 
 
 class HeavyApproach(Approach):
-    """The same with mass: from the last cycles' first velocities, their changes and displacements; or whatever ``numbers``
-    a start is told by, (numbers, B)."""
+    """The same with mass: from the last cycles' first velocities, their changes and displacements."""
 
-    def __init__(self, samples: int, numbers: int = 3):
+    def __init__(self, samples: int):
         super().__init__(samples)
         self.cycles: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self.step, self.failures = np.zeros((numbers, samples)), np.zeros(samples, int)
+        self.step, self.failures = np.zeros((3, samples)), np.zeros(samples, int)
 
     def after(self, start, end, moved) -> np.ndarray:
         last, self.moved = self.moved, moved

@@ -44,6 +44,7 @@ from rft.vertical import (
 from rft.vertical.effects import Aeration, Slope
 from rft.vertical.effects import DisturbedGround as DisturbedPlaces
 from rft.vertical.effects import GrainInertia as GrainPressure
+from rft.walking import Rhex, Roller, Tripod, Walker
 
 _PSI = np.linspace(0.0, math.pi / 2, 12)  # rad
 
@@ -117,6 +118,17 @@ OUTLINES = {
     "polygon, open": Polygon(points=((0.0, 0.0), (0.05, 0.01), (0.02, 0.02)), width=0.01, closed=False),
     "spline": Spline(points=((0.0, 0.0), (0.0, 0.04), (0.03, 0.05), (0.04, 0.0)), width=0.01),
     "spline, open": Spline(points=((0.0, 0.0), (0.02, -0.01), (0.04, 0.01)), width=0.01, closed=False),
+}
+
+# Robots that walk, none like another in anything.
+POPPY = StressMap(zeta=0.3, grazing=math.radians(5))
+UNEVEN = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.01, 0.06), hip_height=-0.004, axle=0.002)
+ROUND = Rhex(0.5, 0.2, 0.04, 0.08, RoundRod(0.025, 0.03), (-0.07, 0.08), inertia=4e-3, axle=0.015)
+WALKERS = {
+    "rhex, c-legs": Walker(UNEVEN, Tripod(2.0), POPPY),
+    "rhex, round legs, tripod clock": Walker(ROUND, Tripod(1.3, 0.4, 1.1, 0.3), StressMap(zeta=0.5, tension="cut")),
+    "rhex, air and grain inertia": Walker(UNEVEN, Tripod(3.0), POPPY, (Aeration(0.1, 0.4), GrainPressure(2.0))),
+    "wheel, lugs": Walker(Roller(2.0, Wheel(0.1, 0.1, 12, 0.015, 0.006)), Tripod(1.0, 0.3, 1.0), POPPY),
 }
 
 # Bodies of three dimensions.

@@ -16,6 +16,7 @@ import pytest
         (golden.marches, 50),
         (golden.intrusions, 100),
         (golden.solids, 20),
+        (golden.walks, 4),
     ],
     ids=lambda x: getattr(x, "__name__", ""),
 )

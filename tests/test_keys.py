@@ -11,12 +11,23 @@ import pytest
 
 from geomech import cli, kinds
 from geomech.errors import SceneError
-from geomech.scene import builtin_names, from_tables, intruder_keys, intruder_names, load, parse, solid
+from geomech.scene import (
+    builtin_names,
+    from_tables,
+    intruder_keys,
+    intruder_names,
+    load,
+    parse,
+    solid,
+    walker_keys,
+    walker_names,
+)
 from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
 from geomech.scene.read import TABLES
 from rft import CATALOGUE, spatial, vertical
 from rft.vertical import VERTICAL
 from rft.vertical.effects import KINDS as GROUND_EFFECTS
+from rft.walking import ROBOTS, Fineness, Tripod
 
 EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
 OF_INTRUDERS = {
@@ -26,6 +37,9 @@ OF_INTRUDERS = {
     "motion-of-mesh": spatial.MOTIONS,
     "medium-of-mesh": {"": spatial.Spatial},
     "ground": GROUND_EFFECTS,
+    "robot": ROBOTS,
+    "clock": {"": Tripod},
+    "numerics-of-walk": {"": Fineness},
 }
 EVERY_CLASS = [*EVERY, *((table, name, kind) for table, kinds in OF_INTRUDERS.items() for name, kind in kinds.items())]
 ROOT = pathlib.Path(__file__).parents[1]
@@ -36,8 +50,10 @@ ROOT = pathlib.Path(__file__).parents[1]
 )
 def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(table, name, kind):
     """In the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
-    keys = keys_of(kind)
-    assert [k.name for k in keys] == [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
+    keys = [k for k in keys_of(kind) if k.name != "legs"]  # a table of its own
+    assert [k.name for k in keys] == [
+        f.name for f in dataclasses.fields(kind) if f.init and f.name not in ("solver", "legs")
+    ]
     for key in keys:
         place = f"{kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
         assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
@@ -141,7 +157,7 @@ def tables(name):
     return tomllib.loads(load(name).text)
 
 
-@pytest.mark.parametrize("name", builtin_names() + intruder_names())
+@pytest.mark.parametrize("name", builtin_names() + intruder_names() + walker_names())
 def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
     scene = tables(name)
     assert valid(scene)
@@ -155,7 +171,9 @@ def test_built_in_scenes_are_valid_and_wrong_keys_are_not(name, valid):
             if kind := {"kind", "law", "name"} & {*part}:
                 bare = both(valid, scene, table, k, {x: v for x, v in part.items() if x not in kind})
                 # without a name that of an outline is the generic set; that of a mesh may be told by numbers
-                assert bare == (table == "medium" and "intruder" in scene and not of_mesh(scene))
+                assert bare == (
+                    table == "medium" and ("robot" in scene or ("intruder" in scene and not of_mesh(scene)))
+                )
 
 
 def of_mesh(scene):
@@ -321,6 +339,95 @@ def test_keys_of_intruders_are_told(capsys):
     assert re.search(r"^  heading +number +rad +0.0 ", of_mesh.partition("\n\n")[0], re.M)
     assert re.search(r"\n  internal_friction +number +- +none +mu, tan of the angle of repose", whole)
     assert '[[effects]] kind = "aeration" of an intruder scene\n' in run(capsys, "keys", "effects")[1]
+
+
+LEG, BOX = 'kind = "flat-leg"\nradius = 0.02\nwidth = 0.01', "length = 0.1\nheight = 0.03\nwidth = 0.05\nhips = [0.0]"
+
+
+@pytest.mark.parametrize(
+    ("robot", "legs", "gait", "more", "good"),
+    [
+        (BOX, LEG, "frequency = 2", "", True),
+        (
+            BOX + "\ninertia = 1e-3\naxle = -0.01",
+            LEG,
+            "frequency = 2\nsweep_deg = 60\nmiddle = 0.1\nduty = 0.4",
+            "",
+            True,
+        ),
+        (None, LEG, "frequency = 2\nsweep = 1.0", "[numerics]\nsteps = 16\nrounding = 1e-3\nduration = 2.0", True),
+        (BOX, LEG, "frequency = 2", '[[effects]]\nkind = "aeration"\nair_speed = 0.1\nfluidisation = 0.3', True),
+        (BOX, LEG, "frequency = 2", '[[effects]]\nkind = "slope"\nangle_deg = 3', False),
+        (BOX, LEG, "sweep = 1.0", "", False),
+        (BOX, LEG, None, "", False),
+        (BOX, None, "frequency = 2", "", False),
+        (BOX, LEG.replace("flat-leg", "sphere"), "frequency = 2", "", False),
+        (BOX, LEG, "frequency = 2\nsweep = 1.0\nsweep_deg = 60", "", False),
+        (BOX, LEG, "frequency = 2", "[motion]\nkind = 'drag'\ndepth = 0.1", False),
+        (BOX, LEG, "frequency = 2", "[numerics]\nphases = 20", False),
+        (BOX.replace("width", "widht"), LEG, "frequency = 2", "", False),
+    ],
+)
+def test_the_schema_agrees_with_the_reader_of_walkers(robot, legs, gait, more, good, valid):
+    kind = "wheel" if robot is None else "rhex"
+    parts = {"robot": f'kind = "{kind}"\nmass = 0.2\n{robot or ""}', "robot.legs": legs, "gait": gait}
+    written = "\n".join(f"[{name}]\n{part}" for name, part in parts.items() if part is not None)
+    scene = f'[medium]\nname = "poppy-seeds-loose"\n{written}\n{more}'
+    assert valid(tomllib.loads(scene)) == good
+    if good:
+        parse(scene)
+    else:
+        with pytest.raises(SceneError):
+            parse(scene)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "good"),
+    [
+        ("", "", True),
+        ('name = "poppy-seeds-loose"', "xi_n = 3e5", True),
+        ('name = "poppy-seeds-loose"', 'law = "3d"\ndensity = 700\ninternal_friction = 0.5', True),
+        ("name =", 'law = "planar"\nname =', True),
+        ("name =", 'law = "spatial"\nname =', False),
+        ("mjcf =", 'kind = "mjcf"\nmjcf =', True),
+        ("mjcf =", 'kind = "rhex"\nmjcf =', False),
+        ("mjcf =", "mass = 1.0\nmjcf =", False),
+        ('geoms = ["foot"]', "", False),
+        ('geoms = ["foot"]', 'geoms = ["foot"]\nactuators = ["turn"]\nphases = [0.5]', True),
+    ],
+)
+def test_the_schema_agrees_with_the_reader_of_mjcf_robots(old, new, good, valid, tmp_path):
+    pytest.importorskip("mujoco")
+    leg = '<body><joint name="j" axis="0 1 0"/><geom name="foot" type="capsule" fromto="0 0 0 0 0 -.05" size=".01"/></body>'
+    body = f'<body><freejoint/><geom type="box" size=".05 .03 .01"/>{leg}</body>'
+    turn = '<actuator><position name="turn" joint="j" kp="1" kv=".1"/></actuator>'
+    (tmp_path / "r.xml").write_text(f"<mujoco><worldbody>{body}</worldbody>{turn}</mujoco>")
+    robot = f'[robot]\nmjcf = "{tmp_path}/r.xml"\ngeoms = ["foot"]'
+    scene = f'[medium]\nname = "poppy-seeds-loose"\n{robot}\n[gait]\nfrequency = 1.0'.replace(old, new)
+    assert valid(tomllib.loads(scene)) == good
+    if good:
+        parse(scene)
+    else:
+        with pytest.raises(SceneError):
+            parse(scene)
+
+
+def test_keys_of_robots_are_told(capsys):
+    for section, parts in walker_keys.sections().items():
+        out = run(capsys, "keys", section)[1]
+        for part in parts:
+            block = out.partition(part.title + "\n")[2].partition("\n\n")[0]
+            for key in part.keys:
+                assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} +\S+ +.*[a-z]", block, re.M), (
+                    key.name
+                )
+                assert key.type != "value" and key.unit and key.name != "legs"
+    robots = run(capsys, "keys", "robot")[1]
+    assert (
+        re.search(r"\n  mass +number +kg +required +of all that the wheel carries", robots) and "[robot.legs]" in robots
+    )
+    assert re.search(r"\n  hips +list of numbers +m +required +x of each", robots)
+    assert re.search(r"\n  sweep +number +rad +3.14\d* +by which.*sweep_deg", run(capsys, "keys", "gait")[1])
 
 
 def test_systems_and_sizes_given_once_are_valid(valid):

@@ -39,8 +39,8 @@ def walk(
         film.check_format(animate)
     check_outputs(scene, animate, None)
     allow(scene, walking.price(scene, by=engine), yes)
-    with terminal.progress(f"walk of {scene.name}"):
-        found = walking.run(scene, engine)
+    with terminal.progress(f"walk of {scene.name}") as bar:
+        found = walking.run(scene, engine, bar)
     if animate:
         walks.film(animate, scene, found)
     if out:

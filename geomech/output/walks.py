@@ -31,6 +31,7 @@ def as_json(found: Walked) -> str:
     w = found.walk
     series = {name: values.tolist() for name, values in columns(found).items() if name in ("t", "x", "z", "pitch")}
     numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
+    numbers |= {"residual": w.residual, "unaccounted": w.unaccounted}
     return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
 
 
@@ -45,9 +46,15 @@ def told(scene: WalkerScene, found: Walked) -> str:
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
         *_aside(w),
-        f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J",
-        *([f"{w.unsolved} steps were taken unsolved: raise [numerics] steps or rounding"] if w.unsolved else []),
+        f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J; "
+        f"{100 * w.unaccounted:.1g} % of the work is not accounted for, an error of the time steps",
+        *([_unsolved(w)] if w.unsolved else []),
     ])  # fmt: skip
+
+
+def _unsolved(walk) -> str:
+    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.off:.1g} m/s"
+    return f"{walk.unsolved} steps were taken unsolved, {off}: raise [numerics] steps or rounding"
 
 
 def _aside(walk) -> list[str]:

@@ -61,9 +61,11 @@ def keys_of(kind: type) -> list[Key]:
 
 
 def _shapes(kind: type) -> dict[str, dict]:
-    """JSON Schema of the fields; empty for a class of one's own with types that no scene file can hold."""
+    """JSON Schema of the fields; empty for types that no scene file can hold, and for a class of one's own with such."""
     try:
-        return msgspec.json.schema(kind)["$defs"][kind.__name__]["properties"]
+        return msgspec.json.schema(kind, schema_hook=lambda other: {"type": "object"})["$defs"][kind.__name__][
+            "properties"
+        ]
     except (TypeError, KeyError):
         return {}
 

@@ -1,6 +1,7 @@
 """Every key of a scene file, from the classes that read it: as text to read, and as a JSON Schema for editors.
 
-What a class says of its keys is in `geomech.scene.key`; tables of intruder scenes are in `geomech.scene.intruder_keys`.
+What a class says of its keys is in `geomech.scene.key`; tables of intruder scenes are in `geomech.scene.intruder_keys`,
+those of walking robots in `geomech.scene.walker_keys`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 from geomech.errors import choose
 from geomech.kinds import FAMILIES, unloaded
-from geomech.scene import intruder_keys
+from geomech.scene import intruder_keys, walker_keys
 from geomech.scene.key import Key, first, keys_of, meanings, option, properties, table, told
 from geomech.scene.model import Numerics
 from geomech.scene.read import TABLES
@@ -50,16 +51,16 @@ def sections() -> dict[str, list[tuple[str, str, type]]]:
 
 def names() -> list[str]:
     """Of the tables, those of scenes with a gait first."""
-    return list(dict.fromkeys(["frame", *sections(), *intruder_keys.sections()]))
+    return list(dict.fromkeys(["frame", *sections(), *intruder_keys.sections(), *walker_keys.sections()]))
 
 
 def text(section: str | None = None) -> str:
     """All keys, or those of one section, to be read."""
-    every, theirs = sections(), intruder_keys.sections()
+    every, theirs = sections(), (intruder_keys.sections(), walker_keys.sections())
     chosen = [choose("SECTION", section, names())] if section is not None else names()
     of_gaits = [x for name in chosen if name in every or name == "frame" for x in _told(name, every)]
-    of_intruders = [told(*part[:3]) for name in chosen for part in theirs.get(name, ())]
-    return "\n\n".join([*of_gaits, *of_intruders]) + "\n"
+    others = [told(*part[:3]) for of in theirs for name in chosen for part in of.get(name, ())]
+    return "\n\n".join([*of_gaits, *others]) + "\n"
 
 
 def _told(section: str, every: dict) -> Iterator[str]:
@@ -90,12 +91,12 @@ def _of_packages(group: str, key: str) -> Iterator[str]:
 
 
 def schema() -> dict[str, Any]:
-    """JSON Schema of a scene file, with a gait or with an intruder, its classes those that are known now."""
+    """JSON Schema of a scene file, with a gait, an intruder or a robot that walks, its classes those that are known now."""
     every, theirs = sections(), intruder_keys.schemas()
     shapes = {"frame": {"type": "string", "description": FRAME}, **{k: _any(k, parts) for k, parts in every.items()}}
     swimmer = {"kind": {"const": "swimmer"}, **{name: shapes[name] for name in ("medium", "body", "effects")}}
     shapes["system"]["oneOf"].append(table(SWIMMER, swimmer, ["kind"]))
-    groups = {"gaits": shapes, **theirs}
+    groups = {"gaits": shapes, **theirs, "walkers": walker_keys.schemas()}
     named = {group: {k: {"$ref": f"#/$defs/{group}/{k}"} for k in of} for group, of in groups.items()}
     own = named["gaits"]
     every_name = dict.fromkeys(name for of in named.values() for name in of)
@@ -106,12 +107,16 @@ def schema() -> dict[str, Any]:
         "type": "object",
         "properties": {k: {"anyOf": [of[k] for of in named.values() if k in of]} for k in every_name},
         "additionalProperties": False,
-        "if": {"anyOf": [{"required": ["intruder"]}, {"required": ["motion"]}]},
-        "then": intruder_keys.whole(named),
+        "if": {"required": ["robot"]},
+        "then": walker_keys.whole(named["walkers"]),
         "else": {
-            **table("", own, []),
-            "if": {"required": ["system"]}, "then": whole, "else": short,
-            "allOf": [_size_needed(*each) for each in _sizes_needed(every)],
+            "if": {"anyOf": [{"required": ["intruder"]}, {"required": ["motion"]}]},
+            "then": intruder_keys.whole(named),
+            "else": {
+                **table("", own, []),
+                "if": {"required": ["system"]}, "then": whole, "else": short,
+                "allOf": [_size_needed(*each) for each in _sizes_needed(every)],
+            },
         },
         "$defs": groups,
     }  # fmt: skip

@@ -130,6 +130,7 @@ def _robot(name: str, table: Mapping, at) -> Robot:
     names = [f.name for f in dataclasses.fields(kind)]
     for key in rest:
         choose(f"{place} key", key, names)
+    _kind(f"{name}: [robot.legs]", dict(rest["legs"]), "kind", SHAPES)
     legs = _intruder(f"{name}: [robot.legs]", at(rest.pop("legs")))
     needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING} - {"legs"}
     if lacking := sorted(needed - {*rest}):

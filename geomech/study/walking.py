@@ -26,10 +26,11 @@ from rft.walking import Walk, engine
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
-PER_STEP = 3e-3  # s of computing, for a robot by itself,
-MORE = 1e-3  # and for each beside it, measured
+PER_STEP = 2.2e-3  # s of computing, for a robot by itself,
+MORE = 5e-4  # and for each beside it, measured
 ALONE = 5e-3  # s, in three dimensions
-LIMIT = 6  # cycles on the way to the limit cycle, and half as many for each of two errors
+WALKING = 0.7  # of the time, before the errors are asked for
+LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
 KNOBS = {
     "steps": (12, 16, 24, 32, 48, 64, 96),
     "elements": (6, 8, 12, 16, 24, 32),
@@ -41,29 +42,35 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)
 
 
 class Walked(NamedTuple):
-    """walk: as rft has it. estimate: error of its speed, m/s: what half the steps and half the elements change, and what is
-    left to the limit."""
+    """walk: as rft has it. estimate: error of its speed, m/s: what half the steps and half the elements change, what is left to
+    the limit, and what steps that are not solved move."""
 
     walk: Walk
     estimate: float
 
 
-def walked(scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False) -> list[Walked]:
-    """Scenes of equal numerics and engines, side by side. settling: a few cycles from rest are enough."""
+def walked(
+    scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False, progress: Callable | None = None
+) -> list[Walked]:
+    """Scenes of equal numerics and engines, side by side. settling: a few cycles from rest are enough. progress: told the
+    fraction done."""
     numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
-    walks = how.walk(walkers, numerics, SETTLING if settling else None)
-    error = np.array([w.drift for w in walks])
+    told = {"progress": lambda done: progress(WALKING * done)} if progress else {}
+    walks = how.walk(walkers, numerics, SETTLING if settling else None, **told)
+    error = np.array([w.drift + w.off for w in walks])
     for name, fewest in (("steps", 8), ("elements", 4)):
         coarse = dataclasses.replace(numerics, **{name: max(fewest, getattr(numerics, name) // 2)})
         there = how.again(walkers, coarse, walks, SETTLING if settling else None)
         error = error + np.abs([a.speed - b.speed for a, b in zip(there, walks)])
+        if progress:
+            progress((1.0 + WALKING) / 2 if name == "steps" else 1.0)
     return [Walked(w, float(e)) for w, e in zip(walks, error)]
 
 
-def run(scene: WalkerScene, by: str | None = None) -> Walked:
+def run(scene: WalkerScene, by: str | None = None, progress: Callable | None = None) -> Walked:
     """One scene."""
     with named(scene.name):
-        return walked([scene], by)[0]
+        return walked([scene], by, progress=progress)[0]
 
 
 class Steps(Cost):

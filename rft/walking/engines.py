@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -47,11 +47,9 @@ class Walker:
 
 @dataclass(frozen=True)
 class Fineness:
-    """steps: of a cycle. elements: of a leg's outline; the belly has as many. rounding: m/s, below which drag falls off in
-    proportion to speed. duration: s of walking from rest, at most.
-
-    engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three dimensions.
-    """
+    """steps (-): of a cycle. elements (-): of a leg's outline; the belly has as many. rounding (m/s): below which drag
+    falls off in proportion to speed. duration (s): of walking from rest, at most. engine (-): planar or mujoco; if left out
+    the planar one, but for robots and ground of three dimensions."""
 
     steps: int = 32
     elements: int = 12
@@ -75,8 +73,15 @@ class Engine(Protocol):
         """ValueError for a walker that this engine does not take."""
         ...
 
-    def walk(self, walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
-        """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
+    def walk(
+        self,
+        walkers: Sequence[Walker],
+        numerics: Fineness,
+        settling: int | None = None,
+        progress: Callable | None = None,
+    ) -> list[Walk]:
+        """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle.
+        progress: told the fraction done."""
         ...
 
     def again(

@@ -12,39 +12,36 @@ from rft.vertical.stress import PlateStress
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A stress map that is common to all samples, at unit strength. What differs is (B, 1), or (1, 1) for all.
+    """A stress map that is common to all samples, at unit strength. What differs is (B,).
 
     strength: times the map. flux: lambda rho, kg/m^3, of the grains' inertia. rounding: m/s; the stress on an element of
     speed v is that of the map times v / sqrt(v^2 + rounding^2), as the law itself, like dry friction, jumps at rest. The
-    faces of a closed outline lead by degrees, too: with v_n / sqrt(v_n^2 + s^2 (v^2 + rounding^2)), s the sine of the map's
-    ``grazing``, so that what lies still on its belly feels no jump.
+    faces of a closed outline, (n,), lead by degrees, too: with v_n / sqrt(v_n^2 + s^2 (v^2 + rounding^2)), s the sine
+    of the map's ``grazing``, so that what lies still on its belly feels no jump. width: times the rounding, and its
+    root times the sine, on the way to a solution.
     """
 
     stress: PlateStress
     strength: np.ndarray
     flux: np.ndarray
     rounding: np.ndarray
-    closed: bool = False
-    grazing = 0.0  # here, not cut by the elements
+    closed: np.ndarray | bool = False
+    width: np.ndarray | float = 1.0
 
-    @property
-    def tension(self) -> str:
-        return self.stress.tension
-
-    def take(self, samples, closed: bool = False) -> Ground:
-        """Of these samples, as often as they are named; under an outline that is closed, or a sheet."""
-        some = lambda x: x if len(x) == 1 else x[samples]
-        return Ground(self.stress, some(self.strength), some(self.flux), some(self.rounding), closed)
+    def take(self, samples, closed: np.ndarray | bool = False) -> Ground:
+        """Of these samples, as often as they are named; under elements of outlines that are closed, or of sheets."""
+        width = self.width[samples] if np.ndim(self.width) else self.width
+        return Ground(self.stress, self.strength[samples], self.flux[samples], self.rounding[samples], closed, width)
 
     def on(self, parts) -> tuple[np.ndarray, np.ndarray]:
-        """Stress (x, z) in Pa on `rft.vertical.loads.Parts`, whose rows are this ground's samples."""
+        """Stress (x, z) in Pa on `rft.vertical.loads.Parts` (..., n), one for each of the samples."""
         t_x, t_z = self.stress.traction(parts.n, parts.v)
-        fast = np.sqrt(parts.speed**2 + self.rounding**2)
+        fast = np.sqrt(parts.speed * parts.speed + (self.rounding * self.width) ** 2)
         share = self.strength * parts.depth * parts.speed / fast
         across = parts.speed * (parts.n[0] * parts.v[0] + parts.n[1] * parts.v[1])
-        if self.closed:
-            scale = np.sqrt(across**2 + (np.sin(self.stress.grazing) * fast) ** 2)
-            share = share * across / np.where(scale == 0.0, 1.0, scale)
+        if np.any(self.closed):
+            scale = np.sqrt(across * across + (np.sin(self.stress.grazing) * np.sqrt(self.width) * fast) ** 2)
+            share = np.where(self.closed, share * across / np.where(scale == 0.0, 1.0, scale), share)
         if not self.flux.any():
             return share * t_x, share * t_z
         flux = np.where(parts.depth > 0.0, -self.flux * across * np.abs(across), 0.0)

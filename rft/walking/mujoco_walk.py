@@ -135,7 +135,7 @@ class Course:
         more = {name: named[name] for name in ("y", "roll", "yaw")} | {"states": path}
         return Walk(
             named["t"], pose, twist, named["work"], named["loss"], named["energy"], speed, status,
-            float(len(moves)), periodic, drift, limit, unsolved=body.unsolved, more=more,
+            float(len(moves)), periodic, drift, limit, body.unsolved, body.residual, body.defect / max(1, len(moves)), more,
         )  # fmt: skip
 
     def told(self, rows, moves, periodic: bool, drift: float, ended: str) -> tuple[float, float, str]:

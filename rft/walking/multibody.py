@@ -44,7 +44,8 @@ class Multibody:
     forces at the end of the last. work: J, of the actuators so far. loss: J, into the ground, dampers and constraints.
     energy(): J, of motion, height and springs; work = loss + change of energy to the order of the steps. wrenches: (B, 6), N
     and N m, of the grains on `Facets.bodies` about their origins at the end of the last step. unsolved: steps so far that
-    Newton's method left unsolved, however short.
+    Newton's method left unsolved, however short; defect: m/s, what these are off by, in all; residual: m/s, the most that any
+    step is off by.
     """
 
     def __init__(
@@ -61,7 +62,7 @@ class Multibody:
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
         self.work = self.loss = 0.0
-        self.unsolved = 0
+        self.unsolved, self.residual, self.defect, self._off = 0, 0.0, 0.0, 0.0
         self.wrenches = np.zeros((len(self.facets.bodies), 6))
         self.jacobians = np.zeros((len(self.facets.bodies), 6, model.nv))
         mujoco.mj_forward(model, self.data)
@@ -94,6 +95,7 @@ class Multibody:
         start = data.time, data.qpos.copy(), data.qvel.copy(), self.work, self.loss
         solved = self._step(*start[:3], h, of)
         if solved and np.isfinite(data.qpos).all():
+            self.residual = max(self.residual, self._off)
             return
         if halvings:
             data.time, data.qpos[:], data.qvel[:], self.work, self.loss = start
@@ -102,10 +104,11 @@ class Multibody:
             return
         finite = np.isfinite(data.qpos).all() and np.isfinite([self.work, self.loss]).all()
         require(bool(finite), f"the time step at {start[0]:.4g} s cannot be solved: make steps shorter")
-        self.unsolved += 1
+        self.unsolved, self.defect = self.unsolved + 1, self.defect + self._off
+        self.residual = max(self.residual, self._off)
 
     def _step(self, t, q, v, h, of) -> bool:
-        self._rest = None
+        self._rest, self._off = None, 0.0
         k = GAMMA * h
         first, good, *powers = self._stage(q, v, v, k, t + k, of)
         q_2, v_2 = self._moved(q, first, h - k), v + (h - k) / k * (first - v)
@@ -126,19 +129,20 @@ class Multibody:
         data.time = t
         if self.control:
             data.ctrl[:] = self.control(t, of)
-        found, good = self._newton(q, v, guess, k)
-        if not good:
+        found, off = self._newton(q, v, guess, k)
+        if not off <= SOLVED * self.grains.rounding:
             plain = self.grains
             for wider in WIDER:
                 self.grains = self.facets.rounded(plain, wider)
-                found, good = self._newton(q, v, found if np.isfinite(found).all() else guess, k)
+                found, off = self._newton(q, v, found if np.isfinite(found).all() else guess, k)
             self.grains = plain
+        self._off, good = max(self._off, off), off <= SOLVED * self.grains.rounding
         motors = float(data.qfrc_actuator @ data.qvel)
         others = data.qfrc_applied + data.qfrc_passive - data.qfrc_spring + data.qfrc_constraint
         return found, good, motors, -float(others @ data.qvel)
 
-    def _newton(self, q, v, guess, k) -> tuple[np.ndarray, bool]:
-        """The same from a guess; the data are those of what is returned."""
+    def _newton(self, q, v, guess, k) -> tuple[np.ndarray, float]:
+        """(velocities from a guess, m/s that they are off by); the data are those of what is returned."""
         limit, share, last = SOLVED * self.grains.rounding, 1.0, True
         here = guess
         residual, slope = self._residual(q, v, here, k)
@@ -158,7 +162,7 @@ class Multibody:
                 share, last = share / 2, False
         if not last:
             self._residual(q, v, here, k)
-        return here, bool(size <= limit)
+        return here, float(size)
 
     def _residual(self, q, v, here, k) -> tuple[np.ndarray, np.ndarray]:
         """(force that lacks (nv,), its slopes (nv, nv)) if the velocities at the end of a stage are ``here``."""

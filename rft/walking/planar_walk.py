@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +11,10 @@ from rft.media.base import require
 from rft.vertical.stress import PlateStress
 from rft.walking.engines import Fineness, Walker
 from rft.walking.ground import Ground
+from rft.walking.limit import Found, Limit, limit_cycle
 from rft.walking.planar import Robots, State
 from rft.walking.robot import Rhex, Roller
-from rft.walking.stride import FEW_STRIDES, MOST_STRIDES, STUCK, Strides, Walk, from_rest, limit_cycle
+from rft.walking.stride import STUCK, Strides, Walk, from_rest
 
 
 def refuse(walker: Walker) -> None:
@@ -24,14 +24,19 @@ def refuse(walker: Walker) -> None:
     require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot: use --engine mujoco")
 
 
-def walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None) -> list[Walk]:
-    """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle."""
+def walk(
+    walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None, progress: Callable | None = None
+) -> list[Walk]:
+    """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle. progress:
+    told the fraction done."""
     found: list = [None] * len(walkers)
     for walker in walkers:
         refuse(walker)
-    for members in _alike(walkers, numerics):
-        for k, one in zip(members, _walk([walkers[k] for k in members], numerics, settling)):
-            found[k] = one
+    groups = _alike(walkers, numerics)
+    for k, members in enumerate(groups):
+        told = (lambda done, k=k: progress((k + done) / len(groups))) if progress else (lambda done: None)
+        for j, one in zip(members, _walk([walkers[j] for j in members], numerics, settling, told)):
+            found[j] = one
     return found
 
 
@@ -47,76 +52,59 @@ def _alike(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
 
 
 def _strides(walkers: Sequence[Walker], numerics: Fineness) -> Strides:
-    column = lambda values: np.array(values, float)[:, None]
-    strength, flux = column([w.strength for w in walkers]), column([w.flux for w in walkers])
+    strength, flux = (np.array([getattr(w, name) for w in walkers]) for name in ("strength", "flux"))
     ground = Ground(replace(walkers[0].stress, zeta=1.0), strength, flux, np.full_like(flux, numerics.rounding))
     robots, gaits = [w.robot for w in walkers], [w.gait for w in walkers]
     return Strides(Robots(robots, gaits, ground, numerics.elements), robots, gaits, numerics.steps)
 
 
-def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None) -> list[Walk]:
+def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None, told: Callable) -> list[Walk]:
     strides = _strides(walkers, numerics)
     durations = settling / strides.frequency if settling else np.full(len(walkers), numerics.duration)
-    state, told, done, how = from_rest(strides, durations)
-    paths = [_told(blocks, how[k] == "periodic", durations[k]) for k, blocks in enumerate(told)]
-    mean = np.array([rows[-1, 1] / rows[-1, 0] for rows in paths])
-    found = Speeds(
-        mean, how, np.zeros(len(walkers)), np.zeros(len(walkers), bool), done * strides.period, [None] * len(walkers)
-    )
-    here = np.flatnonzero(np.isin(how, ("", "periodic")))
-    if here.size:
-        found = found.put(here, _limits([walkers[k] for k in here], numerics, state.take(here)))
+    state, blocks, done, how, fold = from_rest(strides, durations, told)
+    on = np.flatnonzero(np.isin(how, ("", "periodic")))
+    limits = [Limit(state.take([k]), fold[k]) for k in on]
+    at_limit = dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits))) if on.size else {}
     walks = []
-    for k, rows in enumerate(paths):
-        states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], 0.0 * rows[:, 8])
-        energy = strides.robots.take([k]).energy(states)
-        unsolved = state.unsolved[k] if found.limit[k] is None else found.limit[k].unsolved[0]
-        walks.append(Walk(rows[:, 0], *states[:4], energy, *found.of(k), int(unsolved)))
+    for k in range(len(walkers)):
+        rows = _rows(blocks[k], strides.cycle if how[k] == "periodic" else 0, durations[k])
+        states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *np.zeros((3, len(rows))))
+        energy, speed = strides.robots.energy(states, k), rows[-1, 1] / rows[-1, 0]
+        own = float(speed), str(how[k]), 0.0, False, 0.0, None, int(state.unsolved[k]), float(state.residual[k])
+        one = Walk(rows[:, 0], *states[:4], energy, *own)
+        one = one._replace(**at_limit[k]) if k in at_limit else one
+        walks.append(one._replace(cycles=one.cycles + done[k] * strides.period))
     return walks
 
 
-class Speeds(NamedTuple):
-    """Of (B,) robots, as in `Walk`."""
-
-    speed: np.ndarray
-    status: np.ndarray
-    drift: np.ndarray
-    periodic: np.ndarray
-    cycles: np.ndarray
-    limit: list
-
-    def of(self, k: int):
-        """speed, status, cycles, periodic, drift, limit of one, as they stand in `Walk`."""
-        numbers = float(self.cycles[k]), bool(self.periodic[k]), float(self.drift[k])
-        return float(self.speed[k]), str(self.status[k]), *numbers, self.limit[k]
-
-    def put(self, some, other: Speeds) -> Speeds:
-        """With these as in the other, and the cycles of both."""
-        new = Speeds(*(x.copy() for x in self))
-        for x, y in zip(new[:4], other[:4]):
-            x[some] = y
-        new.cycles[some] += other.cycles
-        for k, limit in zip(some, other.limit):
-            new.limit[k] = limit
-        return new
-
-
-def _limits(walkers: Sequence[Walker], numerics: Fineness, state: State, most: int = MOST_STRIDES) -> Speeds:
-    """At the limit cycle, from some state of each."""
+def _at_limits(walkers: Sequence[Walker], numerics: Fineness, limits: list[Limit]) -> list[dict]:
+    """What a `Walk` has of its limit cycle, from near that."""
     strides = _strides(walkers, numerics)
-    limit, progress, change, periodic, count, ends = limit_cycle(strides, state, most)
-    per = strides.frequency / strides.period
-    stuck = np.abs(progress) < STUCK * strides.period * strides.reach
-    status = np.where(ends != "", ends, np.where(stuck, "stuck", "walking"))
-    limits = [limit.take([k]) for k in range(len(walkers))]
-    return Speeds(progress * per, status, change * per, periodic, count * strides.period, limits)
+    found = limit_cycle(strides, limits)
+    return [_speed(strides, found, k) for k in range(len(limits))]
 
 
-def _told(blocks, periodic: bool, duration: float) -> np.ndarray:
-    """Rows (T, 9): t, pose, twist, work and loss; the last stride, where it repeats itself, till the duration is over."""
+def _speed(strides: Strides, found: Found, k: int) -> dict:
+    per, limit = strides.frequency[k] / strides.period, found.limits[k]
+    stuck = abs(found.progress[k]) < STUCK * strides.period * strides.reach[k]
+    return {
+        "speed": float(found.progress[k] * per),
+        "status": str(found.ends[k]) or ("stuck" if stuck else "walking"),
+        "cycles": float(found.strides[k] * strides.period),
+        "periodic": bool(found.periodic[k]),
+        "drift": float(found.drift[k] * per),
+        "limit": limit,
+        "unsolved": int(limit.state.unsolved[0]),
+        "residual": float(limit.state.residual[0]),
+        "off": float(found.off[k] * per),
+    }
+
+
+def _rows(blocks, cycle: int, duration: float) -> np.ndarray:
+    """Rows (T, 9): t, pose, twist, work and loss; so many last strides, if any, again and again till the duration is over."""
     rows = np.concatenate(blocks)
-    if periodic:
-        last, before = blocks[-1], blocks[-2][-1]
+    if cycle:
+        last, before = np.concatenate(blocks[-cycle:]), blocks[-1 - cycle][-1]
         gain = np.zeros(9)
         gain[[0, 1, 7, 8]] = (last[-1] - before)[[0, 1, 7, 8]]
         more = int(np.ceil((duration - rows[-1, 0]) / gain[0]))
@@ -135,8 +123,6 @@ def again(
     rest = [k for k, w in enumerate(walks) if w.limit is not None]
     for members in _alike([walkers[k] for k in rest], numerics):
         here = [rest[m] for m in members]
-        state = State(*(np.concatenate(x) for x in zip(*(walks[k].limit for k in here))))
-        speeds = _limits([walkers[k] for k in here], numerics, state, FEW_STRIDES)
-        for j, k in enumerate(here):
-            found[k] = Walk(*walks[k][:6], *speeds.of(j), int(speeds.limit[j].unsolved[0]))
+        for k, one in zip(here, _at_limits([walkers[k] for k in here], numerics, [walks[k].limit for k in here])):
+            found[k] = walks[k]._replace(**one)
     return found

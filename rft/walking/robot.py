@@ -24,10 +24,14 @@ FREQUENCIES = (1e-3, 200.0)  # Hz
 
 @dataclass(frozen=True)
 class Tripod:
-    """The clock of a leg (RHex): for a share ``duty`` of the cycle it turns by ``sweep``, in the middle of which its angle is
-    ``middle``, for the rest by what a whole turn lacks. 0 is straight down from the body; as it stands, a constant rate.
+    """The clock of a leg (RHex): for a share ``duty`` of the cycle it turns by ``sweep``, in the middle of which its
+    angle is ``middle``, for the rest by what a whole turn lacks. 0 is straight down from the body; as it stands, a
+    constant rate.
 
-    frequency: turns a second, Hz. sweep, middle: radians. The legs at a hip are half a cycle apart.
+    frequency (Hz): turns a second. duty (-): share of the cycle that a leg stands, 0.01 to 0.99. sweep (rad): by which
+    it turns meanwhile. middle (rad): its angle in the middle of that.
+
+    The legs at a hip are half a cycle apart.
     """
 
     frequency: float
@@ -61,26 +65,39 @@ class Tripod:
 
     def angle(self, phase, of) -> np.ndarray:
         """Of a leg at ``phase`` (cycles), by the rate that holds at the phase ``of``, on whose side of a kink it is."""
-        turns = np.floor(np.asarray(of) + 0.5)
-        place, there = np.asarray(phase) - turns, np.asarray(of) - turns  # of the second, -0.5 to 0.5
-        half = self.duty / 2
-        slow = self.sweep / self.duty * place
-        fast = np.sign(there) * math.pi + self._fast * (place - np.sign(there) * 0.5)
-        return self.middle + 2 * math.pi * turns + np.where(np.abs(there) <= half, slow, fast)
+        return leg_angle(phase, of, self.duty, self.sweep, self.middle)
 
     def rate(self, of) -> np.ndarray:
         """rad a cycle, at the phase ``of``."""
-        there = np.asarray(of) - np.floor(np.asarray(of) + 0.5)
-        return np.where(np.abs(there) <= self.duty / 2, self.sweep / self.duty, self._fast)
+        return leg_rate(of, self.duty, self.sweep)
 
-    @property
-    def _fast(self) -> float:
-        return (2 * math.pi - self.sweep) / (1.0 - self.duty)
+
+def leg_angle(phase, of, duty, sweep, middle) -> np.ndarray:
+    """`Tripod.angle` of many clocks."""
+    turns = np.floor(np.asarray(of) + 0.5)
+    place, there = np.asarray(phase) - turns, np.asarray(of) - turns  # of the second, -0.5 to 0.5
+    slow = sweep / duty * place
+    fast = np.sign(there) * math.pi + _fast(duty, sweep) * (place - np.sign(there) * 0.5)
+    return middle + 2 * math.pi * turns + np.where(np.abs(there) <= duty / 2, slow, fast)
+
+
+def leg_rate(of, duty, sweep) -> np.ndarray:
+    """`Tripod.rate` of many clocks."""
+    there = np.asarray(of) - np.floor(np.asarray(of) + 0.5)
+    return np.where(np.abs(there) <= duty / 2, sweep / duty, _fast(duty, sweep))
+
+
+def _fast(duty, sweep):
+    """rad a cycle, while a leg recovers."""
+    return (2 * math.pi - sweep) / (1.0 - duty)
 
 
 class Robot:
-    """Base of robots. legs: the outline they share turns about the origin of its frame, or a point ``axle`` above that.
-    mass: kg. inertia: kg m^2, infinite for one that keeps its pitch. hips: x of each from the centre of mass, m."""
+    """Base of robots. legs: the outline they share turns about its axle at each of the hips. inertia: kg m^2,
+    infinite for one that keeps its pitch.
+
+    mass (kg): of all that moves. axle (m): about which legs turn, above the origin of their outline.
+    """
 
     mass: float
     legs: Shape
@@ -111,8 +128,8 @@ class Robot:
 class Rhex(Robot):
     """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
 
-    length, height, width: of the box about the centre of mass, m. hip_height: of the hips above it. inertia: that of the box
-    where none is given.
+    length, height, width (m): of the box about the centre of mass. hips (m): x of each from there. hip_height (m): of
+    the hips above that. inertia (kg m^2): of pitching; that of the box where none is given.
 
     aside (m): of the legs at each hip from the middle plane, one on either side, for the engine of three dimensions; where
     none are given, beside the box, and at every other one of an odd number of hips so much farther out that a tripod whose
@@ -172,8 +189,11 @@ class Rhex(Robot):
 
 @dataclass(frozen=True)
 class Roller(Robot):
-    """A wheel, or whatever turns, on an axle that is kept level: a mass that moves forwards and up and down, driven by its own
-    weight. mass: of all that the wheel carries."""
+    """A wheel, or whatever turns, on an axle that is kept level: a mass that moves forwards and up and down, driven by
+    its own weight.
+
+    mass (kg): of all that the wheel carries, and its own.
+    """
 
     mass: float
     legs: Shape
