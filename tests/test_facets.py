@@ -11,7 +11,7 @@ from rft.spatial import Cylinder, Screw, Spatial, Sphere, below, shapes, wrench
 from rft.spatial.extruded import Extruded
 from rft.spatial.submerged import submerged
 from rft.vertical import CLeg, Polygon, RoundRod, StressMap
-from rft.vertical.loads import _loads
+from rft.walking.elements import Elements
 from rft.walking.facets import Facets, Grains, Poses, Surface
 from rft.walking.ground import Ground, Outlines
 
@@ -94,10 +94,11 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
     )
     facets = Facets([Surface.of_outline(0, outline)])
     found = facets.loads(Grains(Extruded(SAND), 1.0, 2000.0, 1e-7), at)[0][0]
-    ground = Ground(SAND, *np.array([1.0, 2000.0, 1e-7])[:, None, None], outline.closed)
-    force, moment = _loads(ground, Outlines.of([outline]), np.array([[place[0], place[2], angle]]), motion[None])
-    np.testing.assert_allclose(found[[0, 2]], force[0], rtol=3e-3, atol=2e-4 * np.abs(force).max())
-    assert found[4] == pytest.approx(moment[0], abs=6e-5 * np.abs(force).max())
+    ground = Ground(SAND, *np.array([1.0, 2000.0, 1e-7])[:, None])
+    flat, pose = Elements(Outlines.of([outline]), None, np.zeros((2, 1, 1)), SAND.tension), [place[0], place[2], angle]
+    *force, moment = np.ravel(flat.sums(ground, [0], np.array([[pose]]), motion[None, None], *np.zeros((2, 1, 1)))[:3])
+    np.testing.assert_allclose(found[[0, 2]], force, rtol=3e-3, atol=2e-4 * np.abs(force).max())
+    assert found[4] == pytest.approx(moment, abs=6e-5 * np.abs(force).max())
     np.testing.assert_allclose(found[[1, 3, 5]], 0.0, atol=1e-9)
 
 

@@ -161,7 +161,7 @@ class _March:
             self.step[k] = len(self.length)
 
 
-def solved(slopes, residual):
+def solved(slopes, residual) -> np.ndarray:
     """(B, 3); none where there is no solution."""
     try:
         return np.linalg.solve(slopes, residual[..., None])[..., 0]
