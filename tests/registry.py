@@ -136,6 +136,7 @@ SOLIDS = {
     "sphere": Sphere(radius=0.02),
     "cylinder": Cylinder(radius=0.01, length=0.05),
     "screw": Screw(radius=0.03, core=0.015, pitch=0.06, length=0.12),
+    "screw, blade": Screw(radius=0.03, core=0.018, pitch=0.05, length=0.11, thickness=0.006, nose=0.02, handed="left"),
     "leg": Leg(radius=0.03, width=0.02, thickness=0.004, relative_curvature=-0.6),
 }
 

@@ -26,7 +26,7 @@ from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2, spatial
 from rft.vertical import SHAPES, Drag, Path, Penetrate, Rotate
 from rft.vertical import effects as ground
-from rft.walking import Fineness, Rhex, Roller, Tripod, Walker
+from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
     "None": None, "text": "x", "digits": "12", "bytes": b"1", "empty": [], "list": [1.0, 2.0, 3.0, 4.0, 5.0], "deep": [[1.0]],
@@ -36,6 +36,7 @@ WRONG = {
     "date": np.datetime64("2020"),
 }  # fmt: skip
 RHEX = Rhex(0.2, 0.15, 0.03, 0.06, OUTLINES["c-leg"], (-0.05, 0.05))
+SCREWS = Screws(0.2, 0.15, 0.12, 0.03, spatial.Screw(0.03, 0.01, 0.02, 0.1, 0.003), 0.1)
 PARTS = {
     "Granular": Granular(1.8, 0.24), "Viscous": Viscous(),
     "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)), "Chain": Chain(), "Backbone": rft.Backbone(8),
@@ -57,7 +58,7 @@ PARTS = {
     "Leg": spatial.Leg(0.04, 0.02, 0.003), "SpatialDrag": spatial.Drag(0.1), "SpatialPenetrate": spatial.Penetrate(0.1),
     "SpatialRotate": spatial.Rotate(0.1), "SpatialPath": spatial.Path(*[(0, 1, 2)] * 4),
     "MeshScene": MeshScene(spatial.Spatial(3e5), spatial.Sphere(0.02), spatial.Drag(0.1), triangles=20),
-    "Tripod": Tripod(2.0), "Rhex": RHEX, "Roller": Roller(1.0, OUTLINES["wheel"]), "Fineness": Fineness(),
+    "Tripod": Tripod(2.0), "Rhex": RHEX, "Roller": Roller(1.0, OUTLINES["wheel"]), "Screws": SCREWS, "Fineness": Fineness(),
     "Walker": Walker(RHEX, Tripod(2.0), STRESSES["generic"]),
     "WalkerScene": WalkerScene(STRESSES["generic"], RHEX, Tripod(2.0)),
 }  # fmt: skip

@@ -18,7 +18,8 @@ from geomech.study.walking import STATUSES
 UNITS = {  # of parameters, by the last part of their names; the others have none
     "mass": "kg", "inertia": "kg m$^2$", "length": "m", "width": "m", "height": "m", "hip_height": "m", "radius": "m",
     "lug_height": "m", "lug_width": "m", "axle": "m", "frequency": "Hz", "sweep": "rad", "middle": "rad", "air_speed": "m/s",
-    "fluidisation": "m/s", "grazing": "rad", "duration": "s", "rounding": "m/s",
+    "fluidisation": "m/s", "grazing": "rad", "duration": "s", "rounding": "m/s", "core": "m", "pitch": "m", "thickness": "m",
+    "nose": "m", "track": "m", "drop": "m", "xi_n": "N/m$^3$", "density": "kg/m$^3$",
 }  # fmt: skip
 
 

@@ -12,11 +12,11 @@ from geomech.scene import solid
 from geomech.scene.intruder import _intruder, read_medium
 from geomech.scene.intruding import located
 from geomech.scene.read import _build, _kind
-from rft.spatial import Spatial
-from rft.vertical import SHAPES, PlateStress, StressMap
+from rft.spatial import Screw, Solid, Spatial
+from rft.vertical import SHAPES, PlateStress, Shape, StressMap
 from rft.vertical.effects import KINDS as EFFECTS
 from rft.vertical.effects import GroundEffect
-from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Tripod, Walker
+from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
 TABLES = ("medium", "robot", "gait", "numerics", "effects")
 KINDS = {"aeration", "grain-inertia"}  # of effects
@@ -52,7 +52,7 @@ class WalkerScene:
     @property
     def engine(self) -> str:
         """What computes it, where nothing else is asked for."""
-        spatial = isinstance(self.robot, Mjcf) or isinstance(self.medium, Spatial)
+        spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial)
         return self.numerics.engine or ("mujoco" if spatial else "planar")
 
     @property
@@ -67,8 +67,8 @@ class WalkerScene:
         if isinstance(self.robot, Mjcf):
             robot = _plain(self.robot)
         else:
-            robot = kind(self.robot, ROBOTS) | _plain(self.robot)
-            robot["legs"] = kind(self.robot.legs, SHAPES) | _plain(self.robot.legs)
+            robot, part = kind(self.robot, ROBOTS) | _plain(self.robot), getattr(self.robot, self.robot.part)
+            robot[self.robot.part] = kind(part, SHAPES | solid.KINDS) | _plain(part)
         tables = {
             "medium": _plain(self.medium),
             "robot": robot,
@@ -99,7 +99,7 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerS
     at = lambda table: located(table, Path(name).absolute().parent, files)
     with named(name):
         return WalkerScene(
-            medium=_medium(f"{name}: [medium]", at(tables["medium"])),
+            medium=_medium(f"{name}: [medium]", at(tables["medium"]), tables["robot"].get("kind")),
             robot=_robot(name, tables["robot"], at),
             gait=_build(f"{name}: [gait]", _gait(name, tables["gait"]), Tripod),
             effects=tuple(_effects(name, tables.get("effects", []))),
@@ -110,11 +110,11 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerS
         )
 
 
-def _medium(place: str, table: dict) -> PlateStress | Spatial:
+def _medium(place: str, table: dict, robot) -> PlateStress | Spatial:
     """A stress map, as of outlines, or the law of three dimensions, as of meshes: where law = "3d", or what tells its
-    strength is of that alone."""
+    strength is of that alone, or, if no law is named, for a robot on screws."""
     law = choose(f"{place} law", table.pop("law"), LAWS) if "law" in table else None
-    if law == "3d" or (law is None and {*table} & OF_THREE):
+    if law == "3d" or (law is None and ({*table} & OF_THREE or robot == "screws")):
         return solid.read_medium(place, table, read_medium)[0]
     return read_medium(place, table)
 
@@ -125,18 +125,27 @@ def _robot(name: str, table: Mapping, at) -> Robot:
         return _machine(place, rest, at)
     kind = ROBOTS[_kind(place, rest, "kind", ROBOTS)]
     del rest["kind"]
-    if not rest.get("legs") or not isinstance(rest["legs"], Mapping):
-        raise SceneError(f"{place} is a robot without legs: add the table [robot.legs], {CURE}")
+    part = kind.part
+    if not rest.get(part) or not isinstance(rest[part], Mapping):
+        raise SceneError(f"{place} is a robot without {kind.parts}: add the table [robot.{part}], {CURE}")
     names = [f.name for f in dataclasses.fields(kind)]
     for key in rest:
         choose(f"{place} key", key, names)
-    _kind(f"{name}: [robot.legs]", dict(rest["legs"]), "kind", SHAPES)
-    legs = _intruder(f"{name}: [robot.legs]", at(rest.pop("legs")))
-    needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING} - {"legs"}
+    made = _part(f"{name}: [robot.{part}]", at(rest.pop(part)), kind)
+    needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING} - {part}
     if lacking := sorted(needed - {*rest}):
         raise SceneError(f"{place} has no {', '.join(lacking)}: add it, {CURE}")
     with named(place):
-        return kind(legs=legs, **{k: tuple(v) if isinstance(v, list) else v for k, v in rest.items()})
+        return kind(**{part: made}, **{k: tuple(v) if isinstance(v, list) else v for k, v in rest.items()})
+
+
+def _part(place: str, table: dict, robot: type[Robot]) -> Shape | Solid:
+    """What a robot moves by: an outline, or a screw, which need not say its kind."""
+    if robot is not Screws:
+        _kind(place, dict(table), "kind", SHAPES)
+        return _intruder(place, table)
+    choose(f"{place} kind", table.pop("kind", "screw"), ("screw",))
+    return _build(place, table, Screw)
 
 
 def _machine(place: str, table: dict, at) -> Mjcf:

@@ -7,9 +7,12 @@ from typing import Any
 from geomech.scene import intruder_keys
 from geomech.scene.intruder_keys import Part
 from geomech.scene.key import Key, first, keys_of, option, table
-from geomech.scene.walker import KINDS, LAWS, ROBOTS, SHAPES, Fineness, Mjcf, Tripod
+from geomech.scene.walker import KINDS, LAWS, ROBOTS, SHAPES, Fineness, Mjcf, Screw, Tripod
 
-LEGS = "The table [robot.legs] is an outline, as [intruder] is; 'geomech keys intruder' has its keys."
+PARTS = {
+    "legs": "The table [robot.legs] is an outline, as [intruder] is; 'geomech keys intruder' has its keys.",
+    "screw": "The table [robot.screw] is a screw, as [intruder] is; 'geomech keys intruder' has its keys.",
+}
 LAW = "stress maps of the vertical plane, or the law of three dimensions, for the engine mujoco; if left out what the keys tell"
 NEEDED = ["medium", "robot", "gait"]
 
@@ -29,8 +32,8 @@ def sections() -> dict[str, list[Part]]:
 
 
 def _robot(kind: str, robot: type) -> Part:
-    keys = [k for k in keys_of(robot) if k.name != "legs"]
-    return Part(f'[robot] kind = "{kind}"', f"{first(robot)} {LEGS}", keys, {"kind": kind})
+    keys = [k for k in keys_of(robot) if k.name != robot.part]
+    return Part(f'[robot] kind = "{kind}"', f"{first(robot)} {PARTS[robot.part]}", keys, {"kind": kind})
 
 
 def schemas() -> dict[str, Any]:
@@ -40,11 +43,14 @@ def schemas() -> dict[str, Any]:
     media = [_of_law(theirs["medium"], LAWS[0]), _of_law(spatial, LAWS[1])]
     effects = [x for x in theirs["effects"]["items"]["oneOf"] if x["properties"]["kind"]["const"] in KINDS]
     legs = {"oneOf": [x for x in theirs["intruder"]["oneOf"] if x["properties"]["kind"]["const"] in SHAPES]}
+    screw = option("", "", "", keys_of(Screw))
+    screw["properties"]["kind"] = {"const": "screw"}
+    parts = {"legs": legs, "screw": screw}
     *made, of_file = own["robot"]
     robots = [option(part.about, "kind", part.named["kind"], part.keys) for part in made]
-    for robot in robots:
-        robot["properties"]["legs"] = legs
-        robot["required"].append("legs")
+    for robot, kind in zip(robots, ROBOTS.values()):
+        robot["properties"][kind.part] = parts[kind.part]
+        robot["required"].append(kind.part)
     robots.append(option(of_file.about, "", "", of_file.keys))
     robots[-1]["properties"]["kind"] = {"const": "mjcf"}
     (gait,), (numerics,) = own["gait"], own["numerics"]

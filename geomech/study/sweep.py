@@ -37,9 +37,10 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
     """The tables with one parameter set: "section.key", "effects.KIND.key" for an effect that is on, or
     "effects.key" for all effects that give that key."""
     parts = parameter.split(".")
-    if len(parts) == 3 and parts[:2] == ["robot", "legs"]:  # a table inside a table
-        inner = changed({"robot": tables["robot"]["legs"]}, f"robot.{parts[2]}", value)
-        return {**tables, "robot": {**tables["robot"], "legs": inner["robot"]}}
+    within = tables.get("robot", {}).get(parts[1]) if len(parts) == 3 and parts[0] == "robot" else None
+    if isinstance(within, dict):  # a table inside a table
+        inner = changed({"robot": within}, f"robot.{parts[2]}", value)
+        return {**tables, "robot": {**tables["robot"], parts[1]: inner["robot"]}}
     if len(parts) == 2 and parts[0] in ("medium", "body", "gait", "numerics", "system", "physical", "robot"):
         old = tables.get(parts[0], {}).get(parts[1])
         tables = {**tables, parts[0]: {k: v for k, v in tables.get(parts[0], {}).items() if k != _twin(parts[1])}}

@@ -171,6 +171,12 @@ def quartered(mesh: Mesh) -> Mesh:
     return Mesh(*halved(mesh.vertices, mesh.faces), closed=mesh.closed, bends=bends)
 
 
+def mirrored(mesh: Mesh) -> Mesh:
+    """The mesh as a mirror in the plane of x and z shows it."""
+    bends = None if mesh.bends is None else mesh.bends[:, ::-1] * [1.0, -1.0, 1.0]
+    return Mesh(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], closed=mesh.closed, bends=bends)
+
+
 def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     """The mesh of an STL, OBJ or PLY file, its lengths times ``scale`` (0.001 for millimetres). Needs trimesh."""
     kind = str(path).rpartition(".")[2].lower()

@@ -46,10 +46,11 @@ def cylinder(radius: float, length: float, around: int = 64, along: int = 32, ac
 
 
 def screw(
-    radius: float, core: float, pitch: float, length: float, around: int = 64, along: int = 128, across: int = 6
-) -> Mesh:
+    radius: float, core: float, pitch: float, length: float, around: int = 64, along: int = 128, across: int = 6,
+    nose: float = 0.0,
+) -> Mesh:  # fmt: skip
     """A right-handed Archimedean screw along x: a core with one thread of a smooth profile, as high as ``radius`` - ``core``
-    and ``pitch`` from turn to turn."""
+    and ``pitch`` from turn to turn, and with ends that are points ``nose`` beyond it."""
     _sizes(radius=radius, core=core, pitch=pitch, length=length)
     require(core < radius, f"core must be less than the radius, got {core:g} and {radius:g}")
     turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
@@ -58,7 +59,7 @@ def screw(
         height = np.exp(6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0))  # of the profile; its sharpness is assumed
         r = core + (radius - core) * height
         rings.append(np.stack([np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)], -1))
-    return _tube(np.array(rings), _count("across", across, 1))
+    return _tube(np.array(rings), _count("across", across, 1), nose)
 
 
 def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mesh:
@@ -121,23 +122,35 @@ def _rectangle(a: float, b: float, m: int, n: int) -> np.ndarray:
     return np.concatenate([np.stack(side, -1) for side in sides]) * [a, b]
 
 
-def _tube(rings: np.ndarray, across: int) -> Mesh:
-    """A closed mesh through rings (M, K, 3) of points, with ends of ``across`` smaller rings and a point in the middle."""
+def _tube(rings: np.ndarray, across: int, nose: float = 0.0) -> Mesh:
+    """A closed mesh through rings (M, K, 3) of points, with ends of ``across`` smaller rings and a point in the middle, which
+    is ``nose`` further out along x."""
     share = np.linspace(0.0, 1.0, across + 1)[1:-1][:, None, None]
     first, last = rings[0], rings[-1]
-    near, far = first.mean(0), last.mean(0)
+    near, far = first.mean(0) - [nose, 0.0, 0.0], last.mean(0) + [nose, 0.0, 0.0]
     rings = np.concatenate([near + share * (first - near), rings, far + share[::-1] * (last - far)])
     m, k, _ = rings.shape
     i = np.arange(m * k).reshape(m, k)
-    a, b, c, d = (x.ravel() for x in (i[:-1], np.roll(i, -1, 1)[:-1], np.roll(i, -1, 1)[1:], i[1:]))
     tip, end, ahead = m * k, m * k + 1, np.roll(np.arange(k), -1)
     faces = [
-        np.stack([a, b, c], -1), np.stack([a, c, d], -1),
+        between(i),
         np.stack([np.full(k, tip), ahead, np.arange(k)], -1),
         np.stack([np.full(k, end), i[-1], i[-1][ahead]], -1),
     ]  # fmt: skip
-    faces = np.concatenate(faces)
-    vertices = np.concatenate([rings.reshape(-1, 3), [near, far]])
+    return outward(np.concatenate([rings.reshape(-1, 3), [near, far]]), np.concatenate(faces))
+
+
+def between(rows: np.ndarray, closed: bool = True) -> np.ndarray:
+    """(F, 3): two triangles for each quadrilateral between one row of vertices (M, K) and the next; closed: whether a row's
+    last vertex is followed by its first."""
+    ahead = np.roll(rows, -1, 1) if closed else rows[:, 1:]
+    rows = rows if closed else rows[:, :-1]
+    a, b, c, d = (x.ravel() for x in (rows[:-1], ahead[:-1], ahead[1:], rows[1:]))
+    return np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+
+
+def outward(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """The closed mesh of triangles that agree on which side is out, turned round if that is the inside."""
     corner = vertices[faces]
     inside_out = (corner[:, 0] * np.cross(corner[:, 1], corner[:, 2])).sum() < 0
     return Mesh(vertices, faces[:, ::-1] if inside_out else faces)

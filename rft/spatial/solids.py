@@ -10,11 +10,14 @@ import numpy as np
 
 from rft.media.base import in_range, is_number, require, shown
 from rft.spatial import shapes
-from rft.spatial.mesh import MOST, Mesh, quartered, read
+from rft.spatial.blade import blade
+from rft.spatial.mesh import MOST, Mesh, mirrored, quartered, read
 from rft.spatial.smooth import smooth
 from rft.vertical.outline import check_metres
 
 FINEST = 327_680  # triangles that a body is compared to
+HANDS = ("right", "left")
+MOST_TURNS = 100  # of a thread: more need more triangles than there are
 
 
 class Solid:
@@ -28,10 +31,11 @@ class Solid:
     def mesh(self, triangles: int = 5000) -> Mesh:
         """Of about so many triangles, and at least those that the body takes."""
         in_range("triangles", triangles, 1, MOST, whole=True)
-        return smooth(self.made(int(triangles)))
+        made = self.made(int(triangles))
+        return smooth(made) if made.bends is None else made
 
     def made(self, triangles: int) -> Mesh:
-        """Of flat triangles."""
+        """Of flat triangles, or with the normals of its surface."""
         raise NotImplementedError
 
     @property
@@ -75,25 +79,63 @@ class Cylinder(Solid):
 
 @dataclass(frozen=True)
 class Screw(Solid):
-    """A right-handed Archimedean screw along x, about the origin, a core with one thread of a smooth profile.
+    """An Archimedean screw along x, about the origin: a core with one thread, which is a blade or has a smooth profile.
 
     radius (m): of the thread. core (m): radius of the core, less than that. pitch (m): along x, of a turn of the thread.
-    length (m): along x.
+    length (m): along x, of core and thread. thickness (m): of the blade, along x, less than the pitch; 0 for a thread of a
+    smooth profile. nose (m): length of a cone at either end of the core, beyond the thread; 0 for flat ends. handed (-):
+    "right", which drives to +x as it turns about +x by the right hand, or "left", its mirror image.
     """
 
     radius: float
     core: float
     pitch: float
     length: float
+    thickness: float = 0.0
+    nose: float = 0.0
+    handed: str = "right"
 
     def __post_init__(self):
-        super().__post_init__()
+        check_metres(self, "radius", "core", "pitch", "length")
+        check_metres(self, "thickness", "nose", low=0.0)
         require(self.core < self.radius, f"core must be less than the radius, got {self.core:g} and {self.radius:g}")
+        told = f"{self.thickness:g} and {self.pitch:g}"
+        told = f"thickness must be 0, or from a thousandth of the pitch to less than that, got {told}"
+        require(self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch, told)
+        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {shown(self.handed)}")
+        require(self.turns <= MOST_TURNS, f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}: length / pitch")
+
+    @property
+    def turns(self) -> float:
+        """Of the thread, from end to end."""
+        return self.length / self.pitch
+
+    @property
+    def sense(self) -> float:
+        """1 or -1: the sign of the rate about x at which it drives to +x."""
+        return 1.0 if self.handed == "right" else -1.0
+
+    @property
+    def mirrored(self) -> Screw:
+        """The screw of the other hand."""
+        return dataclasses.replace(self, handed="left" if self.handed == "right" else "right")
 
     def made(self, triangles: int) -> Mesh:
+        right = self._bladed(triangles) if self.thickness else self._smooth(triangles)
+        return right if self.handed == "right" else mirrored(right)
+
+    def _smooth(self, triangles: int) -> Mesh:
         size = math.sqrt(4 * math.pi * self.core * (self.length + 2 * self.core) / triangles)
-        counts = _divided(size, (2 * math.pi * self.core, 12), (self.length, 4), (self.core, 1))
-        return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts)
+        counts = _divided(size, (2 * math.pi * self.core, 12), (self.length, 4), (math.hypot(self.core, self.nose), 1))
+        return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts, self.nose)
+
+    def _bladed(self, triangles: int) -> Mesh:
+        high, slope = self.radius - self.core, 2 * math.pi * self.radius / self.pitch
+        edge, slant = self.length * math.hypot(1.0, slope), math.hypot(self.core, self.nose)
+        sides = edge * (2 * math.pi * self.core + 2 * high + self.thickness) + 2 * math.pi * self.core * slant
+        lengths = (2 * math.pi * self.core, 8), (edge, 8), (slant, 1), (high, 1), (self.thickness * slope, 1)
+        counts = _divided(math.sqrt(2 * sides / triangles), *lengths)
+        return blade(self.radius, self.core, self.pitch, self.length, self.thickness, self.nose, *counts)
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,33 @@
-"""Walking on grains: robots and their clocks, what computes how they walk, and wheels that are driven at a given slip."""
+"""Walking on grains: robots and their clocks, what computes how they walk, and wheels and
+screws that are driven at a given slip."""
 
+from rft.walking.craft import Screws
 from rft.walking.engines import ENGINES, Fineness, Walker, engine
 from rft.walking.mjcf import Mjcf
-from rft.walking.robot import ROBOTS, Rhex, Robot, Roller, Tripod
+from rft.walking.robot import Rhex, Robot, Roller, Tripod
+from rft.walking.robots import ROBOTS
+from rft.walking.screws import Cruise, Turning, cruise, freely, turning
 from rft.walking.stride import Walk
 from rft.walking.wheel import Rolling, rolling
 
 __all__ = [
     "ENGINES",
     "ROBOTS",
+    "Cruise",
     "Fineness",
     "Mjcf",
     "Rhex",
     "Robot",
     "Roller",
     "Rolling",
+    "Screws",
     "Tripod",
+    "Turning",
     "Walk",
     "Walker",
+    "cruise",
     "engine",
+    "freely",
     "rolling",
+    "turning",
 ]

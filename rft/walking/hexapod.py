@@ -21,6 +21,8 @@ GIVES = 1e-4  # rad, that a leg turns by with the robot's weight at its end
 QUICK = 1e-3  # s, in which a servo settles
 LEAST = 1e-14  # kg m^2, of any moment of inertia: MuJoCo takes none below 1e-15
 THICK = 0.02  # of a leg's reach, as drawn
+UNTOUCHED = {"contype": "0", "conaffinity": "0"}
+COLOURS = "0.2 0.5 0.7 1", "0.8 0.35 0.2 1"  # of the two tripods
 
 PLANAR = (("slide", "1 0 0"), ("slide", "0 0 1"), ("hinge", "0 1 0"))
 
@@ -30,6 +32,30 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
     turn, with position actuators of the same names. planar: the hull keeps to the plane: no roll, no yaw, nothing sideways."""
     legs = robot.leg(elements)
     reach = float(np.abs(legs.points).max())
+    root, hull = begun()
+    level = isinstance(robot, Roller)
+    for kind, axis in PLANAR[: 2 if level else 3] if planar or level else ():
+        ET.SubElement(hull, "joint", type=kind, axis=axis)
+    if not (planar or level):
+        ET.SubElement(hull, "freejoint")
+    inertial(hull, robot.mass * (1 - len(hips(robot)) * LIGHT), inertia(robot, reach))
+    if not level:
+        boxed(hull, [robot.length, robot.width, robot.height])
+    stiff = robot.mass * GRAVITY * reach / GIVES
+    motors = ET.SubElement(root, "actuator")
+    for k, (place, phase) in enumerate(zip(hips(robot), phases(robot))):
+        leg = ET.SubElement(hull, "body", name=f"leg{k}", pos=text(place))
+        ET.SubElement(leg, "joint", name=f"leg{k}", type="hinge", axis="0 1 0")
+        light = robot.mass * LIGHT
+        inertial(leg, light, np.full(3, light * reach**2 / 3))
+        for geom in _drawn(legs, THICK * reach):
+            ET.SubElement(leg, "geom", rgba=COLOURS[bool(phase)], **geom, **UNTOUCHED)
+        ET.SubElement(motors, "position", name=f"leg{k}", joint=f"leg{k}", kp=repr(stiff), kv=repr(stiff * QUICK))
+    return ET.tostring(root, encoding="unicode")
+
+
+def begun() -> tuple[ET.Element, ET.Element]:
+    """(the model, its body "hull", in which nothing is)."""
     root = ET.Element("mujoco", model="robot")
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", gravity=f"0 0 {-GRAVITY!r}")
@@ -38,31 +64,12 @@ def mjcf(robot: Robot, elements: int = 12, planar: bool = False) -> str:
     ET.SubElement(ET.SubElement(root, "asset"), "texture", **sky)
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="0 0 2", dir="0.2 0.3 -1", directional="true")
-    hull = ET.SubElement(world, "body", name="hull")
-    level = isinstance(robot, Roller)
-    for kind, axis in PLANAR[: 2 if level else 3] if planar or level else ():
-        ET.SubElement(hull, "joint", type=kind, axis=axis)
-    if not (planar or level):
-        ET.SubElement(hull, "freejoint")
-    _inertial(hull, robot.mass * (1 - len(hips(robot)) * LIGHT), inertia(robot, reach))
-    if not level:
-        half = np.array([robot.length, robot.width, robot.height]) / 2
-        ET.SubElement(hull, "geom", type="box", size=_text(half), rgba="0.25 0.3 0.4 1", **UNTOUCHED)
-    stiff = robot.mass * GRAVITY * reach / GIVES
-    motors = ET.SubElement(root, "actuator")
-    for k, (place, phase) in enumerate(zip(hips(robot), phases(robot))):
-        leg = ET.SubElement(hull, "body", name=f"leg{k}", pos=_text(place))
-        ET.SubElement(leg, "joint", name=f"leg{k}", type="hinge", axis="0 1 0")
-        light = robot.mass * LIGHT
-        _inertial(leg, light, np.full(3, light * reach**2 / 3))
-        for geom in _drawn(legs, THICK * reach):
-            ET.SubElement(leg, "geom", rgba=COLOURS[bool(phase)], **geom, **UNTOUCHED)
-        ET.SubElement(motors, "position", name=f"leg{k}", joint=f"leg{k}", kp=repr(stiff), kv=repr(stiff * QUICK))
-    return ET.tostring(root, encoding="unicode")
+    return root, ET.SubElement(world, "body", name="hull")
 
 
-UNTOUCHED = {"contype": "0", "conaffinity": "0"}
-COLOURS = "0.2 0.5 0.7 1", "0.8 0.35 0.2 1"  # of the two tripods
+def boxed(hull: ET.Element, sides) -> None:
+    """A box is drawn about the hull's middle."""
+    ET.SubElement(hull, "geom", type="box", size=text(np.array(sides) / 2), rgba="0.25 0.3 0.4 1", **UNTOUCHED)
 
 
 def inertia(robot: Robot, reach: float) -> np.ndarray:
@@ -104,15 +111,16 @@ def _drawn(legs, thick: float):
         size = np.array([length, legs.width, thick]) / 2
         yield {
             "type": "box",
-            "size": _text(size),
-            "pos": _text((x, 0.0, z)),
-            "euler": _text((0.0, -np.arctan2(dz, dx), 0.0)),
+            "size": text(size),
+            "pos": text((x, 0.0, z)),
+            "euler": text((0.0, -np.arctan2(dz, dx), 0.0)),
         }
 
 
-def _inertial(body, mass: float, sides) -> None:
-    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=_text(np.maximum(sides, LEAST)))
+def inertial(body: ET.Element, mass: float, sides) -> None:
+    """Mass, kg, and moments of inertia (3,), kg m^2, about the body's origin."""
+    ET.SubElement(body, "inertial", pos="0 0 0", mass=repr(float(mass)), diaginertia=text(np.maximum(sides, LEAST)))
 
 
-def _text(numbers) -> str:
+def text(numbers) -> str:
     return " ".join(repr(float(x)) for x in numbers)

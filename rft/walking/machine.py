@@ -7,7 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft.walking import hexapod
+from rft.walking import craft_model, hexapod
+from rft.walking.craft import Screws
 from rft.walking.facets import Surface
 from rft.walking.mjcf import Mjcf
 from rft.walking.multibody import Multibody
@@ -35,6 +36,9 @@ def machine(robot: Robot, elements: int, planar: bool = False) -> Machine:
         surfaces = robot.surfaces(elements)
         root = int(robot.model.body_rootid[surfaces[0].body])
         return Machine(robot.model, surfaces, root, robot.driven, np.array(robot.phases, float))
+    if isinstance(robot, Screws):
+        model = mujoco.MjModel.from_xml_string(craft_model.mjcf(robot))
+        return Machine(model, craft_model.surfaces(robot, elements), 1, np.arange(2), np.zeros(2))
     model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot, elements, planar))
     phases = hexapod.phases(robot)
     return Machine(model, hexapod.surfaces(robot, elements), 1, np.arange(len(phases)), phases)

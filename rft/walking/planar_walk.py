@@ -19,9 +19,9 @@ from rft.walking.stride import STUCK, Strides, Walk, from_rest
 
 def refuse(walker: Walker) -> None:
     """ValueError for a walker that this engine does not take."""
-    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes --engine mujoco")
     planar = isinstance(walker.robot, Rhex | Roller)
     require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot: use --engine mujoco")
+    require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes --engine mujoco")
 
 
 def walk(

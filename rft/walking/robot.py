@@ -102,6 +102,8 @@ class Robot:
     mass: float
     legs: Shape
     axle: float
+    part: ClassVar[str] = "legs"  # the field, and the table of a scene, that says what it moves by
+    parts: ClassVar[str] = "legs"  # what these are
     apart: ClassVar[tuple[float, ...]]  # phases of the legs at a hip
     period: ClassVar[float]  # cycles after which the robot looks the same
 
@@ -207,6 +209,3 @@ class Roller(Robot):
 
     def __post_init__(self):
         self._check()
-
-
-ROBOTS = {"rhex": Rhex, "wheel": Roller}

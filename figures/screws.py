@@ -1,0 +1,113 @@
+"""Screws in sand by the law of three dimensions: what one pulls against slip, and how craft on two of them go.
+
+The craft is that of the built-in scene ``screws``; it and its sand are assumed. Lines are the balance in the mean over a turn,
+without inertia (`rft.walking.cruise`); circles and paths are MuJoCo's. Axes are a third of the blade's radius out of the
+ground, at the surface, or so far under it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from figures import main
+from geomech.output import plots
+from geomech.scene import load
+from rft.walking import Fineness, Walker, cruise, engine, turning
+from rft.walking.craft import PER_SQUARE
+
+HEIGHTS = (0.01, 0.0, -0.01, -0.03)  # m, of the axis over the surface
+MASSES = (0.5, 1.0, 2.0)  # kg
+PITCHES = (0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.2, 0.24)  # m
+PATHS = {("mirrored", 1.0): 10, ("alike", 2.5): 10, ("alike", 1.0): 4}  # turns that are shown
+
+
+def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness: Fineness | None = None) -> dict:
+    """slip; pulled {height: Turning}; pitch; advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
+    the scene's mass; paths {(pair, mass): (turns, x, y, Cruise)}, x and y in m."""
+    scene, slip = load("screws"), np.linspace(-0.2, 1.0, slips)
+    fineness = fineness or scene.numerics
+    triangles = PER_SQUARE * fineness.elements**2
+    of = lambda mass, pitch: dataclasses.replace(
+        scene.robot, mass=mass, screw=dataclasses.replace(scene.robot.screw, pitch=pitch)
+    )
+    walk = lambda robot: engine("mujoco").walk([Walker(robot, scene.gait, scene.medium)], fineness)[0]
+    pulled = {h: turning(scene.medium, scene.robot.screw, h, slip, triangles=triangles) for h in HEIGHTS}
+    going = lambda robot: cruise(scene.medium, robot, scene.gait.frequency, triangles)
+    advance = {mass: np.array([going(of(mass, p)).advance for p in pitches]) for mass in MASSES}
+    found = np.array([walk(of(scene.robot.mass, p)).speed / scene.gait.frequency for p in tried])
+    paths = {}
+    for (pair, mass), turns in PATHS.items():
+        robot = dataclasses.replace(scene.robot, pair=pair, mass=mass)
+        one = walk(robot)
+        some = one.t * scene.gait.frequency <= turns + 1e-9
+        paths[pair, mass] = turns / scene.gait.frequency, one.pose[some, 0], one.more["y"][some], going(robot)
+    return {
+        "slip": slip, "pulled": pulled, "pitch": np.array(pitches), "advance": advance, "tried": np.array(tried),
+        "found": found, "paths": paths,
+    }  # fmt: skip
+
+
+def table(numbers: dict) -> str:
+    """MuJoCo beside the balance."""
+    lines, by_balance = [], np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
+    for p, found, wanted in zip(numbers["tried"], numbers["found"], by_balance):
+        lines.append(f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {wanted:.4g} by the balance")
+    for (pair, mass), (time, x, y, steady) in numbers["paths"].items():
+        lines.append(
+            f"{pair}, {mass:g} kg, {time:g} s: to ({x[-1]:.4g}, {y[-1]:.4g}) m; {steady.velocity} m/s by balance"
+        )
+    return "\n".join(lines)
+
+
+@plots.styled
+def draw(numbers: dict):
+    from cmcrameri import cm
+
+    fig, ((thrust, advance), (torque, path)) = plots.figure(7.4, 5.6, 2, 2)
+    for k, (height, found) in enumerate(numbers["pulled"].items()):
+        style = {"color": cm.batlow(0.85 * k / len(HEIGHTS)), "label": _told(height)}
+        thrust.plot(numbers["slip"], found.thrust, **style)
+        torque.plot(numbers["slip"], 1e3 * found.torque, **style)
+    thrust.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    thrust.set(xlabel="slip", ylabel="thrust (N)", title="one screw")
+    thrust.legend(title="axis", alignment="left")
+    torque.set(xlabel="slip", ylabel="torque (mN m)", ylim=(0.0, None))
+    pitch = 1e3 * numbers["pitch"]
+    for k, (mass, found) in enumerate(numbers["advance"].items()):
+        advance.plot(pitch, 1e3 * found, color=cm.batlow(0.4 * k), label=f"{mass:g} kg")
+    advance.plot(
+        1e3 * numbers["tried"], 1e3 * numbers["found"], "o", mfc="white", color=cm.batlow(0.4), label="1 kg, MuJoCo"
+    )
+    advance.plot(pitch, pitch, ":", color="0.5", label="as in a nut")
+    top = 1.9e3 * max(np.nanmax(found) for found in numbers["advance"].values())
+    advance.set(xlabel="pitch (mm)", ylabel="advance a turn (mm)", title="craft on two", ylim=(0.0, top))
+    advance.legend()
+    for k, ((pair, mass), (time, x, y, steady)) in enumerate(numbers["paths"].items()):
+        colour = cm.batlow(0.3 * k)
+        path.plot(1e2 * x, 1e2 * y, color=colour, label=f"{pair}, {mass:g} kg, {time:g} s")
+        path.plot(*_arc(steady, time), "--", lw=0.8, color=colour)
+    path.plot([], [], "--", lw=0.8, color="0.3", label="by balance")
+    path.set(xlabel="$x$ (cm)", ylabel="$y$ (cm), to the left", aspect="equal")
+    path.legend(loc="lower right")
+    return fig
+
+
+def _told(height: float) -> str:
+    return f"{abs(1e3 * height):.0f} mm {'above' if height > 0 else 'below'}" if height else "at the surface"
+
+
+def _arc(steady, time: float):
+    """(x, y) in cm of a body velocity that stays."""
+    t = np.linspace(0.0, time, 200)
+    yaw = steady.yaw_rate * t
+    v = (
+        np.stack([np.cos(yaw), np.sin(yaw)]) * steady.velocity[0]
+        + np.stack([-np.sin(yaw), np.cos(yaw)]) * steady.velocity[1]
+    )
+    return 1e2 * np.cumsum(v, 1) * t[1]
+
+
+if __name__ == "__main__":
+    main("screws", compute, draw, table)

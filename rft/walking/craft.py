@@ -1,0 +1,71 @@
+"""A craft that two screws drive: a box over screws side by side, along its own x axis, which turn as they are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.media.base import check_ranges, require, shown
+from rft.spatial import Mesh, Screw, shapes
+from rft.vertical.outline import LARGEST, check_metres
+from rft.walking.robot import MASSES, Robot
+
+PAIRS = ("mirrored", "alike")
+PER_SQUARE = 10  # triangles of a screw
+
+
+@dataclass(frozen=True)
+class Screws(Robot):
+    """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
+
+    mass (kg): of the whole craft. length, width, height (m): of the box about the centre of mass. screw (-): that on the left;
+    both drive forwards. track (m): from one axis to the other. drop (m): of the axes below the centre of mass. pair (-):
+    "mirrored", the one on the right is its mirror image and turns the other way, or "alike", the same and turns the same way.
+    """
+
+    mass: float
+    length: float
+    width: float
+    height: float
+    screw: Screw
+    track: float
+    drop: float = 0.0
+    pair: str = "mirrored"
+    part = "screw"
+    parts = "screws"
+    period = 1.0
+
+    def __post_init__(self):
+        check_ranges(self, mass=MASSES)
+        require(
+            isinstance(self.screw, Screw), f"a robot without screws: screw must be a Screw, got {shown(self.screw)}"
+        )
+        check_metres(self, "length", "width", "height", "track")
+        check_metres(self, "drop", low=-LARGEST)
+        require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}, got {shown(self.pair)}")
+        told = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
+        require(self.track > 2 * self.screw.radius, told)
+
+    @property
+    def screws(self) -> tuple[tuple[Screw, tuple[float, float, float]], ...]:
+        """(screw, its middle from the centre of mass, m), left and right."""
+        right = self.screw.mirrored if self.pair == "mirrored" else self.screw
+        return (self.screw, (0.0, self.track / 2, -self.drop)), (right, (0.0, -self.track / 2, -self.drop))
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3,): kg m^2, of the box about x, y, z."""
+        squares = np.array([self.length, self.width, self.height]) ** 2
+        return self.mass / 12 * (squares.sum() - squares)
+
+    def meshes(self, elements: int) -> list[Mesh]:
+        """Of the screws, `PER_SQUARE` triangles for the square of so many elements."""
+        return [screw.mesh(PER_SQUARE * elements**2) for screw, _ in self.screws]
+
+    def hull(self, elements: int) -> Mesh:
+        """Of the box, about the centre of mass."""
+        return shapes.box((self.length, self.width, self.height), max(1, elements // 6))
+
+    def check(self, elements: int) -> None:
+        self.meshes(elements)
