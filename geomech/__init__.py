@@ -8,6 +8,7 @@ Study, tiers                            what follows: connection, CCF, cost, dis
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
 optimise, undulation, plots             the best gait; swimmers that undulate; figures
+workers                                 who computes what is large: `with geomech.workers.using(4): ...`
 
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """
@@ -25,6 +26,7 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
     from geomech import reconstruct as reconstruct
     from geomech import systems as systems
     from geomech import tiers as tiers
+    from geomech import workers as workers
     from geomech.kinds import register as register
     from geomech.output import plots as plots
     from geomech.scene import Numerics as Numerics
@@ -43,7 +45,7 @@ __version__ = "0.1.0"
 _MODULES = {  # by the name they have here; none is imported before it is asked for
     **{
         name: f"geomech.{name}"
-        for name in ("connection", "curvature", "gaits", "optimise", "reconstruct", "systems", "tiers")
+        for name in ("connection", "curvature", "gaits", "optimise", "reconstruct", "systems", "tiers", "workers")
     },
     **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
     "plots": "geomech.output.plots",

@@ -36,4 +36,5 @@ def geomech(
 
 def main(argv: list[str] | None = None) -> None:
     """Entry point: one line on standard error and exit code 2 for what the user can mend, 128 + its number for a signal."""
+    terminal.calm()
     sys.exit(terminal.ended(app, (sys.argv[1:] if argv is None else argv) or ["--help"]))

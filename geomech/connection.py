@@ -13,15 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech import summary
+from geomech import summary, workers
 from geomech.errors import is_whole, number, real_array, short
 from geomech.field import Field, as_axes, half_of
-from geomech.velocity import fits, tried
+from geomech.velocity import Telling, Velocity, evaluate, tried
 
-Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
 EVEN = 1e-6  # of the largest velocity: a solver's rounding is below it
-SAMPLES_TOGETHER = 100_000  # velocities asked for in one call
+SAMPLES_TOGETHER = 25_000  # velocities asked for in one call: enough to fill the solver, few enough to share out
 
 
 @dataclass(frozen=True)
@@ -79,23 +78,6 @@ class Connection:
         from geomech.tables import load
 
         return load(path, sign, order).connection
-
-
-def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
-    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), and does not broadcast to it, or not finite
-    unless ``masked``."""
-    shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
-    if not callable(velocity):
-        raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
-    xi = real_array("what velocity returns", velocity(alpha, alphadot))
-    if xi.shape != shape and fits(xi, shape):
-        xi = np.broadcast_to(xi, shape).copy()
-    if xi.shape != shape:
-        raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
-    if not masked and not np.isfinite(xi).all():
-        where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
-        raise ValueError(f"velocity is not finite at alpha = {where}")
-    return xi
 
 
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
@@ -190,19 +172,30 @@ def sampled_at(
     todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
     step = max(1, SAMPLES_TOGETHER // len(unit))
     fields: list[np.ndarray] = []
-    for k in range(0, todo, step):
-        here = slice(k, min(k + step, todo))
-        xi = evaluate(velocity, alpha[here], unit, masked=masked)
+    parts = [slice(k, min(k + step, todo)) for k in range(0, todo, step)]
+    asked = velocity, unit, masked
+    for here, (xi, *more) in zip(parts, workers.each(_asked, asked, (alpha[x] for x in parts), len(parts))):
+        if more:
+            velocity.heard(*more)
         kept = keep(xi)
         fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in kept]
         _put(fields, here, kept)
         # There xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
-        if twins := min(here.stop, len(alpha) - todo) - k:
-            there = slice(len(alpha) - k - twins, len(alpha) - k)
+        if twins := min(here.stop, len(alpha) - todo) - here.start:
+            there = slice(len(alpha) - here.start - twins, len(alpha) - here.start)
             _put(fields, there, keep([-1.0, 1.0, 1.0] * xi[:twins][::-1]))
         if progress:
             progress(here.stop / todo)
     return fields
+
+
+def _asked(asked: tuple, alpha: np.ndarray) -> tuple:
+    """(xi, and more if the velocity tells more) of (velocity, unit, whether xi may be nan) at some shapes."""
+    velocity, unit, masked = asked
+    if not isinstance(velocity, Telling):
+        return (evaluate(velocity, alpha, unit, masked),)
+    xi, more = velocity.both(alpha, unit)
+    return evaluate(lambda *at: xi, alpha, unit, masked), more
 
 
 def even_part(velocity: Velocity, axes, singularity: Callable | None = None) -> np.ndarray | None:

@@ -27,6 +27,7 @@ from geomech.systems.swimmer import PARTS
 from rft.effects import Effect
 
 LARGEST = 1_000_000  # bytes of a file of one's own
+PLUGIN = "geomech_plugin_"  # begins the names of modules made of such files
 Part = TypeVar("Part", bound=type)
 
 
@@ -51,6 +52,7 @@ FAMILIES = {  # by the group of entry points
 BUILT_IN = {group: frozenset(family.kinds) for group, family in FAMILIES.items()}
 NAMELESS = {Effect.kind, Plain.kind}
 _code: dict[str, str] = {}  # file or package of one's own: what tells one version of it from another
+_files: dict[str, str] = {}  # file of one's own: its text
 
 
 def register(part: Part) -> Part:
@@ -104,7 +106,22 @@ def load_file(path: str | Path) -> list[str]:
         text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
         raise SceneError(f"{place}: {getattr(error, 'strerror', None) or 'it is not text'}") from None
-    name = f"geomech_plugin_{path.stem}_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
+    return _load(path, str(path.resolve()), text)
+
+
+def load_text(whole: str, text: str) -> None:
+    """`load_file` of a file that need not be on this machine, by its whole name and its text, as `files` has them."""
+    if _files.get(whole) != text:
+        _load(Path(whole), whole, text)
+
+
+def _module(whole: str) -> str:
+    """Name of the module made of a file."""
+    return f"{PLUGIN}{Path(whole).stem}_{hashlib.sha256(whole.encode()).hexdigest()[:8]}"
+
+
+def _load(path: Path, whole: str, text: str) -> list[str]:
+    place, name = f"--plugin {path}", _module(whole)
     module = types.ModuleType(name)
     module.__file__ = str(path)
     with _all_or_none(name, module):
@@ -117,7 +134,7 @@ def load_file(path: str | Path) -> list[str]:
         own = [n for _, n, part in _names() - before if part.__module__ == name]
         if not own:
             raise SceneError(f'{place}: no class in it has a law = "..." (a force law) or kind = "..." (all else)')
-    _code[str(path.resolve())] = hashlib.sha256(text.encode()).hexdigest()
+    _code[whole], _files[whole] = hashlib.sha256(text.encode()).hexdigest(), text
     return sorted(own)
 
 
@@ -218,3 +235,18 @@ def _package(entry: importlib.metadata.EntryPoint) -> str:
 def code() -> dict[str, str]:
     """The code of one's own that is loaded, and its version: what was computed with another is not taken up."""
     return dict(_code)
+
+
+def files() -> tuple[tuple[str, str], ...]:
+    """(whole name, text) of the files of one's own whose classes scenes may name."""
+    modules = {part.__module__ for part in _own()}
+    return tuple((whole, text) for whole, text in _files.items() if _module(whole) in modules)
+
+
+def registered() -> tuple[tuple[str, str], ...]:
+    """(module, name) of the classes of one's own from elsewhere."""
+    return tuple((p.__module__, p.__qualname__) for p in _own() if not p.__module__.startswith(PLUGIN))
+
+
+def _own() -> list[type]:
+    return [p for group, family in FAMILIES.items() for name, p in family.kinds.items() if name not in BUILT_IN[group]]

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
+from geomech import workers
 from geomech.connection import SAMPLES_TOGETHER, directions
 from geomech.errors import is_whole, real_array, short
 from geomech.field import Field, as_axes
@@ -135,17 +136,21 @@ def _sampled(power: Power, axes, unit: np.ndarray, progress: Callable | None) ->
     """(C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
     out, step = np.empty((len(unit), len(alpha))), max(1, SAMPLES_TOGETHER // len(unit))
-    for k in range(0, len(alpha), step):
-        here = alpha[k : k + step]
-        found = np.asarray(power(here, unit))
-        if found.shape != (len(here), len(unit)) or not np.isfinite(found).all():
-            raise ValueError(
-                f"power must be finite, of shape {(len(here), len(unit))} for these rates, got {found.shape}"
-            )
-        out[:, k : k + step] = found.T
+    parts = [slice(k, min(k + step, len(alpha))) for k in range(0, len(alpha), step)]
+    for here, found in zip(parts, workers.each(_powers, (power, unit), (alpha[x] for x in parts), len(parts))):
+        out[:, here] = found.T
         if progress:
-            progress(min(1.0, (k + step) / len(alpha)))
+            progress(here.stop / len(alpha))
     return out.reshape(len(unit), *map(len, axes))
+
+
+def _powers(asked: tuple, alpha: np.ndarray) -> np.ndarray:
+    """Of (power, unit) at some shapes."""
+    power, unit = asked
+    found = np.asarray(power(alpha, unit))
+    if found.shape != (len(alpha), len(unit)) or not np.isfinite(found).all():
+        raise ValueError(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates, got {found.shape}")
+    return found
 
 
 def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:

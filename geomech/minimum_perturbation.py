@@ -17,9 +17,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
-from scipy.linalg import eigh
-from scipy.sparse.linalg import LinearOperator, cg
 
 from geomech.connection import Connection
 from geomech.coordinates import change_connection
@@ -104,6 +101,8 @@ class Basis:
     which integrates products of splines exactly, (Q_1, ..., Q_d); both may have leading axes."""
 
     def __init__(self, axes: tuple[np.ndarray, ...], degree: int):
+        from scipy.interpolate import BSpline, make_interp_spline
+
         self.axes, self.degree, self.d = axes, degree, len(axes)
         self.values, self.slopes, self.weights, self.knots_to_grid = [], [], [], []
         for axis in axes:
@@ -120,6 +119,8 @@ class Basis:
 
     def coefficients(self, values: np.ndarray) -> np.ndarray:
         """Of the spline through values (..., N_1, ..., N_d) on the grid."""
+        from scipy.interpolate import make_interp_spline
+
         for k, axis in enumerate(self.axes):
             rows = np.moveaxis(values, k - self.d, 0)
             values = np.moveaxis(make_interp_spline(axis, rows, self.degree).c, 0, k - self.d)
@@ -166,6 +167,8 @@ class Basis:
     def modes(self) -> tuple[list[np.ndarray], np.ndarray]:
         """Matrices (N, N) of each axis that make mass and stiffness diagonal, and the eigenvalues of -Laplace, ascending
         from 0 for the constant, (N_1, ..., N_d)."""
+        from scipy.linalg import eigh
+
         vectors, total = [], np.zeros((1,) * self.d)
         for k, (v, s, w) in enumerate(zip(self.values, self.slopes, self.weights)):
             mass, stiff = ((m.T @ m.multiply(w[:, None]).tocsr()).toarray() for m in (v, s))
@@ -194,6 +197,8 @@ class Basis:
 
         def near(r):
             return self._along(inverse * self._along(r.reshape(shape), onto), vectors).ravel()
+
+        from scipy.sparse.linalg import LinearOperator, cg
 
         right = -self._adjoint(w, a, bent).ravel()
         size, kind = np.linalg.norm(right), complex if bent or np.iscomplexobj(w) else float

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import spsolve
 
 from geomech.errors import number
 from geomech.field import Field
@@ -109,6 +107,9 @@ def _first(metric, alpha: np.ndarray) -> np.ndarray:
 
 def _relaxed(u: np.ndarray, ends: np.ndarray, length: np.ndarray) -> np.ndarray:
     """u (n, 2) with the least sum of squares of |du| / length - 1, by damped Gauss-Newton steps."""
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import spsolve
+
     rows = np.repeat(np.arange(len(ends)), 4)
     columns = (2 * ends[:, :, None] + np.arange(2)).reshape(-1)  # of (end, component)
     scale = np.sqrt((length**2).mean())  # so that steps have no unit

@@ -23,6 +23,7 @@ from geomech.progress import progress
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
+BELOW = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
@@ -54,6 +55,12 @@ def stoppable() -> Iterator[None]:
     finally:
         for n, handler in before.items():
             signal.signal(n, handler)
+
+
+def calm() -> None:
+    """Let the libraries below NumPy, which loads later, take one thread: small matrices gain nothing from more, their threads
+    wait by turning in circles, and sums that are shared out end in other digits."""
+    os.environ.update(dict.fromkeys(BELOW, "1"))
 
 
 def ended(app: typer.Typer, argv: list[str]) -> int:

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.errors import VelocityWarning
+from geomech.errors import VelocityWarning, real_array, short
+
+Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 SHAPES = 11  # tried, scattered over the grid; more than a body of a field has joints, so that none is taken for one
 RATES = 13  # at each
@@ -86,3 +88,28 @@ def one_by_one(velocity: Callable) -> Callable:
         return np.array(xi).reshape(*alpha.shape[:-1], 3)
 
     return each
+
+
+class Telling:
+    """A velocity that tells more than xi, wherever it is asked: both(alpha, alphadot) gives xi and more, which is heard(more)
+    in the order of the shapes."""
+
+    def __call__(self, alpha, alphadot) -> np.ndarray:
+        return self.both(alpha, alphadot)[0]
+
+
+def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
+    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), and does not broadcast to it, or not finite
+    unless ``masked``."""
+    shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
+    if not callable(velocity):
+        raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
+    xi = real_array("what velocity returns", velocity(alpha, alphadot))
+    if xi.shape != shape and fits(xi, shape):
+        xi = np.broadcast_to(xi, shape).copy()
+    if xi.shape != shape:
+        raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
+    if not masked and not np.isfinite(xi).all():
+        where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
+        raise ValueError(f"velocity is not finite at alpha = {where}")
+    return xi

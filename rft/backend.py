@@ -16,7 +16,8 @@ import functools
 import importlib.util
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextvars import ContextVar
 
 import numpy as np
 
@@ -47,9 +48,40 @@ def installed() -> bool:
 
 def takes(backend: str, model: Model) -> bool:
     """Whether the next descents of a model are compiled ones."""
+    backend = (_settled.get() or backend) if backend == "auto" else backend
     if backend == "numpy" or foreign(model) is not None or not installed():
         return False
     return backend == "numba" or AUTO.ready()
+
+
+_settled: ContextVar[str] = ContextVar("settled", default="")
+
+
+@contextlib.contextmanager
+def settled(backend: str) -> Iterator[None]:
+    """In the body of the statement "auto" is this one from the first balance to the last: the parts of a large request give
+    the same digits whenever and wherever they are computed."""
+    token = _settled.set(backend)
+    try:
+        yield
+    finally:
+        _settled.reset(token)
+
+
+def settled_on() -> str:
+    """What "auto" is here, if that is settled."""
+    return _settled.get()
+
+
+def at_hand() -> str:
+    """What "auto" is settled on where there is much to do: compiled code if it lies ready on this machine."""
+    if AUTO.is_ready:
+        return "numba"
+    if not installed() or AUTO.worked < 0:
+        return "numpy"
+    from rft import compiled
+
+    return "numba" if compiled.made() else "numpy"
 
 
 def foreign_to(medium, body: Body, effects: Sequence[Effect], loads: str):
@@ -72,12 +104,12 @@ def counted(backend: str):
     waits for on a busy machine."""
     start = time.process_time()
     yield
-    if backend == "auto":
+    if backend == "auto" and not _settled.get():
         AUTO.worked += time.process_time() - start
 
 
 class Auto:
-    """What "auto" knows in this process. worked: s of NumPy's work."""
+    """What "auto" knows in this process. worked: s of NumPy's work; below 0 no compiled code is taken."""
 
     def __init__(self):
         self.worked, self.maker, self.is_ready = 0.0, None, False

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 
 import numpy as np
 
@@ -18,9 +20,30 @@ def keep_freed_memory() -> None:
     np.empty(LARGE_BLOCK, np.uint8)
 
 
+def cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
+
+
+_one: ContextVar[bool] = ContextVar("one thread", default=False)
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """In the body of the statement the solver takes one thread: its neighbours have the other cores."""
+    token = _one.set(True)
+    try:
+        yield
+    finally:
+        _one.reset(token)
+
+
 def workers(threads: int | None, useful: int) -> int:
     """How many threads to take of those allowed, by default one a core."""
-    return max(1, min(threads or os.cpu_count() or 1, useful))
+    return max(1, min(1 if _one.get() else threads or cores(), useful))
 
 
 def split(samples: np.ndarray, count: int) -> list[np.ndarray]:

@@ -1,6 +1,9 @@
 """Ratios measured in one run: pytest -m benchmark -s. Nothing here asserts a wall-clock time."""
 
 import os
+import resource
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -127,3 +130,31 @@ def test_the_geometers_pipeline():
     a_loop, ours = cpu(loop) * len(alpha) / len(some), min(cpu(pipeline) for _ in range(5))
     print(f"\npipeline: {ours:.3f} CPU seconds, the loop for A alone {a_loop:.1f}, ratio {a_loop / ours:.0f}")
     assert a_loop > 10 * ours
+
+
+def test_a_sweep_of_ten_thousand_points_on_two_cores(tmp_path):
+    """By processes against one: wall-clock time, which hangs on who else is at work, and by computing alone, of which two cores
+    could do no better than half."""
+    over = ["gait.amplitude=0.2:2:20", "medium.C=1:3:25", "medium.gamma0=0.15:0.4:20"]
+    args = [
+        sys.executable,
+        "-m",
+        "geomech",
+        "sweep",
+        "three-link-glass",
+        "--yes",
+        *(x for o in over for x in ("--over", o)),
+    ]
+    wall, computing = {}, {}
+    for count in (1, 2):
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        subprocess.run(
+            [*args, "-o", f"{count}.nc", "--workers", str(count)], cwd=tmp_path, check=True, capture_output=True
+        )
+        wall[count], after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+        computing[count] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    assert (tmp_path / "1.nc").read_bytes() == (tmp_path / "2.nc").read_bytes()
+    print(f"\n10,000 points: one process {wall[1]:.1f} s, two {wall[2]:.1f} s, ratio {wall[1] / wall[2]:.2f};", end=" ")
+    print(
+        f"computing {computing[1]:.1f} and {computing[2]:.1f} s, at best {2 * computing[1] / computing[2]:.2f}", end=""
+    )

@@ -434,3 +434,32 @@ def test_the_command_starts_without_the_heavy_libraries():
     heavy = ("numpy", "scipy", "matplotlib", "sympy", "rich.progress")
     code = f"import sys, geomech.cli; print([m for m in {heavy} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
+
+
+def test_commands_load_what_they_use_and_no_more(tmp_path):
+    """A start of a few tenths of a second: nothing that draws, splines or computes formulas, no walking, no cluster."""
+    used = [
+        ["velocity", "three-link-glass", "--alpha", "0.5,0.3", "--alphadot", "1,0"],
+        ["explain", "three-link-glass"],
+        ["scenes"],
+        ["displacement", "three-link-viscous", "--amplitudes", "0.5", "--methods", "direct"],
+        ["trajectory", "three-link-viscous", "-o", "t.csv"],
+        ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc"],
+    ]
+    heavy = ("matplotlib", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "sympy", "numba", "distributed")
+    heavy += ("rft.walking", "rft.spatial", "geomech.scene.walker", "concurrent.futures.process", "rich.progress")
+    code = f"""if True:
+        import os, sys
+        from geomech import cli
+        os.environ["OPENBLAS_NUM_THREADS"] = "7"
+        for args in {used!r}:
+            try:
+                cli.main(args)
+            except SystemExit as left:
+                assert left.code == 0, args
+            found = [m for m in {heavy} if m in sys.modules]
+            assert not found, (args, found)
+            assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")

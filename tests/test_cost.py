@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 from test_cli import geomech as run
+from test_sweep import rows_in
 
 from geomech import connection, harmonics, terminal
 from geomech import scene as scenes
@@ -267,7 +268,7 @@ def test_a_signal_stops_a_sweep_and_keeps_what_is_done(number, large, monkeypatc
     assert code == 128 + number
     assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: ")
     assert "of 99999 points are kept in .s.nc.partial: the same command goes on from there" in err
-    rows = np.array(json.loads(kept.read_text())["rows"])
+    rows = rows_in(kept)
     assert f" {len(rows)} of 99999" in err
     scene = scenes.load("v.toml")
     amplitudes = [0.1 + (2 - 0.1) * k / 99998 for k in range(99999)]

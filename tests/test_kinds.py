@@ -38,7 +38,8 @@ SMALL = Numerics(grid=7, phases=32)
 def as_before(monkeypatch):
     before = {group: dict(family.kinds) for group, family in FAMILIES.items()}
     modules = set(sys.modules)
-    monkeypatch.setattr(kinds, "_code", {})
+    for name in ("_code", "_files"):
+        monkeypatch.setattr(kinds, name, {})
     yield
     for group, family in FAMILIES.items():
         family.kinds.clear()

@@ -11,11 +11,13 @@ from geomech.commands import COMMANDS
 ROOT = pathlib.Path(__file__).parents[1]
 # Beside the systems: commands list the named media and ask a stress map, an intruder scene has a law, a body and effects but no
 # system, a sweep puts effects side by side, a calibration fits a law, a class of one's own is told to be an effect, and the
-# top shows media, bodies and effects to type checkers. A robot that walks has a map and no system, either.
+# top shows media, bodies and effects to type checkers. A robot that walks has a map and no system, either; a map
+# of stress is written by its coefficients. Workers tell the
+# solver to take one thread, and by which back end.
 KNOW_MECHANICS = {
     "__init__.py", "commands/scenes.py", "commands/stress.py", "kinds.py", "scene/intruder.py", "scene/intruding.py",
-    "scene/solid.py", "scene/walker.py", "study/batch.py", "study/calibration.py", "study/stress_calibration.py",
-    "study/sweep.py", "study/walking.py",
+    "scene/solid.py", "scene/walker.py", "scene/write.py", "study/batch.py", "study/calibration.py",
+    "study/stress_calibration.py", "study/sweep.py", "study/walking.py", "workers/solving.py",
 }  # fmt: skip
 
 

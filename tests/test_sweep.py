@@ -1,6 +1,7 @@
 """Sweeps over a scene's parameters: right at every point, kept when interrupted, taken up again."""
 
 import contextlib
+import io
 import json
 import os
 import signal
@@ -167,8 +168,14 @@ def interrupted(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 2)  # both amplitudes of one length
     with pytest.raises(KeyboardInterrupt):
         sweep.sweep(GLASS, OVER, partial)
-    assert np.shape(json.loads(partial.read_text())["rows"]) == (4, 5)  # two lengths, two amplitudes each
+    assert np.shape(rows_in(partial)) == (4, 5)  # two lengths, two amplitudes each
     return partial, calls
+
+
+def rows_in(path, points=99_999):
+    """What a file keeps, as numbers (N, 5)."""
+    with path.open("rb") as file:
+        return kept._believed(file, {}, points, 5)[1]
 
 
 def test_an_interrupted_sweep_is_taken_up(interrupted, whole):
@@ -176,7 +183,7 @@ def test_an_interrupted_sweep_is_taken_up(interrupted, whole):
     again = sweep.sweep(GLASS, OVER, partial)
     assert calls == [1.0, 2.0, 3.0, 3.0, 4.0]
     np.testing.assert_array_equal(again["displacement"], whole["displacement"])
-    assert len(json.loads(partial.read_text())["rows"]) == 8  # there until it is saved
+    assert len(rows_in(partial)) == 8  # there until it is saved
     assert sweep.sweep(GLASS, OVER, partial)["estimate"].tolist() == again["estimate"].tolist()
     assert len(calls) == 5
 
@@ -213,7 +220,8 @@ def test_a_sweep_goes_on_anywhere(done, tmp_path, monkeypatch):
             found.extend((s.system.body.length, a) for s in batch for a in amplitudes)
             return [[s.system.body.length, a, 0.0, 0.0, 0.0] for s in batch for a in amplitudes]
 
-        kept.keep(tmp_path / "p", asked, [[*point, 0.0, 0.0, 0.0] for point in every[:done]])
+        end = kept.begin(tmp_path / "p", asked)
+        kept.append(tmp_path / "p", end, np.array([[*point, 0.0, 0.0, 0.0] for point in every[:done]]))
         monkeypatch.setattr(sweep, "_rows", rows)
         monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", at_once)
         result = sweep.sweep(GLASS, over, tmp_path / "p")
@@ -238,23 +246,19 @@ def other_scene(found):
 
 
 def too_many(found):
-    found["rows"] *= 3
+    found["rows"] = np.tile(found["rows"], (3, 1))
 
 
 def not_finite(found):
     found["rows"][1][0] = float("nan")
 
 
-def too_wide(found):
-    found["rows"][1].append(0.0)
+def another_back_end(found):
+    found["settled"] = "abacus"
 
 
-def a_number(found):
-    found["rows"] = 5
-
-
-def no_rows(found):
-    del found["rows"]
+def no_back_end(found):
+    del found["settled"]
 
 
 def no_question(found):
@@ -270,25 +274,27 @@ def no_question(found):
         other_scene,
         too_many,
         not_finite,
-        too_wide,
-        a_number,
-        no_rows,
+        another_back_end,
+        no_back_end,
         no_question,
     ],
 )
 def test_what_is_kept_of_anything_else_is_set_aside(change, interrupted, whole, capsys):
     """With a checksum that is right, as another version or another sweep would leave it."""
     partial, calls = interrupted
-    found = json.loads(partial.read_text())
+    head = json.loads(partial.read_bytes().split(b"\n")[0])
+    found = {**head, "rows": rows_in(partial)}
     change(found)
-    del found["checksum"]
-    partial.write_text(json.dumps({**found, "checksum": kept._checksum(found)}))
-    text = partial.read_text()
+    body = {key: value for key, value in found.items() if key not in ("rows", "checksum")}
+    line = json.dumps({**body, "checksum": kept._checksum(body)}).encode() + b"\n"
+    partial.write_bytes(line)
+    kept.append(partial, len(line), found["rows"])
+    text = partial.read_bytes()
     again = sweep.sweep(GLASS, OVER, partial)
     assert calls[3:] == [1.0, 2.0, 3.0, 4.0]
     np.testing.assert_array_equal(again["displacement"], whole["displacement"])
     aside = partial.with_name(".s.nc.partial.set-aside")
-    assert aside.read_text() == text
+    assert aside.read_bytes() == text
     said = capsys.readouterr().err
     assert said.startswith(f"note: {partial} is not taken up, ")
     assert said.endswith(f": set aside as {aside.name}\n")
@@ -302,23 +308,37 @@ def test_no_text_is_a_traceback(text, interrupted, capsys):
     partial, _ = interrupted
     for k in range(3):
         partial.write_text(text, errors="surrogatepass")
-        assert kept.taken_up(partial, {}, 8) == []
+        assert kept.taken_up(partial, {}, 8) is None
         assert not partial.exists()
         assert capsys.readouterr().err.endswith(f"set aside as {partial.name}.set-aside{f'-{k + 1}' if k else ''}\n")
 
 
 def test_no_flipped_bit_is_believed(interrupted):
-    """Every bit of the rows, and a thousand cuts: what is taken up is what was kept."""
+    """Every bit behind the question, and a thousand cuts: what is taken up is what was kept, or the beginning of it."""
     partial, _ = interrupted
-    raw = partial.read_bytes()
-    asked = sweep.question(GLASS, OVER)
-    rows = kept._believed(raw, asked, 8)
-    start = raw.index(b'"rows"')
+    asked, rows = sweep.question(GLASS, OVER), rows_in(partial)
+    end = partial.stat().st_size
+    kept.append(partial, end, rows[:2] + 1.0)  # a second block
+    raw, every = partial.read_bytes(), np.concatenate([rows, rows[:2] + 1.0])
+    start = raw.index(b'"settled"')
     damaged = [raw[:k] + bytes([raw[k] ^ 1 << bit]) + raw[k + 1 :] for k in range(start, len(raw)) for bit in range(8)]
-    damaged += [raw[:k] for k in np.linspace(0, len(raw) - 1, 1000).astype(int)]
-    for text in damaged:
+    damaged += [raw[:k] for k in np.linspace(0, len(raw), 1000).astype(int)]
+    believed = []
+    for some in damaged:
         with contextlib.suppress(ValueError, TypeError, KeyError, AttributeError):
-            assert kept._believed(text, asked, 8) == rows
+            believed.append(kept._believed(io.BytesIO(some), asked, 8, 5)[1])
+    assert all(np.array_equal(found, every[: len(found)]) for found in believed)
+    assert {len(found) for found in believed} == {0, 4, 6}
+
+
+def test_what_is_kept_behind_a_torn_block_is_written_over(interrupted, whole):
+    """A kill in the middle of a block: the rows before it count, and those that come are read back."""
+    partial, _ = interrupted
+    with partial.open("ab") as file:
+        file.write(kept.BLOCK.pack(3, 5) + b"half a row")
+    again = sweep.sweep(GLASS, OVER, partial)
+    np.testing.assert_array_equal(again["displacement"], whole["displacement"])
+    np.testing.assert_array_equal(rows_in(partial)[:, :3], whole["displacement"].reshape(-1, 3))
 
 
 def test_a_sweep_of_another_axis_of_the_same_shape_is_another(tmp_path, capsys):
@@ -350,8 +370,8 @@ def test_a_full_disk_loses_nothing_that_is_computed(tmp_path, monkeypatch, capsy
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(kept, "keep", full)
-    monkeypatch.setattr(sweep, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(kept, "append", full)
+    monkeypatch.setattr(kept, "SAVE_EVERY", 0.0)
     monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
     over = {"gait.amplitude": [0.5, 1.0]}
     found = sweep.sweep(GLASS, over, tmp_path / "p")
@@ -400,24 +420,25 @@ def test_a_sweep_killed_in_the_middle_is_taken_up(tmp_path):
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "--over", "body.length=1:4:4", "-o", "s.nc"]
     script = """
 import os, signal, sys
-from geomech import cli, files
-from geomech.study import sweep
-sweep.SAVE_EVERY = sweep.PATIENCE = 0
+from geomech import cli
+from geomech.study import kept, sweep
+kept.SAVE_EVERY = 0
 sweep.SAMPLES_TOGETHER = 2
-replace, done = os.replace, []
-def killing(source, target):
-    done.append(target)
+append, done = kept.append, []
+def killing(path, end, rows):
+    done.append(end)
     if len(done) == 3:
+        with path.open("ab") as file:
+            file.write(b"half a block of rows")
         os.kill(os.getpid(), signal.SIGKILL)
-    replace(source, target)
-files.os.replace = killing
+    return append(path, end, rows)
+kept.append = killing
 cli.main()
 """
     first = subprocess.run([sys.executable, "-c", script, "sweep", *args], cwd=tmp_path)
     assert first.returncode == -signal.SIGKILL
-    left = {p.name[:9] for p in tmp_path.iterdir()}
-    assert left == {".s.nc.par", ".s.nc.loc", ".geomech-"}
-    assert len(json.loads((tmp_path / ".s.nc.partial").read_text())["rows"]) == 4
+    assert {p.name for p in tmp_path.iterdir()} == {".s.nc.partial", ".s.nc.lock"}
+    assert len(rows_in(tmp_path / ".s.nc.partial")) == 4
     assert geomech("sweep", *args, cwd=tmp_path)[::2] == (0, "")
     assert [p.name for p in tmp_path.iterdir()] == ["s.nc"]
 
@@ -479,7 +500,7 @@ def test_an_unfinished_sweep_belongs_to_its_own_question(tmp_path, monkeypatch):
     first = (tmp_path / ".s.nc.partial").read_bytes()
     code, err, _ = ask(0.6, 0.9, 1.2, stop=True)
     own = kept.beside(
-        tmp_path / "s.nc", json.loads(next(tmp_path.glob(".s.nc.?*.partial")).read_text())["question"]
+        tmp_path / "s.nc", json.loads(next(tmp_path.glob(".s.nc.?*.partial")).read_bytes().split(b"\n")[0])["question"]
     ).name
     assert code == 130
     assert err.startswith("note: another sweep to s.nc is unfinished: ")

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from geomech import terminal
 from geomech.commands.asked import allow, loaded
-from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption
+from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, with_workers
 from geomech.files import whole_folder
 
 
+@with_workers
 def accuracy(
     name: EitherArgument,
     out: FolderOption = Path("accuracy"),

@@ -24,16 +24,16 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str =
 
 def scene_with_gait(name: str):
     """The scene of that name; SceneError for one without a gait."""
-    from geomech.scene import Scene, WalkerScene, load
+    from geomech.scene import Scene, load
 
     scene = load(name)
-    if isinstance(scene, WalkerScene):
+    if isinstance(scene, Scene):
+        return scene
+    if hasattr(scene, "robot"):
         raise SceneError(
             f"{name}: a robot that walks has no shape space: give it to 'geomech walk', 'sweep' or 'accuracy'"
         )
-    if not isinstance(scene, Scene):
-        raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
-    return scene
+    raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
 
 
 def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):

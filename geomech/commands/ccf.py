@@ -17,10 +17,12 @@ from geomech.commands.options import (
     SliceOption,
     YesOption,
     check_outputs,
+    with_workers,
 )
 from geomech.errors import SceneError, choose
 
 
+@with_workers
 def ccf(
     name: SceneArgument,
     plot: Annotated[Path, typer.Option("--plot", metavar="FILE", help="figure: .png, .pdf or .svg")],

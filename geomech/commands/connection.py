@@ -19,10 +19,12 @@ from geomech.commands.options import (
     YesOption,
     check_netcdf,
     check_outputs,
+    with_workers,
 )
 from geomech.errors import SceneError, choose
 
 
+@with_workers
 def connection(
     name: SceneArgument,
     out: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="FILE.nc (NetCDF) or FILE.mat to write")],

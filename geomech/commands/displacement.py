@@ -19,10 +19,12 @@ from geomech.commands.options import (
     amplitude_kind,
     check_outputs,
     spread,
+    with_workers,
 )
 from geomech.errors import SceneError, choose
 
 
+@with_workers
 def displacement(
     name: SceneArgument,
     amplitudes: Annotated[str, typer.Option(help="0.5,1.0,1.75 or START:STOP:COUNT; angles also as 30deg")],

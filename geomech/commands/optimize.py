@@ -10,11 +10,20 @@ import typer
 
 from geomech import terminal
 from geomech.commands.asked import allow, loaded
-from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, check_outputs, joint_limits
+from geomech.commands.options import (
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    YesOption,
+    check_outputs,
+    joint_limits,
+    with_workers,
+)
 from geomech.errors import SceneError
 from geomech.files import whole_file
 
 
+@with_workers
 def optimize(
     name: SceneArgument,
     aim: Annotated[str, typer.Option("--for", help="displacement, efficiency, turning or speed")],

@@ -100,6 +100,33 @@ def with_plugins(command: Callable) -> Callable:
     return run
 
 
+WorkersOption = Annotated[
+    Optional[int], typer.Option("--workers", metavar="N", help="processes that compute what takes long; one a core")
+]
+SchedulerOption = Annotated[
+    Optional[str],
+    typer.Option("--scheduler", metavar="ADDRESS", help="of a Dask cluster that computes, such as tcp://10.0.0.1:8786"),
+]
+
+
+def with_workers(command: Callable) -> Callable:
+    """A command that also takes ``--workers`` and ``--scheduler`` (`geomech.workers`)."""
+
+    @functools.wraps(command)
+    def run(workers=None, scheduler=None, **given):
+        from geomech.workers import using
+
+        with using(workers, scheduler):
+            return command(**given)
+
+    signature = inspect.signature(command, eval_str=True)
+    more = {"workers": WorkersOption, "scheduler": SchedulerOption}
+    last = [inspect.Parameter(k, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=a) for k, a in more.items()]
+    run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *last])
+    run.__annotations__ = {p.name: p.annotation for p in run.__signature__.parameters.values()}
+    return run
+
+
 def check_netcdf(path: Path, matlab: bool = False) -> None:
     """SceneError for a name that does not end in .nc, or in .mat where that will do."""
     if path.suffix not in (".nc", ".mat") if matlab else path.suffix != ".nc":

@@ -10,7 +10,7 @@ import typer
 from geomech import terminal
 from geomech.commands.asked import allow, loaded
 from geomech.commands.names import scene_names
-from geomech.commands.options import FolderOption, MediumOption, YesOption
+from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
 from geomech.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"
@@ -20,6 +20,7 @@ SceneOrOurs = Annotated[
 ]
 
 
+@with_workers
 def run(
     name: SceneOrOurs = DEFAULT_SCENE,
     out: FolderOption = Path("results"),

@@ -18,7 +18,8 @@ def scenes(
 ):
     """The scenes that ship with the toolkit, and the named media."""
     import rft
-    from geomech.scene import builtin_names, intruder_names, load, walker_names
+    from geomech.scene import builtin_names, intruder_names, walker_names
+    from geomech.scene.read import builtin_text
     from geomech.scene.write import medium_toml, vertical_toml
     from rft.vertical import VERTICAL
 
@@ -30,7 +31,7 @@ def scenes(
         elif name in VERTICAL:
             print(vertical_toml(name, VERTICAL[name]), end="")
         else:
-            print(load(name).text, end="")
+            print(builtin_text(name), end="")
         return
     for title, names in (
         ("", builtin_names()),
@@ -40,7 +41,7 @@ def scenes(
         if title:
             print(title)
         for scene_name in names:
-            print(f"{scene_name:24} {load(scene_name).text.splitlines()[0].lstrip('# ')}")
+            print(f"{scene_name:24} {builtin_text(scene_name).splitlines()[0].lstrip('# ')}")
     print("\nmedia for [medium] name = ...")
     for medium_name, entry in rft.CATALOGUE.items():
         print(f"{medium_name:24} {entry.source}")

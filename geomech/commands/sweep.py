@@ -17,11 +17,13 @@ from geomech.commands.options import (
     check_outputs,
     parameter_kind,
     spread,
+    with_workers,
 )
 from geomech.errors import SceneError
 from geomech.files import note
 
 
+@with_workers
 def sweep(
     name: SceneArgument,
     over: Annotated[list[str], typer.Option(help="PARAM=START:STOP:COUNT or PARAM=A,B,...; as often as wanted")],
@@ -31,8 +33,8 @@ def sweep(
 ):
     """Net displacement, or speed of a robot that walks, over a grid of the scene's parameters. What is done is kept if
     interrupted, and taken up again."""
-    from geomech.output import plots, sweeps
-    from geomech.scene import WalkerScene, load
+    from geomech.output import sweeps
+    from geomech.scene import load
     from geomech.study import kept
     from geomech.study import sweep as sweeping
     from geomech.study.tables import of_pose
@@ -46,7 +48,7 @@ def sweep(
     check_netcdf(out)
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
-    walks = isinstance(load(name), WalkerScene)
+    walks = hasattr(load(name), "robot")
     scene = load(name) if walks else loaded(name)
     if walks:
         from geomech.output import walk_sweeps as sweeps
@@ -65,6 +67,8 @@ def sweep(
         try:
             sweeps.save(out, scene, results)
             if plot:
+                from geomech.output import plots
+
                 plots.save(sweeps.draw(scene, results), plot)
         except BaseException as error:
             if partial.exists():

@@ -39,6 +39,10 @@ class Request:
     loops: Loops | Undulations
     starts: int
 
+    def __reduce__(self) -> tuple:
+        """As it is sent to workers: without what is remembered."""
+        return Request, (self.scene, self.aim, self.loops, self.starts)
+
     @property
     def system(self) -> System:
         """The scene's; in the frame that it has by itself, where the search is, if the scene has another."""

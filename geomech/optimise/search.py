@@ -5,26 +5,27 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from geomech import metric
+from geomech import workers
 from geomech.connection import check_knobs
 from geomech.errors import named
 from geomech.files import note
 from geomech.gaits import Gait
 from geomech.optimise import loops as series
+from geomech.optimise import ways
 from geomech.optimise.climb import TRIES, climb
-from geomech.optimise.cycles import Brought, Phases, Runs, brought
+from geomech.optimise.cycles import Brought, brought
 from geomech.optimise.keeping import NEARLY, Keeping
 from geomech.optimise.limits import Asked
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
-from geomech.optimise.request import FINISH, NEAR, RUNS, Request, checked
+from geomech.optimise.request import CLIMB, FINISH, NEAR, RUNS, Request, checked
 from geomech.reconstruct import turning
 from geomech.scene.model import Scene
 from geomech.study import estimate
-from geomech.study.bench import Study
 
 NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
 FINISHED = 2  # answers of the table that the direct tier goes on from
@@ -32,6 +33,7 @@ TURNED = 0.02  # rad: what 128 phases leave of a net turn
 AS_MUCH = 1e-3  # of the value
 STRAIGHTENED = 4  # steps of Newton, at most
 LARGER = 0.6  # of the room: how far the scene's own gait goes the second time
+FINISHING = 1.0  # s from a start by the direct tier, likewise
 ENOUGH = 64  # harmonics that any start is told in
 
 
@@ -51,7 +53,7 @@ def optimise(
 def search(request: Request, progress: Callable | None = None) -> Optimum:
     """`optimise` of a request that is checked."""
     check_knobs(1, progress)
-    with named(request.scene.name):
+    with named(request.scene.name), workers.one_way(workers.MANY if request.starts > 1 else 1):
         return _Search(request, progress).optimum()
 
 
@@ -69,8 +71,8 @@ class _Search:
         own = r.loops.of(r.scene.gait)
         start = self._told(self._start())
         turn = abs(float(start.displacement[2]))
-        first, *others = r.loops.starts(own, r.starts)
-        self.keeping = Keeping(r.loops, r.system.singularity, first)
+        self.origin, *others = r.loops.starts(own, r.starts)
+        self.keeping = Keeping(r.loops, r.system.singularity, self.origin)
         found = self._climbed([self.keeping.first, *map(self.keeping.start, others)], turn)
         best, answers, p = start, [], None
         for q, times in found:
@@ -92,25 +94,23 @@ class _Search:
 
     def _climbed(self, starts: list[np.ndarray], turn: float) -> list[tuple[np.ndarray, int]]:
         """Different loops that the starts lead to, each with how many led there."""
-        r, tier = self.r, self._direct()
+        r, tier = self.r, ways.direct(self.r)
         if not r.looks_up:
-            most = RUNS if r.whole else NEAR
-            return self._different(self._near(tier, starts, turn, most))
-        near = self._near(self._table(), starts, turn, NEAR)
+            return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR))
+        looked_up = ways.looked_up(r)
+        near = self._near(ways.table(r, *looked_up), starts, turn, looked_up, NEAR)
         ranked = sorted(self._different(near), key=lambda found: -self._worth(tier, found[0], turn))[:FINISHED]
-        finished = [
-            max((self._up(tier, p, turn, FINISH, TOLERANCE), p), key=lambda q: self._worth(tier, q, turn))
-            for p, _ in ranked
-        ]
+        further = self._each([p for p, _ in ranked], turn, None, FINISH, TOLERANCE)
+        finished = [max(q, p, key=lambda q: self._worth(tier, q, turn)) for q, (p, _) in zip(further, ranked)]
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
 
-    def _near(self, cycles, starts: list[np.ndarray], turn: float, most: int) -> list[np.ndarray]:
+    def _near(self, cycles, starts: list[np.ndarray], turn: float, looked_up, most: int) -> list[np.ndarray]:
         """Where each start leads; the first twice, as it is and with another size, where many a
         loop is the best near by."""
         r = self.r
         rough = r.looks_up or r.system.singularity is not None
         twice = [self._larger(starts[0])] if rough else []
-        near = [self._up(cycles, p, turn, most, NEAR_TOLERANCE) for p in [*starts, *twice]]
+        near = self._each([*starts, *twice], turn, looked_up, most, NEAR_TOLERANCE)
         if twice:
             near[0] = max(near[0], near.pop(), key=lambda p: self._worth(cycles, p, turn))
         return near
@@ -121,6 +121,18 @@ class _Search:
         return self.keeping.start(
             self.r.loops.fitted(np.concatenate([p[:1], p[1:] * LARGER * self.r.loops.half.max() / size]))
         )
+
+    def _each(self, starts: list[np.ndarray], turn: float, looked_up, most: int, tolerance: float) -> list[np.ndarray]:
+        """Where each start leads, by the direct tier or what is ``looked_up``. Who computes: `geomech.workers`."""
+        at_hand = len(starts) == 1 and not workers.far()
+        how = Way(self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None)
+        ends, seconds = [], len(starts) * (CLIMB if looked_up else FINISHING)
+        for p, count in workers.each(_up_from, how, starts, len(starts), seconds=seconds):
+            ends.append(p)
+            self.count += count
+            if how.told is None:
+                self._tell(max(1, count))
+        return ends
 
     def _worth(self, tier, p, turn: float) -> float:
         """Value of a loop as the search sees it, none if it turns too much."""
@@ -137,14 +149,14 @@ class _Search:
         period = self.r.aim.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
         return self.r.aim.value(b, period)[0]
 
-    def _up(self, cycles, p, turn: float, most: int, tolerance: float) -> np.ndarray:
+    def _up(self, cycles, p, how: Way) -> np.ndarray:
         before = cycles.count
         p = climb(
-            cycles, self.r.aim, p, turn=turn, most=most, tolerance=tolerance, stroke=self.keeping.stroke,
-            singularity=self.r.system.singularity, away=self.keeping.away, told=self._tell,
+            cycles, self.r.aim, p, turn=how.turn, most=how.most, tolerance=how.tolerance, stroke=self.keeping.stroke,
+            singularity=self.r.system.singularity, away=self.keeping.away, told=how.told or (lambda: None),
         )  # fmt: skip
         self.count += cycles.count - before
-        return self._straightened(cycles, self.r.loops.fitted(p), turn)
+        return self._straightened(cycles, self.r.loops.fitted(p), how.turn)
 
     def _straightened(self, cycles, p, turn: float) -> np.ndarray:
         """The loop near by that turns no more than it may: the search may end a little beyond."""
@@ -158,8 +170,8 @@ class _Search:
             p = self.r.loops.fitted(p - more * slopes / ((slopes**2).sum() or 1.0))
         return p
 
-    def _tell(self) -> None:
-        self.done += 1
+    def _tell(self, cycles: int = 1) -> None:
+        self.done += cycles
         self.expected = max(self.expected, 1.1 * self.done)
         if self.progress:
             self.progress(self.done / self.expected)
@@ -178,25 +190,6 @@ class _Search:
     def _same(self, p, q) -> bool:
         loops = self.r.loops
         return series.same(p, q, self.r.system.mirror) if isinstance(loops, Loops) else loops.same(p, q)
-
-    def _direct(self) -> Phases | Runs:
-        r = self.r
-        degree = r.degree if r.aim.costs else 1.0
-        if r.whole:
-            return Runs(r.loops, r.system.run, r.aim.costs, degree, r.system.length)
-        velocity = _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
-        return Phases(r.loops, velocity, r.power if r.aim.costs else None, degree)
-
-    def _table(self) -> Phases:
-        """Cycles by the harmonics of the velocity, and those of the power if that is asked for."""
-        r, power = self.r, None
-        study = Study(r.scene.changed(system=r.system)).turned(extent=r.extent)
-        table = study.table("harmonic")
-        if r.aim.costs:
-            run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
-            norm = _inside(metric.fit_norm(run, table.axes).norm, (-r.extent, r.extent))
-            power = lambda alpha, alphadot, xi: norm(alpha, alphadot) ** r.degree
-        return Phases(r.loops, _inside(table.velocity, (-r.extent, r.extent)), power, r.degree if r.aim.costs else 1.0)
 
     def _start(self) -> Gait:
         """The gait to begin with; a note where that is not the scene's."""
@@ -283,6 +276,22 @@ class _Search:
         return Brought(*map(flat, (net, *brought(run, power, degree)[1:])))
 
 
-def _inside(look_up: Callable, box) -> Callable:
-    """A look-up that takes shapes beyond its field for those at its edge."""
-    return lambda alpha, alphadot: look_up(np.clip(alpha, *box), alphadot)
+class Way(NamedTuple):
+    """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`, or
+    None for the direct tier. told: whenever a cycle is done, where only one start is under way."""
+
+    r: Request
+    origin: np.ndarray
+    turn: float
+    looked_up: tuple | None
+    most: int
+    tolerance: float
+    told: Callable | None
+
+
+def _up_from(how: Way, p: np.ndarray) -> tuple[np.ndarray, int]:
+    """(where a start leads, cycles)."""
+    search = _Search(how.r, None)
+    search.keeping = Keeping(how.r.loops, how.r.system.singularity, how.origin)
+    cycles = ways.table(how.r, *how.looked_up) if how.looked_up else ways.direct(how.r)
+    return search._up(cycles, p, how), search.count

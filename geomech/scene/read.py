@@ -59,18 +59,26 @@ def _folder():
     return resources.files("geomech.scene") / "builtin"
 
 
+def builtin_text(name: str) -> str | None:
+    """The TOML of a built-in scene; None if there is none of that name."""
+    for folder, names in (
+        (_folder(), builtin_names()),
+        (_folder() / INTRUDERS, intruder_names()),
+        (_folder() / WALKERS, walker_names()),
+    ):
+        if name in names:
+            return (folder / f"{name}.toml").read_text(encoding="utf-8")
+    return None
+
+
 def load(scene: str | Path) -> Scene | Any:
     """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot]
     (Any, so that no type checker asks which); SceneError, one line, if it is not one."""
     if not isinstance(scene, (str, Path)):
         raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
-    names = builtin_names()
-    if str(scene) in names:
-        return parse((_folder() / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
-    for folder, some in ((INTRUDERS, intruder_names()), (WALKERS, walker_names())):
-        if str(scene) in some:
-            return parse((_folder() / folder / f"{scene}.toml").read_text(encoding="utf-8"), str(scene))
-    path = Path(scene)
+    if (text := builtin_text(str(scene))) is not None:
+        return parse(text, str(scene))
+    path, names = Path(scene), builtin_names()
     try:
         if path.suffix != ".toml" and not path.exists():
             choose("scene", str(scene), names + intruder_names() + walker_names())

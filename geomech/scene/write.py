@@ -8,26 +8,28 @@ import math
 import textwrap
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from geomech.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
-from geomech.scene.intruder import COEFFICIENTS
-from geomech.scene.intruding import Intruding
 from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
-from geomech.scene.walker import WalkerScene
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.said import name_in
 from geomech.systems.swimmer import PARTS, Swimmer
+
+if TYPE_CHECKING:
+    from geomech.scene.intruding import Intruding
+    from geomech.scene.walker import WalkerScene
 
 
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
     which a medium that came from a file stands, and other files with their folders. SceneError if it has a part that no
     scene file can name."""
-    other = isinstance(scene, (Intruding, WalkerScene))
+    other = not isinstance(scene, Scene) and hasattr(scene, "tables")  # without a gait
     whole = scene.text if other else checked_scene(scene).text and not (scene.files or _beside(scene.text))
     if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
@@ -66,6 +68,8 @@ def medium_toml(name: str, entry) -> str:
 def vertical_toml(name: str, entry) -> str:
     """The table of a medium of intruder scenes (`rft.vertical.VerticalEntry`), with its source above."""
     head = "".join(f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110))
+    from rft.vertical.stress import COEFFICIENTS
+
     told = dataclasses.asdict(entry.stress)
     values = {**{key.replace("m", "-"): told[key] for key in COEFFICIENTS}, "zeta": told["zeta"]}
     return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"

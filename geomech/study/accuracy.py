@@ -10,10 +10,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
+from geomech import workers
 from geomech.errors import SceneError, named
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
@@ -94,14 +95,19 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}; of a system whose velocity is not
     exact besides {"own_error": body lengths}, the largest that no setting takes away: errors of the cheapest include it.
 
-    runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell."""
+    runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell.
+    Seconds are of one thread's computing. Who computes: `geomech.workers`."""
     amplitudes = checked_scene(scene).gait.amplitude * FRACTIONS
-    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
-    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
-    truth = Study(finest.with_numerics(phases=_truth_phases(scene))).displacement("direct", None, amplitudes)
     knobs, lines = _knobs(scene), []
+    asked = [Asked(_finest(scene), "direct", 1)]
+    for knob in knobs:
+        asked += [Asked(_limit(scene, knob), knob.tier, 1)] if knob.against == "limit" else []
+        asked += [Asked(knob.turned(scene, value), knob.tier, _runs(scene, runs)) for value in knob.values]
+    found = workers.each(_answer, amplitudes, asked, len(asked))
+    true, _ = next(found)
     for done, knob in enumerate(knobs):
-        lines.append(_sweep(scene, knob, amplitudes, truth, _runs(scene, runs)))
+        truth = next(found)[0] if knob.against == "limit" else true
+        lines.append(_line(scene, knob, truth, [next(found) for _ in knob.values]))
         if progress:
             progress((done + 1) / len(knobs))
     own = float(scene.system.own_error(*scene.gait.cycle(scene.numerics.phases, amplitudes))[..., 0].max())
@@ -147,14 +153,36 @@ def _runs(scene: Scene, runs: int) -> int:
     return 1 if scene.system.steps else runs
 
 
-def _sweep(scene: Scene, knob: Knob, amplitudes, truth, runs: int) -> dict:
-    if knob.against == "limit":
-        truth = Study(_limit(scene, knob)).displacement(knob.tier, None, amplitudes)
-    errors, seconds = [], []
-    for value in knob.values:
-        poses, took = _timed(partial(_fresh, knob, scene, value, amplitudes), runs)
-        errors.append(float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.system.length) ** 2))))
-        seconds.append(took)
+class Asked(NamedTuple):
+    """Displacements of a scene by a tier, timed ``runs`` times."""
+
+    scene: Scene
+    tier: str
+    runs: int
+
+
+def _answer(amplitudes, asked: Asked) -> tuple[np.ndarray, float]:
+    """(poses, seconds), tables built anew so that their cost is counted. The quickest run counts, so that what a first call
+    loads and warms does not."""
+    times = []
+    for _ in range(asked.runs):
+        start = time.thread_time()
+        poses = Study(asked.scene).displacement(asked.tier, None, amplitudes)
+        times.append(time.thread_time() - start)
+    return poses, min(times)
+
+
+def _finest(scene: Scene) -> Scene:
+    """The scene as the truth has it."""
+    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
+    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
+    return finest.with_numerics(phases=_truth_phases(scene))
+
+
+def _line(scene: Scene, knob: Knob, truth: np.ndarray, found: list[tuple[np.ndarray, float]]) -> dict:
+    """A knob's errors and seconds, by what `_answer` gave for its values."""
+    rms = lambda poses: float(np.sqrt(np.mean((estimate.distance(poses, truth) / scene.system.length) ** 2)))
+    errors, seconds = [rms(poses) for poses, _ in found], [took for _, took in found]
     entry = {"label": knob.label, "tier": knob.tier, "knob": knob.name, "order": knob.order, "against": knob.against}
     slope = _slope(knob, errors)
     return {**entry, "buys": knob.buys, "value": list(knob.values), "error": errors, "seconds": seconds, "slope": slope}
@@ -165,21 +193,6 @@ def _limit(scene: Scene, knob: Knob) -> Scene:
     if knob.setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
         return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
     return scene.with_numerics(**{knob.setting: FINEST[knob.setting]})
-
-
-def _fresh(knob: Knob, scene: Scene, value, amplitudes):
-    """The displacement with the knob at ``value``, tables built anew so that their cost is counted."""
-    return Study(knob.turned(scene, value)).displacement(knob.tier, None, amplitudes)
-
-
-def _timed(f: Callable, runs: int):
-    """(value, seconds): the quickest of some runs, so that what a first call loads and warms is not counted."""
-    times = []
-    for _ in range(runs):
-        start = time.perf_counter()
-        value = f()
-        times.append(time.perf_counter() - start)
-    return value, min(times)
 
 
 def _slope(knob: Knob, errors) -> float | None:

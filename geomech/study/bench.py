@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
 
 from geomech.connection import Connection, even_part
 from geomech.curvature import ccf
@@ -81,8 +80,9 @@ class Study:
         """(what was made, the seconds that took, whether it was there before)."""
         s = self.scene
         key = what, s.system, *(getattr(s.numerics, name) for name in depends_on), *reach
-        there = key in self._tables
-        if not there:
+        if not (there := key in self._tables):
+            import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
+
             self._tables[key] = timed(make)
         return *self._tables[key], there
 

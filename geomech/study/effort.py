@@ -9,6 +9,7 @@ and along itself, as far in the same time.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     grid, degree = axes(system, numerics), numerics.interpolation
     if system.cost is not None or system.linear:
         return metric.fit(system.cost or system.power, grid, degree, progress)
-    norm = lambda *at: _norm(system.power(*at), system.power_degree)
+    norm = partial(_norm_of, system)
     count = TIERS["harmonic"].directions(system, numerics)
     return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
 
@@ -111,10 +112,23 @@ class _Watched:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.system, name)
 
-    def velocity(self, alpha, alphadot) -> np.ndarray:
-        xi, power = self.system.driven(alpha, alphadot)
-        self.powers.append(power)
-        return xi
+    @property
+    def velocity(self) -> _Driven:
+        return _Driven(self.system, self.powers)
+
+
+class _Driven(connection.Telling):
+    """The velocity of a system, which tells the power besides."""
+
+    def __init__(self, system: System, powers: list):
+        self.both, self.heard = system.driven, powers.append
+
+    def __reduce__(self) -> tuple:
+        return _Driven, (self.both.__self__, [])
+
+
+def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
+    return _norm(system.power(alpha, alphadot), system.power_degree)
 
 
 def _norm(power, degree: float) -> np.ndarray:

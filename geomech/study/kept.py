@@ -1,21 +1,33 @@
 """The rows of an unfinished sweep, in a file of its question's own that is believed only if it is whole, and the lock that
-keeps two sweeps from one output."""
+keeps two sweeps from one output.
+
+The file is a line of JSON, the question with its checksum, and behind it blocks of rows as they come: their number, a
+checksum, and the numbers themselves, eight bytes each. What a kill leaves of a last block is dropped.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import math
 import os
+import struct
+import time
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
 
 from geomech.errors import SceneError
-from geomech.files import hidden, locked, note, read, sweep_strays, whole_file, why
+from geomech.files import hidden, locked, note, sweep_strays, whole_file, why
 
-LARGEST = 1_000_000_000  # bytes: ten times what a million rows take
+LARGEST = 10_000_000  # bytes of the first line
 VERSIONS = {"geomech", "solver"}  # of a question: what another one left cannot be taken up any more
 WIDTH = 5  # numbers in a row: x, y, theta and the errors of position and heading
+BLOCK = struct.Struct("<QI")  # rows, and the checksum of their bytes
+SAVE_EVERY = 2.0  # seconds between savings of what there is
 
 
 def beside(output: Path, question: dict) -> Path:
@@ -35,9 +47,9 @@ def is_second(output: Path, partial: Path) -> bool:
 def _is_anothers(path: Path, question: dict) -> bool:
     """Whether a file keeps, undamaged, what is done of another sweep; that of another version is none."""
     try:
-        found = json.loads(read(path, LARGEST))
-        whole = found.pop("checksum") == _checksum(found)
-        return whole and any(found["question"][key] != question[key] for key in {*question} - VERSIONS)
+        with _opened(path, "rb") as file:
+            found = _head(file)["question"]
+        return any(found[key] != question[key] for key in {*question} - VERSIONS)
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError):
         return False
 
@@ -63,52 +75,146 @@ def _plain(output: Path) -> Path:
     return output.resolve() if ".." in output.parts else output
 
 
-def keep(path: Path, question: dict, rows: list) -> None:
-    """Write the rows there are, beside the question they answer (JSON); the file appears whole or not at all."""
-    body = {"question": question, "rows": rows}
+class Rows:
+    """The rows done so far of a sweep, (total, width) when all are, saved to ``path`` every now and then, and when computing
+    ends for whatever reason. settled: the back end they are computed by, `geomech.workers.settle`; that of what is taken
+    up goes on."""
+
+    def __init__(self, path: Path | None, question: dict, total: int, settled: str = "", width: int = WIDTH):
+        self.path, self.total, self.told = path, total, False
+        self.question, self.settled, done = question, settled, np.zeros((0, width))
+        self.end = 0  # bytes of the file that are believed
+        if path is not None:
+            self.settled, done, self.end = taken_up(path, question, total, width) or (settled, done, 0)
+        self.values = np.empty((total, width))
+        self.values[: len(done)] = done
+        self.count = self.saved = len(done)
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def __len__(self) -> int:
+        return self.count
+
+    def add(self, rows) -> None:
+        rows = np.asarray(rows, float)
+        self.values[self.count : self.count + len(rows)] = rows
+        self.count += len(rows)
+        if time.monotonic() > self.due:
+            self._save()
+
+    def _save(self) -> None:
+        """A disk that is full now is no reason to lose what is computed."""
+        if self.path and self.count > self.saved:
+            try:
+                if not self.end:
+                    self.end = begin(self.path, self.question, self.settled)
+                self.end = append(self.path, self.end, self.values[self.saved : self.count])
+                self.saved = self.count
+            except (SceneError, OSError) as error:
+                if not self.told:
+                    note(f"what is done of the sweep is not kept: {error}")
+                self.told = True
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def __enter__(self) -> Rows:
+        return self
+
+    def __exit__(self, kind, error, _) -> None:
+        self._save()
+        if error and self.path and self.saved:
+            told = f"{self.saved} of {self.total} points are kept in {self.path}: the same command goes on from there"
+            error.add_note(told)
+
+
+def begin(path: Path, question: dict, settled: str = "") -> int:
+    """A file without rows yet; it appears whole or not at all. The bytes it has."""
+    body = {"question": question, "settled": settled}
+    line = json.dumps({**body, "checksum": _checksum(body)}).encode() + b"\n"
     with whole_file(path) as part:
-        part.write_text(json.dumps({**body, "checksum": _checksum(body)}), encoding="utf-8")
+        part.write_bytes(line)
+    return len(line)
 
 
-def taken_up(path: Path | None, question: dict, points: int) -> list:
-    """The rows kept, of at most ``points``, for the same question; else none, and what is there is set aside, with a
-    note that says why. SceneError if it is no file, or cannot be set aside."""
-    if path is None:
-        return []
+def append(path: Path, end: int, rows: np.ndarray) -> int:
+    """Write rows behind the first ``end`` bytes; where they end."""
+    raw = np.ascontiguousarray(rows, "<f8").tobytes()
+    with _opened(path, "r+b") as file:
+        file.truncate(end)
+        file.seek(end)
+        file.write(BLOCK.pack(len(rows), zlib.crc32(raw)) + raw)
+    return end + BLOCK.size + len(raw)
+
+
+def taken_up(path: Path, question: dict, points: int, width: int = WIDTH) -> tuple[str, np.ndarray, int] | None:
+    """(back end, rows kept, bytes of the file that they take), of at most ``points``, for the same question; else None, and
+    what is there is set aside, with a note that says why. SceneError if it is no file, or cannot be set aside."""
     try:
         sweep_strays(path.resolve())
         if not os.path.lexists(path):
-            return []
+            return None
         if not path.is_file():
             raise SceneError(
                 f"cannot keep what is done in {path}: it is no ordinary file; remove it, or choose another -o"
             )
-        return _believed(read(path, LARGEST), json.loads(json.dumps(question)), points)
+        with _opened(path, "rb") as file:
+            return _believed(file, json.loads(json.dumps(question)), points, width)
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError) as error:
         _set_aside(path, str(error) if type(error) is _Unbelievable else f"it is damaged ({type(error).__name__})")
-    return []
+    return None
+
+
+def _opened(path: Path, mode: str) -> BinaryIO:
+    """An ordinary file; nobody waits for another end of a pipe."""
+    if not path.is_file():
+        raise OSError("it is no ordinary file")
+    return path.open(mode)
 
 
 class _Unbelievable(ValueError):
     """Its text says what is wrong with a file that is kept."""
 
 
-def _believed(raw: bytes, question: dict, points: int) -> list:
-    found = json.loads(raw)
+def _head(file: BinaryIO) -> dict:
+    """What the first line says."""
+    found = json.loads(file.readline(LARGEST))
     if found.pop("checksum") != _checksum(found):
         raise _Unbelievable("it is damaged (checksum)")
+    return found
+
+
+def _believed(file: BinaryIO, question: dict, points: int, width: int) -> tuple[str, np.ndarray, int]:
+    found = _head(file)
     if other := [key for key, value in question.items() if found["question"].get(key) != value]:
         raise _Unbelievable(f"it is of another sweep ({', '.join(other)})")
-    rows = found["rows"]
-    if not (isinstance(rows, list) and len(rows) <= points and all(map(_is_row, rows))):
+    if found["settled"] not in ("", "numpy", "numba"):
+        raise _Unbelievable("its back end is unknown")
+    rows, end = np.empty((points, width)), file.tell()
+    done = 0
+    for count, raw in _blocks(file, width):
+        if done + count > points:
+            raise _Unbelievable("its rows are not those of this sweep")
+        rows[done : done + count] = np.frombuffer(raw, "<f8").reshape(count, width)
+        done, end = done + count, file.tell()
+    if not np.isfinite(rows[:done]).all():
         raise _Unbelievable("its rows are not those of this sweep")
-    return rows
+    return found["settled"], rows[:done], end
 
 
-def _is_row(row) -> bool:
-    return isinstance(row, list) and len(row) == WIDTH and all(type(x) is float and math.isfinite(x) for x in row)
+def _blocks(file: BinaryIO, width: int) -> Iterator[tuple[int, bytes]]:
+    """(rows, their bytes) of each whole block."""
+    start = file.tell()
+    left = file.seek(0, os.SEEK_END) - start
+    file.seek(start)
+    while left >= BLOCK.size:
+        count, checksum = BLOCK.unpack(file.read(BLOCK.size))
+        left -= BLOCK.size + 8 * width * count
+        if left < 0:  # a kill in the middle of it
+            return
+        raw = file.read(8 * width * count)
+        if zlib.crc32(raw) != checksum:
+            raise _Unbelievable("it is damaged (checksum)")
+        yield count, raw
 
 
 def _checksum(body: dict) -> str:

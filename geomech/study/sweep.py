@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import time
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from geomech import __version__
+from geomech import __version__, workers
 from geomech.errors import SceneError, real_array, short
-from geomech.files import note
 from geomech.kinds import code
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
@@ -24,13 +24,12 @@ from geomech.study.results import Swept
 from geomech.study.tables import of_pose
 from rft import SOLVER
 
-LARGEST = 1_000_000  # points
+LARGEST = 100_000_000  # points
+HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
 FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
 LENGTHS = "body", "physical", "system", "length"
-SAVE_EVERY = 2.0  # seconds between savings of what there is, and more where saving takes long:
-PATIENCE = 20  # times as long
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
@@ -76,29 +75,24 @@ def sweep(
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
     solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
-    asked for; it is the caller's to remove, once the results are saved. SceneError if a point of the grid makes no scene.
+    asked for; it is the caller's to remove, once the results are saved. Who computes: `geomech.workers`. SceneError if a
+    point of the grid makes no scene.
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
     solved = tuple(1 if name in _idle(scene, names) else n for name, n in zip(names, shape))
     if not (partial is None or (isinstance(partial, (str, Path)) and str(partial))):
         raise SceneError(f"partial must be the path of a file, got {short(partial)}")
-    partial = partial and Path(partial)
-    told, doubtful = progress or (lambda fraction: None), uncertainty.uncertain(scene.system)
-    with Rows(partial, question(scene, values), int(np.prod(solved))) as rows:
-        while len(rows) < rows.total:
-            k, done = divmod(len(rows), len(amplitudes or [0]))  # points, of which amplitudes run fastest
-            first = _scene_at(tables, scene, names, points[k])
-            most = min(SAMPLES_TOGETHER, first.system.at_once(first.numerics.phases))
-            beyond = points[k + 1 : k + max(1, most // len(amplitudes or [0]))] if done == 0 else []
-            batch = [first, *(_scene_at(tables, scene, names, p) for p in beyond)]
-            rows.add(_rows(batch, amplitudes[done : done + most] if amplitudes else None))
-            told(len(rows) / rows.total * (0.4 if doubtful else 1.0))
-    flat = np.array(list(rows))
-    if doubtful:
-        at = lambda point: _scene_at(tables, scene, names, point)
-        flat = np.column_stack([flat, _doubts(at, points, amplitudes, lambda done: told(0.4 + 0.6 * done))])
-    flat = flat.reshape(*solved, -1)
+    at = _At(tables, scene, tuple(names))
+    parts = -(-points.total * len(amplitudes or [0]) // SAMPLES_TOGETHER)
+    doubtful = uncertainty.uncertain(scene.system)
+    kept_as = partial and Path(partial), question(scene, values), int(np.prod(solved)), workers.settle(parts)
+    with kept.Rows(*kept_as, kept.WIDTH + 2 * doubtful) as rows:
+        for found in workers.each(_part, at, _parts(at, points, amplitudes, len(rows)), parts, rows.settled):
+            rows.add(found)
+            if progress:
+                progress(len(rows) / rows.total)
+    flat = rows.values.reshape(*solved, -1)
     flat = np.broadcast_to(flat, (*shape, flat.shape[-1]))
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
@@ -136,12 +130,12 @@ def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
 def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     """Of `sweep`, by some of its points; SceneError as there."""
     tables, names, values, points = _grid(scene, over)
-    total = len(points) * len(values.get(AMPLITUDE, [0]))
-    some = [_scene_at(tables, scene, names, points[k]) for k in {0, len(points) // 2, len(points) - 1}]
+    total, at = points.total * len(values.get(AMPLITUDE, [0])), _At(tables, scene, tuple(names))
+    some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
     jobs = [direct(s, s.gait, total, s.numerics.phases, SAMPLES_TOGETHER) + of_medium(s, s.gait, total) for s in some]
-    each = list(map(price, jobs))
-    balances, seconds, memory = np.array(each).T
-    return Cost(round(balances.mean()), float(seconds.mean()), float(memory.max()))
+    balances, seconds, _ = np.array(list(map(price, jobs))).T
+    held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
+    return Cost(round(balances.mean()), float(seconds.mean()), max(held) + HELD * total)
 
 
 def _grid(scene: Scene, over: Mapping[str, list[float]]):
@@ -154,20 +148,31 @@ def _grid(scene: Scene, over: Mapping[str, list[float]]):
         )
     names = [k for k in over if k != AMPLITUDE] + [k for k in over if k == AMPLITUDE]  # amplitudes innermost: one batch
     values = {k: listed(k, over[k]) for k in names}
-    total = int(np.prod([len(v) for v in values.values()])) if names else 0
+    total = math.prod(len(v) for v in values.values()) if names else 0
     if not 0 < total <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
+        raise SceneError(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
     outer = [values[k] for k in names if k != AMPLITUDE]
     tables = written.tables(scene)
     if any(name.startswith("medium.") for name in names):
         tables = written.spelled_out(tables, scene)
     for corner in _corners(outer):
-        at = _scene_at(tables, scene, names, corner)  # refuse before computing
-        if uncertainty.uncertain(at.system):
-            uncertainty.sigma_points(at)
+        there = _At(tables, scene, tuple(names))(corner)  # refuse before computing
+        if uncertainty.uncertain(there.system):
+            uncertainty.sigma_points(there)
     idle = _idle(scene, names)
     some = [values[k][:1] if k in idle else values[k] for k in names if k != AMPLITUDE]
-    return tables, names, values, list(itertools.product(*some))
+    return tables, names, values, Points(some)
+
+
+class Points:
+    """The points of a grid, the last parameter running fastest, none of them held: there may be millions."""
+
+    def __init__(self, axes: list[list[float]]):
+        self.axes, self.sizes = axes, tuple(map(len, axes))
+        self.total = math.prod(self.sizes)
+
+    def __getitem__(self, k: int) -> tuple[float, ...]:
+        return tuple(axis[i] for axis, i in zip(self.axes, np.unravel_index(k, self.sizes))) if self.axes else ()
 
 
 def listed(name: str, values) -> list[float]:
@@ -193,43 +198,6 @@ def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     return {"geomech": __version__, "solver": SOLVER, **own, "scene": scene.text, **parts, "over": over}
 
 
-class Rows(list):
-    """The rows done so far, saved to ``path`` every now and then, and when computing ends for whatever reason."""
-
-    def __init__(self, path: Path | None, question: dict, total: int):
-        super().__init__(kept.taken_up(path, question, total))
-        self.path, self.question, self.total, self.saved, self.told = path, question, total, len(self), False
-        self.due = time.monotonic() + SAVE_EVERY
-
-    def add(self, rows: list) -> None:
-        self += rows
-        if time.monotonic() > self.due:
-            self._save()
-
-    def _save(self) -> None:
-        """A disk that is full now is no reason to lose what is computed."""
-        start = time.monotonic()
-        if self.path and len(self) > self.saved:
-            try:
-                kept.keep(self.path, self.question, list(self))
-                self.saved = len(self)
-            except (SceneError, OSError) as error:
-                if not self.told:
-                    note(f"what is done of the sweep is not kept: {error}")
-                self.told = True
-        now = time.monotonic()
-        self.due = now + max(SAVE_EVERY, PATIENCE * (now - start))
-
-    def __enter__(self) -> Rows:
-        return self
-
-    def __exit__(self, kind, error, _) -> None:
-        self._save()
-        if error and self.path and self.saved:
-            told = f"{self.saved} of {self.total} points are kept in {self.path}: the same command goes on from there"
-            error.add_note(told)
-
-
 def _corners(outer: list[list[float]]):
     """The grid's corners, and every value of each parameter with the others at their first."""
     yield from itertools.product(*([v[0], v[-1]] for v in outer))
@@ -237,10 +205,42 @@ def _corners(outer: list[list[float]]):
         yield from ([*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])] for x in values)
 
 
-def _scene_at(tables: dict, scene: Scene, names, point) -> Scene:
-    for name, value in zip(names, point):
-        tables = changed(tables, name, value)
-    return from_tables(tables, scene.name, scene.text)
+class _At(NamedTuple):
+    """The scene at a point of a grid."""
+
+    tables: dict
+    scene: Scene
+    names: tuple[str, ...]
+
+    def __call__(self, point) -> Scene:
+        tables = self.tables
+        for name, value in zip(self.names, point):
+            tables = changed(tables, name, value)
+        return from_tables(tables, self.scene.name, self.scene.text)
+
+
+def _parts(at: _At, points: Points, amplitudes: list[float] | None, done: int) -> Iterator[tuple]:
+    """What is solved together of all that is not done, in order: (scenes, or their points, amplitudes)."""
+    count, total = len(amplitudes or [0]), points.total * len(amplitudes or [0])
+    while done < total:
+        k, j = divmod(done, count)  # points, of which amplitudes run fastest
+        first = at(points[k])
+        most = min(SAMPLES_TOGETHER, first.system.at_once(first.numerics.phases))
+        here = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
+        some = amplitudes[j : j + most] if amplitudes else None
+        batch = [points[i] for i in here]
+        yield [at(p) for p in batch] if at.scene.files else batch, some  # files need not be where it is computed
+        done += len(here) * len(some or [0])
+
+
+def _part(at: _At, part: tuple) -> np.ndarray:
+    """Rows of a part."""
+    batch, amplitudes = part
+    scenes = [p if isinstance(p, Scene) else at(p) for p in batch]
+    rows = np.array(_rows(scenes, amplitudes))
+    if uncertainty.uncertain(at.scene.system):
+        rows = np.column_stack([rows, _together(scenes, amplitudes, _doubt)])
+    return rows
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
@@ -263,18 +263,7 @@ def _together(scenes: list[Scene], amplitudes, solve: Callable) -> list:
     return list(itertools.chain(*rows))
 
 
-def _doubts(at: Callable, points, amplitudes: list[float] | None, progress: Callable) -> np.ndarray:
-    """What the medium's uncertainty does to the positions, body lengths, and headings, rad, of every point: (N, 2). at: gives
-    the scene at a point. These are not kept: they are soon computed anew, beside the rest."""
-    size, rows = max(1, SAMPLES_TOGETHER // len(amplitudes or [0])), []
-    for k in range(0, len(points), size):
-        scenes = [at(p) for p in points[k : k + size]]
-        for j in range(0, len(amplitudes or [0]), SAMPLES_TOGETHER):  # one point alone where there are so many
-            rows += _together(scenes, amplitudes and amplitudes[j : j + SAMPLES_TOGETHER], _doubt)
-        progress(min(1.0, (k + size) / len(points)))
-    return np.array(rows)
-
-
 def _doubt(joined: Scene) -> np.ndarray:
+    """What the medium's uncertainty does to positions, body lengths, and headings, rad: (N, 2)."""
     found = uncertainty.of_medium(joined, joined.gait, None)
     return np.column_stack([found["position"] / joined.system.length, found["heading"]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -13,13 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import __version__
+from geomech import __version__, workers
 from geomech.errors import SceneError, named
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
 from geomech.study import kept
 from geomech.study.cost import BASE, Cost
-from geomech.study.sweep import LARGEST, Rows, changed, listed
+from geomech.study.kept import Rows
+from geomech.study.sweep import LARGEST, Points, changed, listed
 from rft import SOLVER
 from rft.walking import Walk, engine
 
@@ -95,19 +97,39 @@ def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progre
     """{"over": {parameter: values}, "speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}: as
     `geomech.study.sweep.sweep`, which keeps what is done."""
     tables, values, points = _grid(scene, over)
-    shape, at = tuple(map(len, values.values())), lambda point: _scene_at(tables, scene, list(values), point)
-    with Rows(partial and Path(partial), question(scene, values), len(points)) as rows:
-        while len(rows) < rows.total:
-            scenes = [at(p) for p in points[len(rows) : len(rows) + TOGETHER]]
-            alike = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
-            for one in (w for _, some in alike for w in walked(list(some), settling=True)):
-                kind = float(STATUSES.index(one.walk.status))
-                rows.add([[one.walk.speed, one.estimate, kind, one.walk.cycles, 0.0]])
+    shape, at = tuple(map(len, values.values())), _At(tables, scene, tuple(values))
+    parts = -(-points.total // TOGETHER)
+    with Rows(partial and Path(partial), question(scene, values), points.total, workers.settle(parts)) as rows:
+        left = range(len(rows), points.total, TOGETHER)
+        some = ([points[i] for i in range(k, min(k + TOGETHER, points.total))] for k in left)
+        for found in workers.each(_part, at, some, parts, rows.settled):
+            rows.add(found)
             if progress:
                 progress(len(rows) / rows.total)
-    speed, estimate, kinds, cycles, _ = np.moveaxis(np.array(list(rows)).reshape(*shape, 5), -1, 0)
+    speed, estimate, kinds, cycles, _ = np.moveaxis(rows.values.reshape(*shape, 5), -1, 0)
     status = np.array(STATUSES)[kinds.astype(int)]
     return {"over": values, "speed": speed, "estimate": estimate, "status": status, "cycles": cycles}
+
+
+class _At(NamedTuple):
+    """The scene at a point of a grid."""
+
+    tables: dict
+    scene: WalkerScene
+    names: tuple[str, ...]
+
+    def __call__(self, point) -> WalkerScene:
+        tables = self.tables
+        for name, value in zip(self.names, point):
+            tables = changed(tables, name, value)
+        return from_tables(tables, self.scene.name, self.scene.text)
+
+
+def _part(at: _At, points: list) -> list[list[float]]:
+    """Rows of some points: speed, its error, status, cycles."""
+    alike = itertools.groupby(map(at, points), key=lambda s: (s.numerics, s.engine))
+    found = [one for _, some in alike for one in walked(list(some), settling=True)]
+    return [[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles, 0.0] for w in found]
 
 
 def question(scene: WalkerScene, values: Mapping) -> dict:
@@ -125,30 +147,25 @@ def question(scene: WalkerScene, values: Mapping) -> dict:
 def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
     """Of `sweep`; SceneError if a point of the grid makes no scene."""
     tables, values, points = _grid(scene, over)
-    some = [_scene_at(tables, scene, list(values), p) for p in (points[0], points[-1])]
+    at = _At(tables, scene, tuple(values))
+    some = [at(points[0]), at(points[points.total - 1])]
     for one in some:
         refuse_engine(one)
-    return max((price(s, len(points), settling=True) for s in some), key=lambda c: c.seconds)
+    return max((price(s, points.total, settling=True) for s in some), key=lambda c: c.seconds)
 
 
 def _grid(scene: WalkerScene, over: Mapping):
     """(tables of the scene, values by parameter, points); SceneError if a point of the grid makes no scene."""
     values = {k: listed(k, v) for k, v in over.items()}
-    total = int(np.prod([len(v) for v in values.values()]))
+    total = math.prod(map(len, values.values()))
     if not 0 < total <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST} points, got {total}")
+        raise SceneError(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
     read = tomllib.loads(scene.text)
     tables = read if read and from_tables(read, scene.name, scene.text) == scene else scene.tables()
-    points = list(itertools.product(*values.values()))
-    for point in points[:: max(1, len(points) // 200)] + points[-1:]:
-        _scene_at(tables, scene, list(values), point)
+    points, at = Points(list(values.values())), _At(tables, scene, tuple(values))
+    for k in {*range(0, points.total, max(1, points.total // 200)), points.total - 1}:
+        at(points[k])
     return tables, values, points
-
-
-def _scene_at(tables: dict, scene: WalkerScene, names, point) -> WalkerScene:
-    for name, value in zip(names, point):
-        tables = changed(tables, name, value)
-    return from_tables(tables, scene.name, scene.text)
 
 
 def partial(scene: WalkerScene, over: Mapping, output: Path) -> Path:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rft.media.base import check_ranges, real_array, require, shown
 from rft.spatial.mesh import Mesh
 from rft.vertical.motions import FARTHEST, MOST_SAMPLES, SPEEDS, Motion
 from rft.vertical.outline import LARGEST, check_metres
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 WIDEST = 2.0  # rad between two poses of a path
 
@@ -132,7 +134,7 @@ class Rotate(Motion):
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
-        rotation = Rotation.from_rotvec(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
+        rotation = _turned(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
         velocity = np.broadcast_to(self.speed * _ahead(self.heading, 0.0), rotation.shape[:2])
         place = velocity * t[:, None] + [0.0, 0.0, self.hub_height]
         return Passage(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
@@ -178,9 +180,7 @@ class Path(Motion):
         return len(self.t)
 
     def _rotations(self) -> Rotation:
-        return Rotation.from_rotvec(
-            np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3))
-        )
+        return _turned(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
 
     def passage(self, mesh: Mesh) -> Passage:
         t, place, turns = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
@@ -189,6 +189,13 @@ class Path(Motion):
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
+
+
+def _turned(vectors) -> Rotation:
+    """By rotation vectors (..., 3)."""
+    from scipy.spatial.transform import Rotation  # which takes a fifth of a second to load
+
+    return Rotation.from_rotvec(vectors)
 
 
 def _spins(t, turns: Rotation) -> np.ndarray:
@@ -217,7 +224,7 @@ def _hold(motion) -> None:
 
 
 def _matrix(vector) -> np.ndarray:
-    return Rotation.from_rotvec(vector).as_matrix()
+    return _turned(vector).as_matrix()
 
 
 def _ahead(heading: float, direction: float) -> np.ndarray:

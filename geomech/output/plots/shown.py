@@ -24,3 +24,8 @@ class ShownAxes(Axes):
 
     def _repr_png_(self) -> bytes:
         return self.get_figure(root=True)._repr_png_()
+
+    def _update_title_position(self, renderer) -> None:
+        """Matplotlib measures all ticks to place titles above them, whether there are any or not: a tenth of a drawing."""
+        if any(title.get_text() for title in (self.title, self._left_title, self._right_title)):
+            super()._update_title_position(renderer)

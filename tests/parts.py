@@ -1,0 +1,62 @@
+"""What the tests of workers give away: functions of a module that loads at once."""
+
+import os
+import signal
+import time
+import warnings
+from pathlib import Path
+
+from geomech import workers
+from geomech.errors import SceneError, UnitWarning
+from rft import backend
+from rft.workers import workers as threads
+
+
+def doubled(by, x):
+    return by * x
+
+
+def who(_, x):
+    """What a worker is, and what it may take."""
+    return os.getpid(), threads(None, 100), backend._settled.get(), workers._crew.get(), x
+
+
+def dies(folder, x):
+    """Ends its own process, by its own id, the first time that it is asked for 3."""
+    mark = Path(folder) / "died"
+    if x == 3 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def always_dies(_, x):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fails(_, x):
+    if x == 2:
+        raise SceneError("no such thing as 2")
+    return x
+
+
+class Odd(Exception):
+    """An error that cannot be sent."""
+
+    def __init__(self, a, b):
+        super().__init__(f"{a} and {b}")
+
+
+def fails_oddly(_, x):
+    raise Odd(1, x)
+
+
+def notes(_, x):
+    warnings.warn("an angle of 400 rad is large", UnitWarning, stacklevel=1)
+    print("said aside")
+    return x
+
+
+def waits(folder, x):
+    (Path(folder) / str(os.getpid())).touch()
+    time.sleep(60)

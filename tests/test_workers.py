@@ -1,0 +1,275 @@
+"""Work shared by processes and clusters: the same digits whoever computes, nothing lost when a worker is ended."""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from parts import always_dies, dies, doubled, fails, fails_oddly, notes, waits, who
+from test_cli import geomech
+
+from geomech import connection, kinds, metric, terminal, workers
+from geomech import scene as scenes
+from geomech.errors import Note, SceneError, UnitWarning
+from geomech.optimise import checked, search
+from geomech.study import accuracy, sweep
+from geomech.study.bench import Study
+from geomech.workers import processes
+from rft import backend
+from rft.workers import cores
+from rft.workers import workers as threads
+
+GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Two processes, for all tests that leave them alive."""
+    with workers.using(2):
+        yield workers._crew.get()
+
+
+@pytest.fixture
+def given_away(monkeypatch):
+    """All work goes to others, however small."""
+    monkeypatch.setattr(workers, "WORTH", 0.0)
+
+
+def each(crew, f, common, items, parts=100, **known):
+    token = workers._crew.set(crew)
+    try:
+        return list(workers.each(f, common, items, parts, **{"seconds": 1e9, **known}))
+    finally:
+        workers._crew.reset(token)
+
+
+def test_results_come_in_order(two):
+    found = each(two, doubled, np.array([1.0, 2.0]), range(40))
+    np.testing.assert_array_equal(found, np.outer(range(40), [1.0, 2.0]))
+
+
+def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(two):
+    found = each(two, who, None, range(20), back_end="numpy")
+    assert {x[1:4] for x in found} == {(1, "numpy", None)}
+    pids = {x[0] for x in found}
+    assert len(pids) == 2 and os.getpid() not in pids
+    assert {x[:4] for x in each(None, who, None, range(2), back_end="numba")} == {(os.getpid(), 1, "numba", None)}
+    assert threads(None, 100) == cores() and backend._settled.get() == ""  # and it is over
+
+
+def test_what_is_settled_leaves_no_trace_in_what_auto_takes(monkeypatch):
+    """Else the digits of what follows in this process would hang on how much of the work others did."""
+    monkeypatch.setattr(backend.AUTO, "worked", 0.0)
+    with backend.settled("numpy"), backend.counted("auto"):
+        sum(range(100_000))
+    assert backend.AUTO.worked == 0.0
+    with backend.counted("auto"):
+        sum(range(100_000))
+    assert backend.AUTO.worked > 0.0
+
+
+def test_what_is_small_is_done_here(two):
+    here = each(two, who, None, range(5), 5, seconds=None)
+    assert {x[0] for x in here} == {os.getpid()}
+    assert {x[0] for x in each(two, who, None, range(5), 5, seconds=1.0)} == {os.getpid()}
+    assert {x[0] for x in each(two, who, None, [7], 1, seconds=1e9)} == {os.getpid()}  # there is nothing to share
+
+
+def test_what_turns_out_to_take_long_is_given_away(two, monkeypatch):
+    monkeypatch.setattr(workers, "WORTH", 1e-9)
+    found = each(two, who, None, range(6), 6, seconds=None)
+    assert [x[-1] for x in found] == [*range(6)]
+    assert [x[0] == os.getpid() for x in found] == [True, True, False, False, False, False]
+
+
+def test_an_ended_worker_loses_nothing(tmp_path):
+    with workers.using(2):
+        assert each(workers._crew.get(), dies, str(tmp_path), range(8)) == [*range(8)]
+        with pytest.raises(RuntimeError, match="ended 3 times at the same part .signal 9.: out of memory"):
+            each(workers._crew.get(), always_dies, None, [0])
+        assert each(workers._crew.get(), doubled, 2, range(4)) == [0, 2, 4, 6]
+
+
+def test_errors_and_notes_come_back_and_what_is_printed_is_no_answer(two):
+    with pytest.raises(SceneError, match="no such thing as 2"):
+        each(two, fails, None, range(4))
+    with pytest.raises(RuntimeError, match="Odd: 1 and 5"):
+        each(two, fails_oddly, None, [5])
+    with pytest.warns(UnitWarning, match="an angle of 400 rad") as told:
+        assert each(two, notes, None, range(4)) == [*range(4)]
+    assert len(told) == 1
+
+
+def test_what_others_cannot_know_is_done_here(two, monkeypatch):
+    """Without a word for a function that is made inside another; a class that only the program has is worth saying."""
+    assert each(two, lambda c, x: c + x, 1, range(4)) == [1, 2, 3, 4]
+    monkeypatch.setattr(kinds, "registered", lambda: (("__main__", "Own"),))
+    with pytest.warns(Note, match="computed by one process, others cannot know it: the class Own is of the program"):
+        assert {x[0] for x in each(two, who, None, range(4))} == {os.getpid()}
+
+
+def test_a_request_that_is_given_up_ends_its_workers(tmp_path):
+    """Nobody waits for what is under way, and nobody goes on with it."""
+
+    def stop():
+        while len(list(tmp_path.iterdir())) < 2:
+            time.sleep(0.02)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    start, stopper = time.monotonic(), threading.Thread(target=stop)
+    stopper.start()
+    with pytest.raises(terminal.Stopped), terminal.stoppable(), workers.using(2):
+        list(workers.each(waits, str(tmp_path), range(4), 4, seconds=1e9))
+    assert time.monotonic() - start < 50  # of the minute that a part takes
+    for mark in tmp_path.iterdir():
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(mark.name), 0)
+
+
+def test_workers_end_with_whoever_started_them(tmp_path):
+    """SIGKILL, which nobody can hear: in the middle of a part, too."""
+    code = f"""if True:
+        import sys
+        sys.path[:0] = {[str(Path(__file__).parent)]!r}
+        from parts import waits
+        from geomech import workers
+        with workers.using(2):
+            list(workers.each(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
+    """
+    with subprocess.Popen([sys.executable, "-c", code]) as process:
+        while len(list(tmp_path.iterdir())) < 2:
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    left = {int(mark.name) for mark in tmp_path.iterdir()}
+    until = time.monotonic() + 20
+    while left and time.monotonic() < until:
+        left = {pid for pid in left if Path(f"/proc/{pid}").exists() and "Z" not in status(pid)}
+        time.sleep(0.02)
+    assert left == set()
+
+
+def status(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return "Z"
+
+
+OVER = {"body.length": [1.0, 2.0, 3.0], "medium.C": [1.5, 2.5], "gait.amplitude": [0.4, 0.8, 1.2]}
+
+
+@pytest.mark.parametrize("at_once", [2, 5, 64])
+def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, monkeypatch):
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", at_once)
+    here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
+    for key in ("displacement", "estimate", "estimate_heading"):
+        np.testing.assert_array_equal(shared[key], here[key])
+
+
+def both(two, ask, shared=True):
+    """What a request gives here, and by processes, which have done some of it if it is to be shared."""
+    here, sent = ask(), []
+    crew = type("Crew", (), {"remote": False, "has": two.has})()
+    crew.each = lambda order, items: two.each(order, (sent.append(x) or x for x in items))
+    token = workers._crew.set(crew)
+    try:
+        there = ask()
+    finally:
+        workers._crew.reset(token)
+    assert (len(sent) > 1) == shared
+    return here, there
+
+
+def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
+    """With what moving costs, whose powers come beside the velocities."""
+    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 60)
+    monkeypatch.setattr(metric, "SAMPLES_TOGETHER", 60)
+    for scene in (GLASS.with_numerics(grid=7, harmonics=5), scenes.load("three-link-viscous").with_numerics(grid=7)):
+
+        def ask():
+            study = Study(scene)
+            study.compute_metric()
+            return study.fitted.A, study.fitted.residual, study.metric
+
+        (A, residual, cost), shared = both(two, ask)
+        np.testing.assert_array_equal(shared[0], A)
+        np.testing.assert_array_equal(shared[1], residual)
+        name = "M" if scene.system.linear else "coefficients"
+        np.testing.assert_array_equal(getattr(shared[2], name), getattr(cost, name))
+
+
+def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
+    few = [dataclasses.replace(k, values=k.values[:2]) for k in accuracy.KNOBS if k.tier in ("direct", "path")]
+    monkeypatch.setattr(accuracy, "KNOBS", few)
+    monkeypatch.setattr(accuracy, "TRUTH_PHASES", 64)
+    scene = GLASS.with_numerics(grid=7)
+    here, shared = both(two, lambda: accuracy.study(scene, runs=1))
+    assert [x["error"] for x in shared["lines"]] == [x["error"] for x in here["lines"]]
+    assert len(here["lines"]) == 7 and all(t > 0 for x in shared["lines"] for t in x["seconds"])
+
+
+@pytest.mark.parametrize(("name", "aim"), [("three-link-glass", "efficiency"), ("three-link-viscous", "displacement")])
+def test_searches_have_the_same_digits_whoever_computes(name, aim, two, given_away):
+    scene, told = scenes.load(name).with_numerics(grid=7, phases=32), []
+    request = checked(scene, aim, harmonics=1, starts=3)
+    here, shared = both(two, lambda: search(request, told.append))
+    assert here.numbers() | {"seconds": 0.0} == shared.numbers() | {"seconds": 0.0}
+    assert here.best.gait == shared.best.gait and here.answers == shared.answers
+    assert all(0 < x < 1 for x in told)
+
+
+POWER = """
+from dataclasses import dataclass
+import numpy as np
+
+@dataclass(frozen=True)
+class Power:
+    power: float
+    law = "power-of-workers"
+
+    def traction(self, v_t, v_n, eps=0.0):
+        drag = (np.sqrt(v_t**2 + v_n**2 + eps**2) + 1e-300) ** (self.power - 1)
+        return drag * v_t, 3.0 * drag * v_n
+"""
+
+
+@pytest.fixture
+def power(tmp_path, monkeypatch):
+    """A law of one's own, whose file is gone."""
+    for name in ("_code", "_files"):
+        monkeypatch.setattr(kinds, name, {})
+    laws, path = kinds.FAMILIES["geomech.media"].kinds, tmp_path / "power.py"
+    path.write_text(POWER)
+    kinds.load_file(path)
+    path.unlink()
+    yield laws["power-of-workers"]
+    del laws["power-of-workers"]
+
+
+def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
+    """By their text, which need not be a file where they are."""
+    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
+    scene, over = GLASS.changed(medium=power(1.0)), {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]}
+    here, shared = both(two, lambda: sweep.sweep(scene, over))
+    np.testing.assert_array_equal(shared["displacement"], here["displacement"])
+
+
+@pytest.mark.parametrize("word", ["0", "-1", "two", "1.5", "9999"])
+def test_numbers_of_workers_that_make_no_sense_are_refused(word, tmp_path):
+    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--workers", word]
+    code, out, err = geomech("sweep", *args, cwd=tmp_path)
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "--workers" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_processes_are_not_started_before_they_are_asked():
+    with workers.using(3):
+        crew = workers._crew.get()
+        assert isinstance(crew, processes.Processes) and [w.process for w in crew.workers] == [None] * 3
