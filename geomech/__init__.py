@@ -8,6 +8,7 @@ Study, tiers                            what follows: connection, CCF, cost, dis
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
 optimise, undulation, plots             the best gait; swimmers that undulate; figures
+fit_log, measured                       the connection near a measured gait, from a log
 workers                                 who computes what is large: `with geomech.workers.using(4): ...`
 
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
@@ -22,12 +23,14 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
     from geomech import connection as connection
     from geomech import curvature as curvature
     from geomech import gaits as gaits
+    from geomech import measured as measured
     from geomech import optimise as optimise
     from geomech import reconstruct as reconstruct
     from geomech import systems as systems
     from geomech import tiers as tiers
     from geomech import workers as workers
     from geomech.kinds import register as register
+    from geomech.measured import fit_log as fit_log
     from geomech.output import plots as plots
     from geomech.scene import Numerics as Numerics
     from geomech.scene import Scene as Scene
@@ -45,7 +48,9 @@ __version__ = "0.1.0"
 _MODULES = {  # by the name they have here; none is imported before it is asked for
     **{
         name: f"geomech.{name}"
-        for name in ("connection", "curvature", "gaits", "optimise", "reconstruct", "systems", "tiers", "workers")
+        for name in (
+            "connection", "curvature", "gaits", "measured", "optimise", "reconstruct", "systems", "tiers", "workers",
+        )  # fmt: skip
     },
     **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
     "plots": "geomech.output.plots",
@@ -55,6 +60,7 @@ _OBJECTS = {
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scene"),
     "Study": "geomech.study.bench",
     "Swimmer": "geomech.systems",
+    "fit_log": "geomech.measured",
     "register": "geomech.kinds",
 }
 

@@ -15,6 +15,7 @@ import numpy as np
 from geomech.connection import Connection
 from geomech.errors import is_whole, short
 from geomech.field import Field, every_second
+from geomech.tube import Tube
 from rft import se2
 
 
@@ -46,12 +47,16 @@ def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     _checked(connection, i, j)
     if connection.field.joints < 2:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
+    if isinstance(connection, Tube) and connection.field.joints == 2:
+        known = connection.known.ccf if (i, j) == (0, 1) else lambda shapes: -connection.known.ccf(shapes)
+        return Field(connection.axes, connection.at_grid(known), connection.degree)
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
     return Field(connection.axes, values, connection.degree)
 
 
 def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
-    """Estimated error of `ccf`, values (3, N_1, ..., N_d) in its units, from the grid against its halves: no solve.
+    """Estimated error of `ccf`, values (3, N_1, ..., N_d) in its units, from the grid against its halves: no solve. Of a
+    connection near a measured gait it is what the log leaves open.
 
     The halves are every second point of each axis, from the first and from the second, with both ends kept. The estimate
     is the largest difference of either half's CCF from the whole grid's, at a shape and its neighbours: near a kink one
@@ -61,6 +66,8 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
     from scipy.ndimage import maximum_filter
 
     whole = ccf(connection, i, j)  # refuses what has none
+    if isinstance(connection, Tube) and connection.field.joints == 2:
+        return Field(connection.axes, connection.at_grid(connection.known.ccf_error), connection.degree)
     if whole.masked:
         return _at_halves(connection, whole, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,11 +61,20 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
 
 def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[int]) -> list[float]:
     cells = text.split(",")
+    if len(cells) == len(columns):
+        row = [_cell(cells[k]) for k in picks]
+        if all(abs(x) <= LARGEST_NUMBER for x in row):
+            return row
+    said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
+    at = next(
+        (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
+    )
+    raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}" + f", column {at}" * bool(at))
+
+
+def _cell(text: str) -> float:
+    """nan for what is no number."""
     try:
-        row = [float(cells[k]) for k in picks] if len(cells) == len(columns) else []
+        return float(text)
     except ValueError:
-        row = []
-    if not row or not all(abs(x) <= LARGEST_NUMBER for x in row):
-        said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
-        raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}")
-    return row
+        return math.nan

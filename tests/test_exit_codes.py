@@ -8,6 +8,8 @@ import pytest
 
 import rft
 from geomech import cli
+from geomech.gaits import Circle
+from geomech.measured import synthetic
 
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
@@ -31,6 +33,7 @@ COMMANDS = {
     "accuracy": ["-o", "out"],
     "sweep": ["--over", "gait.amplitude=0.5,1.0", "--over", "body.length=1,2", "-o", "out.nc"],
     "optimize": ["--for", "displacement", "--harmonics", "1", "-o", "out.toml", "--plot", "out.svg"],
+    "fit": ["-o", "out.nc", "--plot", "out.svg"],
     "calibrate": ["-o", "out.toml", "--plot", "out.svg"],
     "explain": [],
     "symbolic": [],
@@ -43,7 +46,8 @@ COMMANDS = {
 # Where it is no scene with a gait.
 SUBJECT = {
     "scenes": [], "keys": [], "symbolic": ["differential-drive"],
-    "calibrate": ["dem-rod-drag"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"], "walk": ["walker.toml"],
+    "calibrate": ["dem-rod-drag"], "fit": ["log.csv"], "stress": ["intruder.toml"], "intrude": ["intruder.toml"],
+    "walk": ["walker.toml"],
 }  # fmt: skip
 SOLVING = [name for name in COMMANDS if name not in ("explain", *SUBJECT)]
 SLOW = ("accuracy", "run")  # tried to their ends in test_cli.py
@@ -60,6 +64,8 @@ def ended(tmp_path, monkeypatch, capsys):
     (tmp_path / "small.toml").write_text(SMALL)
     (tmp_path / "intruder.toml").write_text(INTRUDER)
     (tmp_path / "walker.toml").write_text(WALKER)
+    rolling = lambda alpha, alphadot: np.stack([alphadot[..., 0], 0 * alphadot[..., 0], alphadot[..., 1]], -1)
+    synthetic.save(tmp_path / "log.csv", synthetic.made(rolling, Circle(amplitude=0.5), cycles=12, samples=20))
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def run(*args):
@@ -71,7 +77,7 @@ def ended(tmp_path, monkeypatch, capsys):
             left.value.code,
             said.out,
             said.err,
-            {p.name for p in tmp_path.iterdir()} - {"small.toml", "intruder.toml", "walker.toml"},
+            {p.name for p in tmp_path.iterdir()} - {"small.toml", "intruder.toml", "walker.toml", "log.csv"},
         )
 
     yield run
@@ -117,12 +123,14 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
         refused(ended("keys", "gaits"), "did you mean 'gait'")
         return
     what = {"calibrate": "drag", "stress": "medium"}.get(name, "scene")
-    refused(ended(name, "nothing", *COMMANDS[name]), f"{what}: 'nothing' is unknown")
+    unknown = f"{what}: 'nothing' is unknown" if name != "fit" else "cannot read 'nothing'"
+    refused(ended(name, "nothing", *COMMANDS[name]), unknown)
     may_do_without = (
         "run",
         "accuracy",
         "connection",
         "displacement",
+        "fit",
         "calibrate",
         "stress",
         "intrude",

@@ -3,5 +3,5 @@ here; `geomech.commands.options` and `asked` have what they share."""
 
 COMMANDS = (
     "run", "velocity", "connection", "ccf", "displacement", "trajectory", "animate", "accuracy", "sweep", "optimize",
-    "calibrate", "stress", "intrude", "walk", "explain", "symbolic", "scenes", "keys",
+    "fit", "calibrate", "stress", "intrude", "walk", "explain", "symbolic", "scenes", "keys",
 )  # fmt: skip

@@ -141,6 +141,10 @@ def checked(
         number("--starts", starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
+        if system.near:
+            raise SceneError(
+                f"no gait but one to search: A is known near {system.near} alone; measure more varied cycles"
+            )
         wanted = Aim(aim, towards, system.length, **limits)
         if wanted.timed:
             if system.lacks & Premise.RATE_INDEPENDENT:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.tables.netcdf import SHAPE
+from geomech.tube import Known, Tube
 from geomech.two_form import TwoForm
 
 COMPONENTS = ("x", "y", "theta")
@@ -38,14 +40,19 @@ def save_connection(path: str | Path, study: Study) -> None:
     estimated error and, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where something
     says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it.
     The file appears whole or not at all."""
+    write(path, attributes(study), study.fitted.axes, study.scene.system.shape_labels, variables(study))
+
+
+def write(path: str | Path, told: Mapping, axes, labels, found: Sequence[Variable]) -> None:
+    """A file of variables on the grid of ``axes``; told: its attributes; labels: (name, unit) of each shape variable. It
+    appears whole or not at all."""
     from scipy.io import netcdf_file
 
-    found = variables(study)  # computed, before there is a file
     with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        for key, value in attributes(study).items():
+        for key, value in told.items():
             text = isinstance(value, str)  # SciPy keeps but seven digits of a float of Python's
             setattr(file, key, attribute(value) if text else np.float64(value) if isinstance(value, float) else value)
-        _coordinates(file, study.fitted, study.scene.system.shape_labels)
+        _coordinates(file, axes, labels)
         for name, dimensions, values, units, long_name in found:
             for dimension, size in zip(dimensions, values.shape):
                 if dimension not in file.dimensions:
@@ -75,6 +82,8 @@ def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
     unit, lookups = study.scene.system.unit, study.lookups
     found = of_connection(study.fitted, unit)
+    if isinstance(study.fitted, Tube):
+        found += of_known(study.fitted.known, unit)
     if len(study.fitted.axes) == 2:
         found.append(of_ccf(study.curvature, unit))
         name = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -107,6 +116,35 @@ def of_connection(fitted: Connection, unit: str) -> list[Variable]:
         Variable("fit_residual", ("component", *angles), fitted.residual, units, left),
         Variable("speed", ("component", *angles), fitted.speed, units, speed),
     ]
+
+
+def of_known(known: Known, unit: str) -> list[Variable]:
+    """What a connection near one gait is looked up in (`geomech.tube`)."""
+    units, order = (
+        f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)",
+        "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
+    )
+    lead, row = ("component", "joint"), "harmonic_of_A"
+    return [
+        Variable("gait", ("joint", "harmonic_of_gait"), known.loop.coefficients, "rad", f"{order} the mean gait"),
+        Variable("gait_A", (*lead, row), known.A, units, f"{order} A at the mean gait"),
+        Variable(
+            "gait_slope", (*lead, "normal", row), known.slope, f"{units}, per rad",
+            f"{order} the derivative of A along normals of the mean gait; to its left in the plane of two joints",
+        ),
+        Variable(
+            "gait_errors", ("error", *lead, "A_and_normals", row), known.errors, units,
+            "independent errors of gait_A, and of gait_slope: the squares of what each does add up to a variance",
+        ),
+        Variable(
+            "gait_spread", ("joint", "other_joint", "place"), known.spread, "rad2",
+            "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
+        ),
+        Variable(
+            "gait_beyond", ("component",), known.beyond, f"{UNITS[unit]} (x, y), rad (theta)",
+            "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
+        ),
+    ]  # fmt: skip
 
 
 def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variable:
@@ -203,16 +241,16 @@ def attribute(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
 
 
-def _coordinates(file, fitted, labels) -> None:
+def _coordinates(file, axes, labels) -> None:
     width = max(map(len, COMPONENTS))
     file.createDimension("component", len(COMPONENTS))
     file.createDimension("component_length", width)
     variable = file.createVariable("component", "c", ("component", "component_length"))
     variable[:] = np.array([list(name.ljust(width, "\0")) for name in COMPONENTS], "S1")
     variable._Encoding = "ascii"
-    file.createDimension("joint", len(fitted.axes))
-    file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(fitted.axes) + 1)
-    for name, dimensions, axis, units, long_name in shapes(fitted.axes, labels):
+    file.createDimension("joint", len(axes))
+    file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(axes) + 1)
+    for name, dimensions, axis, units, long_name in shapes(axes, labels):
         file.createDimension(name, len(axis))
         _variable(file, name, axis, dimensions, units, long_name)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError
+from geomech.errors import SceneError, named
 from geomech.files import read, refuse_inputs
 from geomech.gaits import Butterfly, Circle, Gait
 from geomech.output import plots
@@ -113,12 +113,23 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if own:
         size = abs(gait.amplitude)
+        if scene.system.near:
+            return _near(scene, gait)
         found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in found]
     room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle))
     if room <= 0:
         raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
     return [float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())]
+
+
+def _near(scene: Scene, gait: Gait) -> list[float]:
+    """Amplitudes about the gait's own, as far as what is known of the system reaches; SceneError where that is nowhere."""
+    found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
+    with named(scene.name):
+        scene.system.refuse_singular(gait.cycle(scene.numerics.phases)[0])
+    reached = lambda a: (scene.system.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
+    return [a for a in found if reached(a)]
 
 
 def steps(top: float) -> list[float]:

@@ -102,6 +102,7 @@ class Plain:
     one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that
     time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
+    near: of which gait alone it is known, in words, empty where it is of all.
     carried: its displacements are those of another frame, carried over. joint_angles: its shape variables are such, so
     that one beyond a full turn is likely a slip of unit. closed: forces on an element have an exact form, which finer
     loads come near to. notes: lines on what its user may not expect of how it is computed. frequency: cycles per
@@ -123,6 +124,7 @@ class Plain:
     together = 1 << 12
     held = cut = 0
     closed = joint_angles = carried = False
+    near = ""
     notes: tuple[str, ...] = ()
     settling = 0.0
     engine = "algebraic"

@@ -17,6 +17,7 @@ from geomech.errors import number, short
 from geomech.field import Field
 from geomech.reconstruct import displacement, trajectory
 from geomech.systems.base import Plain
+from geomech.tube import BEYOND, Tube
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Table(Plain):
     xi = + or - A alphadot in the file; order (-): "ndgrid" or "meshgrid"; if left out as the file says or shows
     (`tables.load`). body_length (the file's unit): of the body, where the file does not say it; results are then
     in body lengths. sha256 (-): of the file, filled in if left out; given, the file must have it.
+
+    A file of `geomech fit` holds A near a mean gait alone: gaits that leave the data are refused, and there is no area tier.
 
     The file is read once, when the system is made.
     Its field has the file's own grid; [numerics] grid, extent, directions, harmonics and interpolation say nothing here.
@@ -53,7 +56,7 @@ class Table(Plain):
         held = tables.load(self.file, self.sign, self.order)
         if self.sha256.lower() not in ("", held.sha256):
             raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")
-        if held.connection.field.masked:
+        if held.connection.field.masked and not isinstance(held.connection, Tube):
             raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those")
         if self.body_length != 1.0 and (held.unit, held.length) != ("BL", 1.0):
             raise ValueError(
@@ -65,6 +68,8 @@ class Table(Plain):
     def __reduce__(self):
         return Table, (self.file, self.sign, self.order, self.body_length, self.sha256)
 
+    tube = property(lambda self: self.held.connection if isinstance(self.held.connection, Tube) else None)
+    near = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
     joints = property(lambda self: len(self.held.connection.axes))
     length = property(lambda self: self.held.length)
     unit = property(lambda self: self.held.unit)
@@ -81,6 +86,18 @@ class Table(Plain):
         if told is None or self.power_degree is not None:
             return None
         return lambda alpha, alphadot: told.norm(alpha, alphadot) ** 2
+
+    singular = "the data of the log do not reach"
+
+    @property
+    def singularity(self) -> Callable | None:
+        """Passes through 0 where the data of a measured gait end."""
+        tube = self.tube
+        return None if tube is None else (lambda alpha: 1 - tube.reach(alpha))
+
+    def refuse_singular(self, alpha) -> None:
+        if self.tube is not None:
+            self.tube.checked(alpha)
 
     def in_frame(self, frame: str) -> Table:
         raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
@@ -108,7 +125,9 @@ class Table(Plain):
         return {**told, "status": "looked up", "residual": left if left is None else float(left)}
 
     def _times(self, values, alpha, alphadot) -> np.ndarray:
-        """(..., 3): values (3, N_1, ...) at a shape times |alphadot|."""
+        """(..., 3): values (3, N_1, ...) at a shape times |alphadot|; near one gait they are the same everywhere."""
+        if self.tube is not None:
+            return np.nanmean(values.reshape(3, -1), 1) * np.linalg.norm(alphadot, axis=-1)[..., None]
         return Field(self.held.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
     def own_error(self, alpha, alphadot) -> np.ndarray:
@@ -116,6 +135,9 @@ class Table(Plain):
         lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
         sums up like a random walk of k steps; what is even in alphadot does not, and a gait may keep to directions where it is
         largest, sqrt(2) times the rms of one harmonic."""
+        if self.tube is not None:
+            x, y, theta = np.moveaxis(self.tube.known.error(alpha, alphadot), -1, 0)
+            return np.stack([np.hypot(x, y) / self.length, theta], -1)
         xi, phases = self.velocity(alpha, alphadot), np.shape(alpha)[-2]
         net = displacement(xi)
         halves = [displacement(half.velocity(alpha, alphadot)) for half in self.held.halves]
@@ -131,7 +153,11 @@ class Table(Plain):
         return error / [self.length, 1.0]
 
     def about(self) -> dict:
-        return {"table": self.file, "table_sha256": self.sha256}
+        own = {"table": self.file, "table_sha256": self.sha256}
+        if self.tube is None:
+            return own
+        known = self.tube.known
+        return {**own, "singular_shapes": BEYOND, "level": known.level, "error_factor": known.factor}
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -141,7 +167,9 @@ class Table(Plain):
     def told(self) -> list[str]:
         held = self.held
         lines = [f"table ({self.file}: {held.connection!r})"]
-        if held.harmonics:
+        if self.tube is not None:
+            lines.append(f"known near a measured gait alone; errors are those of {self.tube.known.level:.3g} of cases")
+        elif held.harmonics:
             lines.append(
                 f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}"
             )

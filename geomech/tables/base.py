@@ -16,6 +16,7 @@ from geomech.gaits import Circle
 from geomech.harmonics import Harmonics
 from geomech.metric import Finsler, Metric
 from geomech.reconstruct import displacement
+from geomech.tube import Tube
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
@@ -112,7 +113,8 @@ def scaled(held: Stored, factor: float) -> Stored:
     by = np.array([factor, factor, 1.0])
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
     c, h = held.connection, held.harmonics
-    c = Connection(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree)
+    near = {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
+    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **near)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     return replace(held, connection=c, harmonics=h, even=None if held.even is None else times(held.even))
 

@@ -12,8 +12,10 @@ from geomech.connection import Connection
 from geomech.harmonics import Harmonics
 from geomech.metric import Finsler, Metric
 from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, checked_names, numbers, rms
+from geomech.tube import Known, Loop, Tube
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
+FITTED = "write it anew with 'geomech fit LOG.csv -o FILE.nc'"
 UNITS = {"body length": "BL", "m": "m"}
 ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links
@@ -89,6 +91,8 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
             raise ValueError(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
         harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
     connection = Connection(axes, turn * A, residual, speed, degree)
+    if "gait" in found:
+        connection = Tube(axes, turn * A, residual, speed, degree, _known(found, told, turn))
     frame = _text(told.get("frame", b"that of the table"))
     even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
     if even is not None and even.shape[0] != 3:
@@ -97,6 +101,28 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     return Stored(
         connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power
     )
+
+
+def _known(found: dict, told: dict, turn: float) -> Known:
+    """What is known along a gait (`geomech.tube`), A times ``turn``."""
+    sized = {"gait": 2, "gait_A": 3, "gait_slope": 4, "gait_errors": 5, "gait_spread": 3, "gait_beyond": 1}
+    if missing := [name for name in sized if name not in found or found[name][1].ndim != sized[name]]:
+        raise ValueError(f"has a gait, but no {missing[0]} that fits it: {FITTED}")
+    gait, A, slope, errors, spread, beyond = (numbers(name, found[name][1]) for name in sized)
+    d, wide = len(gait), A.shape[-1]
+    right = (A.shape == (3, d, wide), slope.shape == (3, d, d - 1, wide), errors.shape[1:] == (3, d, d, wide))
+    level, factor = (told.get(name, np.nan) for name in ("level", "error_factor"))
+    good = (
+        spread.shape[:2] == (d, d)
+        and beyond.shape == (3,)
+        and (np.linalg.eigvalsh(np.moveaxis(spread, -1, 0)) > 0).all()
+    )
+    number = all(np.ndim(x) == 0 and np.asarray(x).dtype.kind in "iuf" for x in (level, factor))
+    if not (all(right) and good and number and wide % 2 and gait.shape[1] % 2 and 0 < level < 1 and 0 < factor < 1e6):
+        raise ValueError(f"has a gait whose parts do not fit each other: {FITTED}")
+    if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
+        raise ValueError(f"has a gait that does not move: {FITTED}")
+    return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, np.abs(beyond), float(factor), float(level))
 
 
 def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:

@@ -83,9 +83,9 @@ class Tier:
         if system.joints not in self.joints:
             raise ValueError(f"the {self.name} tier {self.takes_joints}, this body has {system.joints}: {self.instead}")
         if self.whole and system.singularity is not None:
-            raise ValueError(
-                f"the {self.name} tier sums a field up, and the {system.kind} has singular shapes: use path or direct"
-            )
+            near = getattr(system, "near", "")
+            why = f"A is known near {near} alone" if near else f"the {system.kind} has singular shapes"
+            raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
 
     def takes(self, system: System) -> bool:
         """Whether it says something of this system, and is worth asking."""

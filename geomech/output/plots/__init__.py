@@ -27,6 +27,7 @@ from geomech.output.plots.maps import (
     unknown,
     vector_field,
 )
+from geomech.output.plots.measured import measured_figure
 from geomech.output.plots.motion import LINES, filmstrip, stage
 from geomech.output.plots.optimum import optimum_figure, optimum_map
 from geomech.output.plots.plates import penetration_figure, plates_figure
@@ -74,6 +75,7 @@ __all__ = [
     "indicatrices",
     "intrusion_figure",
     "largest",
+    "measured_figure",
     "medium_band",
     "net",
     "optimum_figure",

@@ -1,0 +1,6 @@
+"""Measured gaits: from the log of an experiment to the connection near its mean gait, one stage a file."""
+
+from geomech.measured.fit import Fitted, fit_log
+from geomech.measured.log import Log, read
+
+__all__ = ["Fitted", "Log", "fit_log", "read"]

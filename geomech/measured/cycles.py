@@ -1,0 +1,124 @@
+"""The cycles of a log: its period, its phase, and whether they are those of one gait."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.measured import phase
+from geomech.measured.log import Log, check_rows
+from geomech.measured.smooth import Smoothed
+from geomech.tube import Loop, waves
+
+FEWEST = 8  # cycles: fewer do not tell how they scatter
+ROWS = 12  # a cycle, at least
+GAP = 1 / 8  # of a cycle without a row, at most
+APART = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
+TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
+AFTER = 0.8  # the same where all cycles of one come before those of the other
+LEAST_APART = 0.05  # of the gait's size, between the means of two gaits
+REFINED = 3  # times the phase is that of the nearest point of the mean gait
+
+
+def period(log: Log) -> float:
+    """Of the joints, in units of t; SceneError, with the place, for too few or too thin cycles, gaps and two gaits."""
+    t = np.linspace(log.t[0], log.t[-1], len(log.t))
+    alpha = np.stack([np.interp(t, log.t, a) for a in log.alpha.T], -1)
+    found = phase.period_of(t, alpha)
+    quarter = len(t) // 4
+    if found and 3 * found < t[quarter] - t[0]:
+        first, last = (phase.period_of(t[k], alpha[k]) for k in (slice(0, quarter), slice(-quarter, None)))
+        if first and last and max(first, last) > APART * min(first, last):
+            raise log.wrong(
+                f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last: two "
+                "gaits are in it, give each a file"
+            )
+    count = (log.t[-1] - log.t[0]) / found if found else 0.0
+    if count < FEWEST + 1:
+        said = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
+        raise log.wrong(f"{said}: give at least {FEWEST + 1} cycles of one gait, some dozens are better")
+    if (rows := len(log.t) / count) < ROWS:
+        raise log.wrong(f"{rows:.1f} rows a cycle are too few: give at least {ROWS}")
+    gaps = np.diff(log.t)
+    k = int(gaps.argmax())
+    if gaps[k] > max(GAP * found, 2.5 * np.median(gaps)):
+        raise log.wrong(
+            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle: cut the log "
+            "there and give the longer part, or fill the gap",
+            k,
+        )
+    check_rows(log)
+    return found
+
+
+def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[np.ndarray, Loop]:
+    """(phase (N,), rad, growing; the mean gait): the phase of each row is that of a sine through the joints at first, then
+    that of the nearest point of the mean gait, remade so that it grows at a uniform rate on average; 0 is where the first
+    harmonic of the first joint is largest."""
+    t = np.linspace(log.t[0], log.t[-1], len(log.t))
+    even = np.stack([np.interp(t, log.t, a) for a in joints.values.T], -1)
+    at = np.interp(log.t, t, phase.protophase(t, even, period))
+    _check_growing(log, at, period)
+    at = phase.uniform(at)
+    for _ in range(REFINED):
+        loop = Loop(phase.fitted_loop(at, joints.values, harmonics))
+        at = phase.uniform(loop.projected(joints.values, at))
+    at = at - _start(at, joints.values)
+    return at, Loop(phase.fitted_loop(at, joints.values, harmonics))
+
+
+def _start(at: np.ndarray, alpha: np.ndarray) -> float:
+    """The phase at which the first harmonic of the first joint that swings at it is largest."""
+    cos, sin = phase.fitted_loop(at, alpha, 1)[:, 1:].T
+    size = np.hypot(cos, sin)
+    k = int(np.flatnonzero(size > 0.5 * size.max())[0])
+    return float(np.arctan2(sin[k], cos[k]))
+
+
+def _check_growing(log: Log, at: np.ndarray, period: float) -> None:
+    """SceneError where the phase stands or runs back for long: over half a cycle it grows by a fifth of one, at least."""
+    inside = np.flatnonzero((log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period))
+    ahead = np.interp(log.t[inside] + period / 2, log.t, at) - at[inside]
+    if (bad := np.flatnonzero(ahead < 0.4 * np.pi)).size:
+        row = inside[bad[0]]
+        raise log.wrong(
+            f"the gait stands, slips or runs back after this row (t = {log.t[row]:.6g}): cut pauses and starts out, and give "
+            "each gait a file",
+            row,
+        )
+
+
+def whole(log: Log, at: np.ndarray, period: float) -> np.ndarray:
+    """(N,): the number of each row's cycle from 0; -1 in those that are not whole, or too near the log's ends for a phase."""
+    kept = (log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period / 2)
+    turns = at / (2 * np.pi)
+    first, last = np.ceil(turns[kept].min()), np.floor(turns[kept].max())
+    number = np.floor(turns - first).astype(int)
+    return np.where(kept & (turns >= first) & (turns < last), number, -1)
+
+
+def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray) -> None:
+    """SceneError if the cycles fall into two kinds: by their first harmonics, along the direction in which these differ most,
+    almost all of the spread is that between two groups."""
+    count = number.max() + 1
+    w = waves(at, 2)
+    each = np.array([np.linalg.lstsq(w[number == c], alpha[number == c], rcond=None)[0].ravel() for c in range(count)])
+    off = each - each.mean(0)
+    size = np.linalg.norm(each.mean(0).reshape(5, -1)[1:])
+    score = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    order = np.sort(score)
+    k = np.arange(1, count)
+    low = np.cumsum(order)[:-1] / k
+    high = (order.sum() - np.cumsum(order)[:-1]) / (count - k)
+    between = k * (count - k) / count * (high - low) ** 2
+    best = int(between[2:-2].argmax()) + 2 if count > 5 else 0
+    kind = score > (order[best] + order[best + 1]) / 2
+    share = AFTER if (kind[1:] != kind[:-1]).sum() == 1 else TWO
+    apart = high[best] - low[best] > LEAST_APART * size and min(k[best], count - k[best]) > 2
+    if apart and between[best] > share * (order**2).sum():
+        change = int(np.flatnonzero(kind != kind[0])[0])
+        row = int(np.flatnonzero(number == change)[0])
+        raise log.wrong(
+            f"two gaits: {k[best]} cycles are of one kind and {count - k[best]} of another, which begins here "
+            f"(t = {log.t[row]:.6g}): give each a file",
+            row,
+        )

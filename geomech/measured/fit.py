@@ -1,0 +1,197 @@
+"""From a log to the connection near its mean gait, and what it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from geomech.errors import number
+from geomech.gaits import Fourier
+from geomech.measured import cycles, regression, smooth
+from geomech.measured.log import Log, read
+from geomech.measured.reach import spread
+from geomech.reconstruct import displacement
+from geomech.tube import Known, Loop, Tube, grid_of, series, tube
+from rft import se2
+
+HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
+PHASES = 128  # of the mean gait, at which it is integrated
+SHOWN = 24  # phases at which numbers are told
+MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What a log tells. times: (C + 1,), at which its C whole cycles begin and the last ends. measured, predicted: (C, 3), the
+    net pose of each cycle, in the body frame at its start, as logged and by the connection along the cycle's own shapes.
+    frequency: cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual:
+    (3,), rms of what the fit leaves of xi, over that of the joint rates; explained: (3,), share of the squares of xi
+    that it does not leave. misfit: (3,), rms over the phase of the residual's mean over all cycles, per rad: what as many
+    harmonics cannot follow. noise: (d + 3,), of the rows' joint angles, x, y and heading.
+    across: whether the cycles vary enough to tell A across the gait. length: of the body in m; 1 for a log in body
+    lengths."""
+
+    log: Log
+    known: Known
+    times: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    frequency: float
+    irregular: float
+    residual: np.ndarray
+    explained: np.ndarray
+    misfit: np.ndarray
+    noise: np.ndarray
+    across: bool
+    length: float
+    samples: regression.Samples
+
+    unit = property(lambda self: "BL" if self.length == 1.0 else "m")
+
+    @cached_property
+    def gait(self) -> Fourier:
+        """The mean gait, of amplitude 1, with the log's frequency."""
+        c = self.known.loop.coefficients
+        cos, sin = (tuple(map(tuple, c[:, k::2].tolist())) for k in (1, 2))
+        return Fourier(cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=self.frequency)
+
+    @cached_property
+    def displacement(self) -> tuple[np.ndarray, np.ndarray]:
+        """(net pose (3,) of the mean gait by the connection, half width of its interval (3,))."""
+        net, alpha, alphadot = _net(self.known)
+        return net, self.known.error(alpha, alphadot)
+
+    @cached_property
+    def mean(self) -> tuple[np.ndarray, np.ndarray]:
+        """(mean net pose (3,) of the logged cycles, half width of its interval (3,))."""
+        return mean_of(self.measured, self.known.level)
+
+    @cached_property
+    def tube(self) -> Tube:
+        """The connection near the mean gait, with a grid for pictures and files."""
+        wide = float(np.sqrt(np.einsum("iip->pi", self.known.spread).min()))
+        extent = max(np.ptp(a) for a in grid_of(self.known, 2))
+        joints = len(self.log.joints)
+        most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
+        points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
+        return tube(self.known, grid_of(self.known, points), self.residual)
+
+    def along(self, t) -> tuple[np.ndarray, np.ndarray]:
+        """(A (T, 3, d) at phases t of the mean gait, half widths of its interval), with what the harmonics cannot follow."""
+        A, errors = series(self.known.A, t), series(self.known.errors[:, :, :, 0], t)
+        rate = np.linalg.norm(self.known.loop.shape(t, 1), axis=-1)
+        tangent = self.known.loop.shape(t, 1) / rate[:, None]
+        off = self.misfit[:, None] * np.abs(tangent)[:, None, :]
+        return A, self.known.factor * np.sqrt((errors**2).sum(1) + off**2)
+
+
+def fit_log(
+    log: str | Path | Log, *, columns: Sequence[str] = (), degrees: bool = False, level: float = 0.95,
+    harmonics: int | None = None, within: float | None = None, body_length: float = 1.0,
+) -> Fitted:  # fmt: skip
+    """The connection near the mean gait of a log (`geomech.measured.log.read` says how ``columns`` and ``degrees`` are meant);
+    SceneError, one line, for a log that does not tell it.
+
+    level: share of cases in which an interval is to cover the truth. harmonics: of the connection in the phase; by
+    cross-validation if left out. within (rad): distance from the mean gait up to which the connection is given; as far as
+    the data reach if left out. body_length (m): of a log in m; 1 for one in body lengths."""
+    number("--level", level, 0.5, 0.999)
+    number("--body-length", body_length, 1e-9, 1e9)
+    if harmonics is not None:
+        number("--harmonics", harmonics, 1, HARMONICS, whole=True)
+    if within is not None:
+        number("--within", within, 1e-6, 10)
+    log = log if isinstance(log, Log) else read(log, columns, degrees)
+    period = cycles.period(log)
+    joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
+    rows = len(log.t) * period / (log.t[-1] - log.t[0])
+    most = int(min(HARMONICS, joints.knots / 2, rows / 4))
+    phase, loop = cycles.phased(log, joints, period, most)
+    count = cycles.whole(log, phase, period)
+    if count.max() + 1 < cycles.FEWEST:
+        raise log.wrong(f"{count.max() + 1} whole cycles are too few: give at least {cycles.FEWEST}")
+    cycles.check_one_gait(log, phase, count, joints.values)
+    return _regressed(log, loop, phase, count, joints, pose, level, harmonics, within, body_length)
+
+
+def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, within, length) -> Fitted:
+    kept = count >= 0
+    heading, (vx, vy, turn) = pose.values[:, 2], pose.rates.T
+    cos, sin = np.cos(heading), np.sin(heading)
+    xi = np.stack([cos * vx + sin * vy, cos * vy - sin * vx, turn], -1)  # R(-heading) of the velocity in the world
+    halves = tuple((a[kept], u[kept]) for a, u in joints.halves)
+    nearest = loop.projected(joints.values, phase)
+    samples = regression.Samples(nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi[kept], halves)
+    across = regression.varied(loop, samples)
+    held = regression.sums(loop, samples, HARMONICS if harmonics is None else harmonics, across)
+    held = held.kept(regression.chosen(held)) if harmonics is None else held
+    found, errors = regression.solution(held)
+    A, errors = (held.split(x, loop) for x in (found, errors))
+    if not across:
+        errors = np.concatenate([errors, regression.unknown(loop, A)])
+    known = Known(
+        loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, across), np.zeros(3),
+        regression.factor(len(held.square), level), level,
+    )  # fmt: skip
+    times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
+    mean, mean_off = mean_of(measured, level)
+    beyond = np.sqrt(np.maximum((_net(known)[0] - mean) ** 2 - mean_off**2, 0.0))  # less what the mean leaves open
+    known = replace(known, beyond=beyond)
+    residual, explained, misfit = _left(known, samples)
+    frequency = (len(times) - 1) / (times[-1] - times[0])
+    uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
+    return Fitted(
+        log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[kept])), residual, explained,
+        misfit, np.concatenate([joints.noise, pose.noise]), across, length, samples,
+    )  # fmt: skip
+
+
+def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+    """(mean, half width of its interval) of net poses of cycles (C, 3), neighbours among which are correlated."""
+    errors = regression.lagged((poses - poses.mean(0)) / len(poses))
+    return poses.mean(0), regression.factor(len(poses), level) * np.sqrt((errors**2).sum(0))
+
+
+def _net(known: Known) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(net pose (3,) of the mean gait, its shapes and their rates (PHASES, d))."""
+    t = 2 * np.pi * np.arange(PHASES) / PHASES
+    alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
+    return displacement(np.einsum("nij,nj->ni", known.of(alpha), alphadot)), alpha, alphadot
+
+
+def _left(known: Known, samples: regression.Samples):
+    """(residual, explained, misfit), (3,) each, of `Fitted`."""
+    w, terms = known.terms_at(samples.phase, samples.alpha, samples.rate)
+    left = samples.xi - np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
+    size = np.sqrt((samples.rate**2).sum(-1).mean())
+    explained = 1 - (left**2).mean(0) / samples.xi.var(0).clip(1e-300)
+    bins = (samples.phase % (2 * np.pi) / (2 * np.pi) * 64).astype(int) % 64
+    n = np.maximum(np.bincount(bins, minlength=64), 1)
+    mean, square = (np.stack([np.bincount(bins, x, 64) / n for x in y.T], -1) for y in (left, left**2))
+    cycles_in = samples.cycle[-1] + 1
+    pure = np.maximum(mean**2 - (square - mean**2) / cycles_in, 0.0)  # less what noise leaves of a mean over the cycles
+    return np.sqrt((left**2).mean(0)) / size, explained, np.sqrt(pure.mean(0)) / size
+
+
+def _cycles(log: Log, known: Known, phase, count, joints, pose):
+    """(times (C + 1,), measured (C, 3), predicted (C, 3))."""
+    from scipy.interpolate import CubicSpline
+
+    first = np.floor(phase[count == 0][0] / (2 * np.pi))
+    marks = 2 * np.pi * (first + np.arange(count.max() + 2))
+    growing = np.maximum.accumulate(phase)
+    times = np.interp(marks, growing, log.t)
+    w, terms = known.terms_at(known.loop.projected(joints.values, phase), joints.values, joints.rates)
+    xi = np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
+    heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
+    way = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
+    poses = (pose.values, np.stack([way.real, way.imag, heading], -1))
+    each = []
+    for g in poses:
+        at = CubicSpline(log.t, g)(times)
+        each.append(se2.compose(se2.inverse(at[:-1]), at[1:]))
+    return times, *each

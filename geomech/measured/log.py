@@ -1,0 +1,168 @@
+"""Logs of an experiment, CSV: time, joint angles and the pose of the body, row by row; read and checked."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech.errors import SceneError, UnitWarning, short
+from geomech.rows import read as read_rows
+
+LARGEST_FILE = 100_000_000  # bytes
+MOST_ROWS, FEWEST_ROWS = 500_000, 100
+MOST_JOINTS = 6  # the columns of the regression grow with their cube
+POSE = {
+    "t": ("t", "time", "time_s", "t_s"),
+    "x": ("x", "x_m"),
+    "y": ("y", "y_m"),
+    "heading": ("heading", "theta", "yaw"),
+}
+JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
+SUFFIXES = ("_rad", "_deg")
+SPIKE = 20.0  # times as far off its neighbours as nine in ten rows
+LARGE = 0.05  # of a column's range, that a row must be off besides
+WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """name: of the file. t: (N,), ascending. alpha: (N, d), rad, without jumps of a turn, as the heading. pose: (N, 3), x, y,
+    heading. joints: the names of their columns. lines: (N,), the rows' lines in the file."""
+
+    name: str
+    t: np.ndarray
+    alpha: np.ndarray
+    pose: np.ndarray
+    joints: tuple[str, ...]
+    lines: np.ndarray
+
+    def wrong(self, what: str, row: int | None = None) -> SceneError:
+        """To be raised for what is wrong in a row, or in the whole file."""
+        return SceneError(f"{self.name}{'' if row is None else f', line {self.lines[row]}'}: {what}")
+
+
+def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -> Log:
+    """The log in a file; SceneError, one line, for one that cannot be used.
+
+    columns: names of the time, of all joint angles, of x, y and the heading, in this order; known ones if left out
+    (`POSE`, `JOINT`; a log of phases for want of times has those). degrees: joint angles and heading are in degrees, and
+    so are columns whose names end in _deg."""
+    try:
+        source = read_rows(path, LARGEST_FILE, WHAT)
+        line, header = source.header
+        picked = _picked(source.name, line, header, [c.strip().lower() for c in columns])
+        if len(source.filled) - 1 > MOST_ROWS:
+            raise ValueError(f"{source.name}: {len(source.filled) - 1} rows, more than {MOST_ROWS}: thin them out")
+        rows = source.numbers(header, picked)
+    except ValueError as error:
+        cure = ": mend that row, or drop it" if "a row must be" in str(error) else ""
+        raise SceneError(f"{error}{cure}") from None
+    turn = np.where([degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0)
+    turn[[0, -3, -2]] = 1.0
+    rows = rows * turn
+    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines)
+    _check_times(log)
+    _check_units(log, picked, turn)
+    return _checked(log)
+
+
+def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
+    """The columns of the time, the joints, x, y and the heading; ValueError if one is missing or ambiguous."""
+    if twice := [c for k, c in enumerate(header) if c in header[:k]]:
+        raise ValueError(f"{name}, line {line}: the column {short(twice[0])} is there twice: rename one")
+    if columns:
+        if missing := [c for c in columns if c not in header]:
+            raise ValueError(
+                f"{name}, line {line}: no column {short(missing[0])}; it has {short(', '.join(header), 200)}"
+            )
+        if len(columns) < 6 or len({*columns}) < len(columns):
+            raise ValueError(
+                f"{name}: --columns are those of t, two joint angles or more, x, y and heading, in this order"
+            )
+        return _of_joints(name, columns)
+    if len(header) < 2:
+        other = "; columns must be parted by commas" if re.search("[;\\t]", header[0]) else ""
+        raise ValueError(f"{name}, line {line}: no header of columns{other}: {WHAT}")
+    bare = {c: re.sub("_(rad|deg)$", "", c) for c in header}
+    found = {role: next((c for c in header if bare[c] in names), None) for role, names in POSE.items()}
+    found["t"] = found["t"] or ("phase" if "phase" in header else None)
+    matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(c))]
+    kind = next((m[1] for m in matches), None)
+    joints = [c for _, k, c in sorted(matches) if k == kind]
+    missing = [role for role, c in found.items() if c is None]
+    if missing or len(joints) < 2:
+        what = (
+            f"no column {missing[0]}" if missing else f"{len(joints)} columns of joint angles where two are the least"
+        )
+        cure = "name them t,alpha_1,alpha_2,x,y,heading, or say --columns"
+        raise ValueError(f"{name}, line {line}: {what}; it has {short(', '.join(header), 120)}: {cure}")
+    return _of_joints(name, [found["t"], *joints, found["x"], found["y"], found["heading"]])
+
+
+def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
+    if len(columns) - 4 > MOST_JOINTS:
+        raise ValueError(
+            f"{name}: {len(columns) - 4} joint angles, more than {MOST_JOINTS}: give the shape in a few modes as columns"
+        )
+    return tuple(columns)
+
+
+def _check_times(log: Log) -> None:
+    if len(log.t) < FEWEST_ROWS:
+        raise log.wrong(f"{len(log.t)} rows are too few: give at least {FEWEST_ROWS}, of many cycles")
+    step = np.diff(log.t)
+    if (bad := np.flatnonzero(step <= 0)).size:
+        k = bad[0]
+        if step[k] == 0:
+            raise log.wrong(f"t = {log.t[k]:.6g} is given twice: keep one of the rows", k + 1)
+        raise log.wrong(f"t = {log.t[k + 1]:.6g} comes after {log.t[k]:.6g}: sort the rows by time", k + 1)
+
+
+def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
+    """Degrees that are taken for radians, and radians for degrees."""
+    step = np.abs(np.diff(log.pose[:, 2]))
+    if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
+        k = jumps[0] + 1
+        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees: say --degrees", k)
+    for k, name in enumerate(log.joints):
+        row = int(np.abs(log.alpha[:, k]).argmax())
+        if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
+            said = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
+            raise log.wrong(f"{said}: say --degrees if these are degrees", row)
+    if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
+        said = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
+        warnings.warn(f"{log.name}: {said}", UnitWarning, stacklevel=3)
+
+
+def _checked(log: Log) -> Log:
+    """The log without jumps of a turn; SceneError for a column that does not move."""
+    pose = np.column_stack([log.pose[:, :2], np.unwrap(log.pose[:, 2])])
+    alpha = np.unwrap(log.alpha, axis=0)
+    for name, values in zip(log.joints, alpha.T):
+        if np.ptp(values) < 1e-6:
+            raise log.wrong(f"{name} does not move: leave it out with --columns")
+    if (np.ptp(pose, axis=0) == 0).all():
+        raise log.wrong("x, y and heading do not move: nothing was measured of the body's motion")
+    return Log(log.name, log.t, alpha, pose, log.joints, log.lines)
+
+
+def check_rows(log: Log) -> None:
+    """SceneError for a row that is off, or after which a column goes on elsewhere."""
+    step = np.diff(log.t)
+    part = step[:-1] / (step[:-1] + step[1:])
+    near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
+    for name, v in zip((*log.joints, "x", "y", "heading"), np.column_stack([log.alpha, log.pose]).T):
+        off = np.where(near, v[1:-1] - (1 - part) * v[:-2] - part * v[2:], 0.0)
+        k = int(np.abs(off).argmax())
+        if abs(off[k]) <= max(SPIKE * np.quantile(np.abs(off), 0.9), LARGE * np.ptp(v)):
+            continue
+        if abs(off[k]) > abs(v[k + 2] - v[k]):
+            raise log.wrong(f"{name} is {off[k]:.3g} off the rows before and after: mend that row, or drop it", k + 1)
+        jump = k + 1 if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]) else k + 2
+        what = "two gaits are in the file, or the tracking slipped" if name in log.joints else "the tracking slipped"
+        raise log.wrong(f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row: {what}; cut the log there", jump)

@@ -1,0 +1,61 @@
+"""The phase of a log: how far its cycles are, growing at a uniform rate on average."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.tube import waves
+
+LIKELY = 0.9  # of the best correlation of a log with itself: the shortest shift that comes so near is the period
+ORDER = 4  # of the Butterworth filter about the cycle's frequency
+DENSITY = 8  # harmonics of the density of a protophase that is made uniform
+
+
+def period_of(t: np.ndarray, alpha: np.ndarray) -> float:
+    """Time after which the shapes alpha (N, d) at equal steps t repeat best: the first peak of their correlation with
+    themselves that comes near the best one. 0 where there is none."""
+    off = alpha - alpha.mean(0)
+    n = len(t)
+    spectrum = np.fft.rfft(off, 2 * n, axis=0)
+    raw = np.fft.irfft(np.abs(spectrum) ** 2, axis=0).sum(1)[: n // 2 + 1]
+    correlation = raw / np.arange(n, n - len(raw), -1)
+    below = np.flatnonzero(correlation < 0)
+    if not below.size:
+        return 0.0
+    tail = correlation.copy()
+    tail[: below[0]] = -np.inf
+    peaks = 1 + np.flatnonzero((tail[1:-1] > tail[:-2]) & (tail[1:-1] >= tail[2:]))
+    peaks = peaks[tail[peaks] >= LIKELY * tail[peaks].max(initial=0.0)] if peaks.size else peaks
+    if not peaks.size or tail[peaks[0]] <= 0:
+        return 0.0
+    k = peaks[0]
+    a, b, c = correlation[k - 1 : k + 2]
+    return (k + 0.5 * (a - c) / (a - 2 * b + c)) * (t[1] - t[0])
+
+
+def protophase(t: np.ndarray, alpha: np.ndarray, period: float) -> np.ndarray:
+    """(N,), rad: the angle of the analytic signal (Hilbert transform) of the combination of joints that swings most at the
+    cycle's frequency, from half to one and a half times it; alpha (N, d) at equal steps t."""
+    from scipy.signal import butter, hilbert, sosfiltfilt
+
+    off = alpha - alpha.mean(0)
+    band = 2 * np.array([0.5, 1.5]) * (t[1] - t[0]) / period
+    slow = sosfiltfilt(butter(ORDER, band, "bandpass", output="sos"), off, axis=0)
+    z = hilbert(slow, axis=0)
+    _, vectors = np.linalg.eigh(z.conj().T @ z)
+    return np.unwrap(np.angle(z @ vectors[:, -1]))
+
+
+def uniform(phase: np.ndarray) -> np.ndarray:
+    """A growing phase (N,), remade so that it is met equally often everywhere in the cycle (Kralemann et al., Phys. Rev. E 77,
+    066205 (2008); Revzen and Guckenheimer, Phys. Rev. E 78, 051907 (2008)): the integral of its density's Fourier series."""
+    k = np.arange(1, DENSITY + 1)
+    whole = phase[phase < phase[0] + 2 * np.pi * np.floor((phase[-1] - phase[0]) / (2 * np.pi))]
+    density = np.exp(-1j * whole[:, None] * k).mean(0)
+    turned = (density / (1j * k) * (np.exp(1j * phase[:, None] * k) - 1)).sum(1)
+    return phase + 2 * turned.real
+
+
+def fitted_loop(phase: np.ndarray, alpha: np.ndarray, harmonics: int) -> np.ndarray:
+    """(d, 2 K + 1): Fourier coefficients of shapes alpha (N, d) over the phase, by least squares."""
+    return np.linalg.lstsq(waves(phase, harmonics), alpha, rcond=None)[0].T

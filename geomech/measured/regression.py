@@ -1,0 +1,217 @@
+"""The connection about a mean gait by regression over all cycles, and what the log leaves open.
+
+With delta the deviation from the mean gait theta(phi), to first order xi = A(phi) alphadot + sum_k dA/dn_k(phi) s_k alphadot,
+s_k = n_k . delta, alphadot = thetadot + deltadot: the constant, the terms in delta, in deltadot and in their products of
+Bittner, Hatton and Revzen (2018), tied by the A that they share, with all phases regressed at once on Fourier series. Where
+xi is not linear in alphadot but homogeneous of degree one, as in sand, the same holds near the gait, with A = d xi / d
+alphadot at it (Euler's theorem); that is not the least-squares A over all directions.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from geomech.tube import Loop, waves
+
+FOLDS = 5  # of the cross-validation over cycles that chooses harmonics
+MOST_BLOCKS = 120  # of cycles, that are left out as one
+MOST_NUMBERS = 20_000_000  # of all their matrices
+LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
+SECOND = 2  # harmonics of what is of the second order in the deviation
+LAGS = 4  # blocks over which errors are correlated
+CERTAIN = 5.0  # standard errors by which the cycles must vary
+LEAST_VARIED = 3e-3  # of the joint rates, that those across the gait must be: splines make up as much
+
+
+class Samples(NamedTuple):
+    """Of whole cycles. phase: (N,), of the nearest point of the mean gait. cycle: (N,), whole numbers from 0. alpha, rate:
+    (N, d). xi: (N, 3). halves: (alpha, rate) twice, with independent noise."""
+
+    phase: np.ndarray
+    cycle: np.ndarray
+    alpha: np.ndarray
+    rate: np.ndarray
+    xi: np.ndarray
+    halves: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Of products over the samples of each block of cycles: matrix (B, P, P), right (B, P, 3), square (B, 3). The first
+    ``terms`` times 2 ``harmonics`` + 1 of the P columns, waves last, make the connection, the others take up the second
+    order. terms is 1 where there is but the rate along the gait."""
+
+    matrix: np.ndarray
+    right: np.ndarray
+    square: np.ndarray
+    terms: int
+    harmonics: int
+
+    def kept(self, harmonics: int) -> Sums:
+        """With no higher waves in the connection."""
+        wide, all_columns = 2 * self.harmonics + 1, np.arange(self.matrix.shape[1])
+        pick = all_columns[(all_columns >= self.terms * wide) | (all_columns % wide <= 2 * harmonics)]
+        return Sums(self.matrix[:, pick][:, :, pick], self.right[:, pick], self.square, self.terms, harmonics)
+
+    def solved(self, weights: np.ndarray) -> np.ndarray:
+        """(..., P, 3) for weights (..., B) of the blocks."""
+        matrix, right = np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.right, 1)
+        size = np.sqrt(np.maximum(np.einsum("...pp->...p", matrix), 1e-300))
+        scaled = matrix / size[..., :, None] / size[..., None, :]
+        return np.linalg.solve(scaled, right / size[..., None]) / size[..., None]
+
+    def left(self, found: np.ndarray) -> np.ndarray:
+        """(B, 3): sums of squares of what ``found`` (P, 3) leaves of xi."""
+        crossed = np.einsum("pi,bpi->bi", found, self.right)
+        return self.square - 2 * crossed + np.einsum("pi,bpi->bi", found, self.matrix @ found)
+
+    def split(self, found: np.ndarray, loop: Loop) -> np.ndarray:
+        """(..., 3, d, d, 2 K + 1): A, and then its slopes along the normals, of solutions (..., P, 3)."""
+        wide, d = 2 * self.harmonics + 1, len(loop.coefficients)
+        if self.terms == 1:
+            return _spread_out(loop, np.moveaxis(found, -1, -2))
+        found = found[..., : self.terms * wide, :].reshape(*found.shape[:-2], d, d, wide, 3)
+        return np.moveaxis(found, -1, -4)
+
+
+def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
+    """The least A, as `Sums.split` gives it, with A theta' = along (..., 3, 2 K + 1); of as many waves, and as the gait has."""
+    d, wide = len(loop.coefficients), max(along.shape[-1], loop.coefficients.shape[1])
+    t = 2 * np.pi * np.arange(8 * wide) / (8 * wide)
+    rows = np.einsum("td,tw->tdw", loop.shape(t, 1), waves(t, wide // 2)).reshape(len(t), -1)
+    least = np.linalg.lstsq(rows, waves(t, along.shape[-1] // 2), rcond=1e-9)[0]
+    A = np.zeros((*along.shape[:-1], d, d, wide))
+    A[..., 0, :] = (along @ least.T).reshape(*along.shape[:-1], d, wide)
+    return A
+
+
+def columns(loop: Loop, phase, alpha, rate, harmonics: int, across: bool) -> np.ndarray:
+    """(N, P): of alphadot_j and s_k alphadot_j, times waves in phase, and of s_k s_l alphadot_j times a few; without ``across``
+    of the pace along the gait alone."""
+    one = np.ones((len(phase), 1))
+    if not across:
+        mean = loop.shape(phase, 1)
+        return _times(
+            (rate * mean).sum(-1, keepdims=True) / (mean**2).sum(-1, keepdims=True), one, waves(phase, harmonics)
+        )
+    normal = np.einsum("nik,ni->nk", loop.normals(phase), alpha - loop.shape(phase))
+    k, m = np.triu_indices(normal.shape[1])
+    groups = ((np.concatenate([one, normal], 1), harmonics), (normal[:, k] * normal[:, m], SECOND))
+    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups], 1)
+
+
+def _times(rate, s, w) -> np.ndarray:
+    """(N, d S W): all products of rates (N, d), deviations (N, S) and waves (N, W)."""
+    return np.einsum("nj,ns,nw->njsw", rate, s, w).reshape(len(rate), -1)
+
+
+def sums(loop: Loop, samples: Samples, harmonics: int, across: bool = True) -> Sums:
+    """Over blocks of cycles. The product of a regressor with itself is that of its two halves: these have independent noise,
+    which then biases nothing (instrumental variables; noise in a regressor would draw its coefficient to 0)."""
+    d = samples.alpha.shape[1]
+    count = columns(loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, across).shape[1]
+    most = min(MOST_BLOCKS, max(FOLDS * LAGS, MOST_NUMBERS // count**2))
+    found = []
+    for some in blocks(samples, most):
+        one, other = (
+            columns(loop, samples.phase[some], x[some], u[some], harmonics, across) for x, u in samples.halves
+        )
+        product, xi = one.T @ other, samples.xi[some]
+        found.append(((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0)))
+    return Sums(*map(np.array, zip(*found)), d * d if across else 1, harmonics)
+
+
+def blocks(samples: Samples, most: int = MOST_BLOCKS) -> list[slice]:
+    """Cycles, or as few together as make no more than ``most``."""
+    cycles = int(samples.cycle[-1]) + 1
+    block = samples.cycle * min(cycles, most) // cycles
+    ends = np.searchsorted(block, np.arange(block[-1] + 2))
+    return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+
+def varied(loop: Loop, samples: Samples) -> bool:
+    """Whether cycles vary about the gait in every direction across it, by their rates, beyond what noise does: products of
+    the two halves, in which it cancels, are surely positive."""
+    normal, mean = loop.normals(samples.phase), loop.shape(samples.phase, 1)
+    pace = (samples.rate * mean).sum(-1) / (mean**2).sum(-1)
+    one, other = (np.einsum("nik,ni->nk", normal, u - pace[:, None] * mean) for _, u in samples.halves)
+    each = np.array([one[some].T @ other[some] for some in blocks(samples)])
+    least = np.linalg.eigh((each + each.swapaxes(1, 2)).mean(0))[1][:, 0]
+    q = np.einsum("bij,i,j->b", each, least, least)
+    size = LEAST_VARIED**2 * (samples.rate**2).sum() / len(q)
+    return bool(q.mean() > max(CERTAIN * q.std(ddof=1) / np.sqrt(len(q)), size))
+
+
+def unknown(loop: Loop, A: np.ndarray) -> np.ndarray:
+    """(3 (d - 1) 2, 3, d, d, 2 K + 1): errors of A across the gait, and of its slopes, that are not known: as large as A is
+    along it, and that over the gait's size. A: as `Sums.split` gives it."""
+    d, wide = A.shape[1], A.shape[-1]
+    t = 2 * np.pi * np.arange(4 * wide) / (4 * wide)
+    rate = loop.shape(t, 1)
+    along = np.einsum("ijk,tk,tj->ti", A[:, :, 0], waves(t, wide // 2), rate) / np.linalg.norm(rate, axis=-1)[:, None]
+    size, found = np.sqrt((along**2).mean(0)), []
+    speed = np.linalg.norm(rate, axis=-1)
+    normal = loop.normals(t) * (speed / np.sqrt((speed**2).mean()))[:, None, None]  # which are as few waves as the gait
+    across = np.linalg.lstsq(waves(t, wide // 2), normal.reshape(len(t), -1), rcond=None)[0].T
+    across, extent = across.reshape(d, d - 1, wide), np.linalg.norm(loop.coefficients[:, 1:])
+    for i in range(3):
+        for k in range(d - 1):
+            off = np.zeros((2, 3, d, d, wide))
+            off[0, i, :, 0] = size[i] * across[:, k]
+            off[1, i, :, 1 + k, 0] = size[i] / extent
+            found += [*off]
+    return np.array(found)
+
+
+def chosen(held: Sums) -> int:
+    """Harmonics: MORE than those with which cycles that are left out are predicted best, of the component of xi that asks for
+    most, so that what is cut off stays below the noise."""
+    fold, errors = np.arange(len(held.square)) % FOLDS, []
+    for k in range(1, held.harmonics + 1):
+        some = held.kept(k)
+        parts = [some.left(some.solved((fold != f).astype(float)))[fold == f].sum(0) for f in range(FOLDS)]
+        errors.append(np.sum(parts, 0))
+    return min(held.harmonics, max(LEAST, int(np.argmin(errors, 0).max()) + 1 + MORE))
+
+
+def solution(held: Sums) -> tuple[np.ndarray, np.ndarray]:
+    """(found (P, 3), errors (E, P, 3)), which are independent and of which the squares add up to the variance.
+
+    They are those of the jackknife over blocks of cycles (each block left out in turn), as they are correlated between
+    neighbours: the noise of a pose ends one cycle too far and begins the next. Correlations fall to 0 over LAGS blocks
+    (Bartlett's weights, by which no variance becomes negative; Newey and West 1987). The last one is half of what the terms of
+    the second order change: where links begin or cease to stick, these are no end of the series."""
+    count, first = len(held.square), held.terms * (2 * held.harmonics + 1)
+    found = held.solved(np.ones(count))
+    without = np.array([held.solved(row) for row in 1 - np.eye(count)])
+    errors = lagged(without - found)
+    if first == len(found):
+        return found, errors
+    plain = replace(held, matrix=held.matrix[:, :first, :first], right=held.right[:, :first]).solved(np.ones(count))
+    change = np.concatenate([found[:first] - plain, np.zeros_like(found[first:])]) / 2
+    return found, np.concatenate([errors, change[None]])
+
+
+def lagged(errors: np.ndarray) -> np.ndarray:
+    """Errors (B + LAGS - 1, ...) whose squares add up to the variance of the sum of ``errors`` (B, ...), the neighbours
+    among which are correlated."""
+    count = len(errors)
+    lags = _lags(count)
+    behind = np.subtract.outer(np.arange(count + lags - 1), np.arange(count))
+    return np.tensordot(((behind >= 0) & (behind < lags)) / np.sqrt(lags), errors, 1)
+
+
+def _lags(count: int) -> int:
+    return min(LAGS, max(1, count // 8))
+
+
+def factor(count: int, level: float) -> float:
+    """Standard errors of an interval of so many blocks: Student's t, with as many degrees of freedom as Bartlett's weights
+    leave of the blocks."""
+    from scipy.stats import t
+
+    return float(t.ppf((1 + level) / 2, max(2.0, 1.5 * count / _lags(count) - 1)))

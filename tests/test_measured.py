@@ -1,0 +1,528 @@
+"""Measured gaits: what logs of known velocities tell, and logs that are refused."""
+
+import contextlib
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+import geomech
+import rft
+from geomech import cli, connection, gaits, measured
+from geomech.connection import Connection
+from geomech.curvature import ccf
+from geomech.errors import SceneError, UnitWarning
+from geomech.measured import cycles, phase, regression, smooth, synthetic
+from geomech.output import measured as told
+from geomech.output import netcdf, plots
+from geomech.output.explain import explain
+from geomech.reconstruct import displacement
+from geomech.scene import Scene, load
+from geomech.study.bench import Study
+from geomech.systems import Swimmer, Table
+from geomech.tube import Loop, Tube, waves
+from rft import se2
+
+GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
+BODY = rft.Chain((1, 1.3, 0.8))
+NAMES = ("t", "alpha_1", "alpha_2", "x", "y", "heading")
+
+
+@pytest.fixture(scope="module")
+def viscous():
+    """The velocity of an uneven swimmer, in a table that is the truth here."""
+    return connection.fit(Swimmer(rft.Viscous(2.0), BODY).velocity, connection.grid(2, 15, 1.5)).velocity
+
+
+def log_of(made, name="log.csv"):
+    names = tuple(f"alpha_{k + 1}" for k in range(made.alpha.shape[1]))
+    return measured.Log(name, made.t, made.alpha, made.pose, names, np.arange(len(made.t)) + 2)
+
+
+def fitted(velocity, gait=GAIT, fit=None, **asked):
+    asked = {"cycles": 40, "samples": 40, **asked}
+    return measured.fit_log(log_of(synthetic.made(velocity, gait, **asked)), **(fit or {}))
+
+
+@pytest.fixture(scope="module")
+def usual(viscous):
+    return fitted(viscous, seed=1)
+
+
+def true_net(f, velocity):
+    return displacement(velocity(*f.gait.cycle(128)))
+
+
+def true_A(f, velocity, t, h=1e-5):
+    """d xi / d alphadot at the mean gait."""
+    alpha, rate, e = f.known.loop.shape(t), f.known.loop.shape(t, 1), h * np.eye(2)
+    return np.stack([velocity(alpha, rate + x) - velocity(alpha, rate - x) for x in e], -1) / (2 * h)
+
+
+def covered(velocity, seeds, **asked):
+    """Shares of net poses (3,) of the mean gait, and of entries of A at 8 phases, that intervals of ``seeds`` logs cover."""
+    net, A, t = [], [], 2 * np.pi * np.arange(8) / 8
+    for seed in seeds:
+        f = fitted(velocity, seed=seed, **asked)
+        found, off = f.displacement
+        net.append(np.abs(found - true_net(f, velocity)) <= off)
+        found, off = f.along(t)
+        A.append(np.abs(found - true_A(f, velocity, t)) <= off)
+    return np.mean(net), np.mean(A)
+
+
+def test_intervals_cover_the_truth_in_a_fluid(viscous):
+    net, A = covered(viscous, range(5), noise=2e-3, cycles=24, samples=32)
+    assert net >= 13 / 15
+    assert 0.9 <= A
+
+
+def test_half_of_the_intervals_of_one_half_miss(viscous, usual):
+    """An interval that covered all would cover too much."""
+    wide, narrow = (measured.fit_log(usual.log, level=x, harmonics=5) for x in (0.95, 0.5))
+    np.testing.assert_allclose(wide.displacement[0], narrow.displacement[0], rtol=1e-12)
+    t = 2 * np.pi * np.arange(32) / 32
+    found, off = narrow.along(t)
+    assert 0.3 <= np.mean(np.abs(found - true_A(narrow, viscous, t)) <= off) <= 0.75
+
+
+def test_intervals_cover_the_net_pose_in_sand():
+    """xi is not linear in alphadot there; near the gait A is its derivative."""
+    velocity = Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
+    net, A = covered(velocity, range(2), cycles=20, samples=32)
+    assert net >= 5 / 6
+    assert A >= 0.4  # corners of A, where links begin and cease to stick, are rounded off
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    ("medium", "gait", "asked", "least"),
+    [
+        ("viscous", GAIT, {}, 0.93), ("viscous", GAIT, {"cycles": 12}, 0.93), ("viscous", GAIT, {"noise": 5e-3}, 0.93),
+        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.93), ("sand", GAIT, {}, 0.6),
+        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.4),
+    ],
+)  # fmt: skip
+def test_intervals_cover_the_truth_in_many_logs(medium, gait, asked, least, viscous):
+    sand = Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
+    count = 100 if medium == "viscous" else 30
+    net, A = covered(viscous if medium == "viscous" else sand, range(count), gait=gait, **{"cycles": 60, **asked})
+    print(f"{medium}, {type(gait).__name__}, {asked}: net poses {net:.3f}, entries of A {A:.3f}")
+    assert net >= 0.93
+    assert A >= least
+
+
+def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
+    f = fitted(viscous, seed=2, noise=1e-6, pose_noise=1e-6, samples=48, cycles=40, fit={"harmonics": 7})
+    t = 2 * np.pi * np.arange(16) / 16
+    assert np.abs(f.along(t)[0] - true_A(f, viscous, t)).max() < 2e-3  # of 0.3
+    n = f.known.loop.normals(t)[..., 0]
+    shape, far = f.known.loop.shape(t), 0.05 * n
+    A = lambda alpha: np.stack([viscous(alpha, x) for x in np.eye(2)], -1)
+    slope = (A(shape + far) - A(shape - far)) / 0.1
+    assert np.abs((f.known.of(shape + far) - f.known.of(shape - far)) / 0.1 - slope).max() < 0.02  # of 0.2
+    np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
+
+
+def test_where_and_when_a_log_begins_does_not_matter(viscous):
+    """Nor does the unit of time: A is what alphadot is multiplied by."""
+    made = synthetic.made(viscous, GAIT, cycles=20, samples=40, seed=1)
+    one = measured.fit_log(log_of(made), harmonics=4)
+    there = se2.compose(np.array([3.0, -2.0, 2.5]), made.pose)
+    other = measured.fit_log(log_of(made._replace(pose=there, t=7 + 3 * made.t)), harmonics=4)
+    np.testing.assert_allclose(other.known.A, one.known.A, atol=1e-9)
+    np.testing.assert_allclose(other.measured, one.measured, atol=1e-9)
+    assert math.isclose(other.frequency, one.frequency / 3)
+
+
+def test_a_backward_log_has_the_same_connection(viscous):
+    made = synthetic.made(viscous, GAIT, cycles=40, samples=40, seed=1)
+    back = made._replace(t=made.t[-1] - made.t[::-1], alpha=made.alpha[::-1], pose=made.pose[::-1])
+    one, other = (measured.fit_log(log_of(x), harmonics=5) for x in (made, back))
+    shape = one.known.loop.shape(np.arange(5.0))
+    np.testing.assert_allclose(other.known.of(shape), one.known.of(shape), atol=0.02)
+    for k in (0, 2):
+        np.testing.assert_allclose(other.displacement[0][k], -one.displacement[0][k], atol=2e-3)
+
+
+def test_the_phase_is_that_of_the_gait_and_grows_evenly(viscous):
+    made = synthetic.made(viscous, GAIT, cycles=40, samples=40, jitter=0.05, seed=4)
+    log = log_of(made)
+    period = cycles.period(log)
+    assert abs(period - 1) < 0.02
+    at, loop = cycles.phased(log, smooth.smoothed(made.t, made.alpha, period), period, 4)
+    inner = slice(40, -40)
+    off = (at - made.phase)[inner]
+    assert np.std(off) < 0.12  # deviations of 0.05 rad along a gait of 0.65
+    assert (at[inner][-1] > at[inner][0]) and np.abs(np.exp(1j * at[inner]).mean()) < 0.02
+    true = GAIT.shape(np.linspace(0, 2 * np.pi, 300))
+    assert np.abs(true - loop.shape(loop.nearest(true))).max() < 0.03
+
+
+def test_uniform_makes_a_density_flat():
+    t = np.linspace(0, 60 * np.pi, 6001)[:-1]
+    bent = t + 0.3 * np.sin(t) + 0.1 * np.cos(2 * t)
+    even = phase.uniform(bent)
+    assert (np.diff(even) > 0).all()
+    assert np.abs(np.exp(1j * np.arange(1, 4) * even[:, None]).mean(0)).max() < 0.01
+    assert np.ptp(even - t) < 0.03
+
+
+def test_the_period_is_that_of_the_gait_not_of_its_strongest_harmonic():
+    t = np.linspace(0, 20, 1001)
+    alpha = np.stack([0.3 * np.cos(2 * np.pi * t), np.sin(4 * np.pi * t + 0.3)], -1)
+    assert abs(phase.period_of(t, alpha) - 1) < 1e-3
+    assert phase.period_of(t, np.stack([t, t], -1)) == 0
+
+
+def test_splines_give_rates_and_halves_with_noise_of_their_own():
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 30, 2400))
+    exact = np.stack([np.sin(2 * np.pi * t), np.cos(4 * np.pi * t)], -1)
+    rate = 2 * np.pi * np.stack([np.cos(2 * np.pi * t), -2 * np.sin(4 * np.pi * t)], -1)
+    s = smooth.smoothed(t, exact + 0.01 * rng.normal(size=exact.shape), 1.0)
+    inner = slice(100, -100)
+    assert np.abs(s.values - exact)[inner].std() < 0.006
+    assert np.abs(s.rates - rate)[inner].std() < 0.25  # of 6 and 12
+    np.testing.assert_allclose(s.noise, 0.01, rtol=0.1)
+    one, other = ((values - exact)[inner] for values, _ in s.halves)
+    assert abs((one * other).mean()) < 0.2 * (one**2).mean()
+
+
+def test_errors_of_neighbours_add_up_as_bartlett_has_it():
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(40, 2))
+    lags = regression.LAGS
+    wanted = (x**2).sum(0) + 2 * sum((1 - k / lags) * (x[k:] * x[:-k]).sum(0) for k in range(1, lags))
+    np.testing.assert_allclose((regression.lagged(x) ** 2).sum(0), wanted)
+    assert len(regression.lagged(x[:10])) == 10
+
+
+def test_noise_in_the_joints_draws_nothing_to_zero(viscous):
+    """Plain least squares would have A across the gait too small by a third."""
+    f = fitted(viscous, seed=5, noise=2e-2, spread=0.05, cycles=80, samples=32, pose_noise=1e-4, fit={"harmonics": 4})
+    t = 2 * np.pi * np.arange(16) / 16
+    n = f.known.loop.normals(t)[..., 0]
+    found, true = (np.einsum("tij,tj->ti", A, n)[:, 2] for A in (f.along(t)[0], true_A(f, viscous, t)))
+    assert abs(found @ true / (true @ true) - 1) < 0.12
+
+
+def wave(alpha, alphadot):
+    """A body of three joints, whose A has all entries."""
+    a, b, c = np.moveaxis(alpha, -1, 0)
+    A = np.stack([
+        np.stack([0.2 + 0.1 * np.sin(a + b), 0.1 * np.cos(b - c), -0.15 * np.sin(c)], -1),
+        np.stack([0.1 * a * b, 0.3 - 0.1 * np.cos(c), 0.1 * np.sin(a - b)], -1),
+        np.stack([0.3 + 0.1 * c, -0.2 * np.cos(a), 0.25 + 0.1 * np.sin(b)], -1),
+    ], -2)  # fmt: skip
+    return np.einsum("...ij,...j->...i", A, alphadot)
+
+
+def test_three_joints(tmp_path):
+    gait = gaits.Fourier(cos=((0.5,), (0.2,), (-0.3,)), sin=((0.1,), (0.5,), (0.4,)), centre=(0.1, 0.0, -0.2))
+    f = fitted(wave, gait, cycles=40, samples=24, seed=1, fit={"harmonics": 4})
+    alpha = f.known.loop.shape(np.arange(6.0))
+    true = np.stack([wave(alpha, x) for x in np.eye(3)], -1)
+    found, off = f.along(np.arange(6.0))
+    assert np.mean(np.abs(found - true) <= off) > 0.85
+    assert (np.abs(f.displacement[0] - displacement(wave(*f.gait.cycle(128)))) <= f.displacement[1]).all()
+    told.save_field(tmp_path / "a.nc", f)
+    system = Table(tmp_path / "a.nc")
+    np.testing.assert_allclose(system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12)
+
+
+def test_normals_are_orthonormal_and_close():
+    c = np.array(
+        [[0.1, 0.8, 0.1, 0.1, 0.0], [0.0, -0.2, 0.6, 0.0, 0.2], [0.2, 0.3, 0.3, 0.1, 0.1], [0, 0.1, 0.5, 0.2, 0]]
+    )
+    for d in (2, 3, 4):
+        loop, t = Loop(c[:d]), np.linspace(-7, 7, 201)
+        n, rate = loop.normals(t), loop.shape(t, 1)
+        np.testing.assert_allclose(
+            np.einsum("tik,til->tkl", n, n), np.broadcast_to(np.eye(d - 1), (201, d - 1, d - 1)), atol=2e-3
+        )
+        assert np.abs(np.einsum("tik,ti->tk", n, rate / np.linalg.norm(rate, axis=1)[:, None])).max() < 2e-3
+        assert np.abs(np.diff(loop.normals(np.linspace(0, 4 * np.pi, 2001)), axis=0)).max() < 0.1
+        phi = np.linspace(0, 2 * np.pi, 50)[1:-1]
+        alpha = loop.shape(phi) + 0.02 * loop.normals(phi) @ np.full(d - 1, 1.0)
+        np.testing.assert_allclose(loop.nearest(alpha), phi, atol=2e-3)
+
+
+def test_waves_are_a_fourier_series_and_its_derivatives():
+    t, h = np.linspace(0, 6, 11), 1e-5
+    np.testing.assert_allclose(
+        waves(t, 2)[:, 1:], np.stack([np.cos(t), np.sin(t), np.cos(2 * t), np.sin(2 * t)], -1), atol=1e-12
+    )
+    for order in (0, 1):
+        np.testing.assert_allclose(
+            (waves(t + h, 3, order) - waves(t - h, 3, order)) / (2 * h), waves(t, 3, order + 1), atol=1e-8
+        )
+
+
+def test_the_ccf_near_the_gait_is_that_of_differences(usual):
+    known, h = usual.known, 1e-5
+    t = np.linspace(0.3, 6, 7)
+    alpha = known.loop.shape(t) + 0.04 * known.loop.normals(t)[..., 0]
+    d = [(known.of(alpha + h * e) - known.of(alpha - h * e)) / (2 * h) for e in np.eye(2)]
+    A = known.of(alpha)
+    np.testing.assert_allclose(
+        known.ccf(alpha), d[0][..., 1] - d[1][..., 0] + se2.bracket(A[..., 0], A[..., 1]), atol=1e-7
+    )
+    field = ccf(usual.tube)
+    assert np.isnan(field.values).any() and np.isfinite(field.values).any()
+
+
+@pytest.fixture(scope="module")
+def field(usual, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("measured")
+    told.save_field(folder / "field.nc", usual)
+    (folder / "mine.toml").write_text(told.scene_toml(usual, folder / "field.nc", folder / "mine.toml"))
+    return folder
+
+
+def test_a_field_is_read_back_as_a_system(usual, field):
+    tube = Connection.load(field / "field.nc")
+    assert isinstance(tube, Tube)
+    np.testing.assert_array_equal(tube.A, usual.tube.A)
+    scene = load(field / "mine.toml")
+    np.testing.assert_allclose(scene.gait.cycle(64), usual.gait.cycle(64), atol=1e-12)
+    assert math.isclose(scene.frequency, usual.frequency)
+    net, off = usual.displacement
+    study = Study(scene)
+    np.testing.assert_allclose(study.displacement("direct", amplitudes=[1.0])[0], net, rtol=1e-10)
+    table = study.study([1.0], ["path", "direct"])
+    assert np.hypot(*off[:2]) <= table["estimate"]["direct"][0] < 1.5 * np.hypot(*off[:2])
+    assert off[2] <= table["estimate_heading"]["direct"][0] < 1.5 * off[2]
+    assert np.isnan(study.curvature.values).any()
+    assert (study.curvature_error.values[np.isfinite(study.curvature.values)] > 0).all()
+
+
+def test_what_the_data_do_not_reach_is_refused(field):
+    scene = load(field / "mine.toml")
+    system, study = scene.system, Study(scene)
+    with pytest.raises(ValueError, match=r"the data do not reach alpha = \(0.2, -0.1\), \d"):
+        system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
+    with pytest.raises(SceneError, match="the data do not reach"):
+        study.displacement("direct", amplitudes=[0.5])
+    with pytest.raises(SceneError, match="the area tier sums a field up, and A is known near the mean gait"):
+        study.displacement("area")
+    with pytest.raises(SceneError, match="no gait but one to search"):
+        geomech.optimise.optimise(scene, "displacement")
+    tube = study.fitted
+    shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
+    np.testing.assert_array_equal(np.isnan(tube.A[0, 0]), tube.reach(shapes) > 1)
+    assert "known near a measured gait alone" in explain(scene)
+
+
+def test_the_reach_is_that_of_the_data(usual):
+    """Deviations of 0.05 rad in both joints, of which 2.5 standard deviations count."""
+    t = np.linspace(0, 6, 9)
+    n = usual.known.loop.normals(t)[..., 0]
+    for side in (-0.125, 0.125):
+        np.testing.assert_allclose(usual.known.reach(usual.known.loop.shape(t) + side * n), 1, atol=0.25)
+    assert np.abs(usual.known.reach(usual.known.loop.shape(t))).max() < 1e-9
+    near = measured.fit_log(usual.log, within=0.03, harmonics=4)
+    np.testing.assert_allclose(
+        near.known.reach(near.known.loop.shape(t) + 0.03 * near.known.loop.normals(t)[..., 0]), 1
+    )
+
+
+def test_a_field_written_again_keeps_every_digit(field, tmp_path):
+    study = Study(load(field / "mine.toml"))
+    netcdf.save_connection(tmp_path / "again.nc", study)
+    one, other = (Connection.load(x).known for x in (field / "field.nc", tmp_path / "again.nc"))
+    for f in dataclasses.fields(one):
+        a, b = (getattr(x, f.name) for x in (one, other))
+        np.testing.assert_array_equal(*((a.coefficients, b.coefficients) if f.name == "loop" else (a, b)))
+
+
+def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
+    minus = Connection.load(field / "field.nc", sign="-")
+    alpha = usual.known.loop.shape(np.arange(3.0))
+    np.testing.assert_array_equal(minus(alpha), -usual.tube(alpha))
+    two = Table(field / "field.nc", body_length=2.0)
+    cycle = usual.gait.cycle(64)
+    np.testing.assert_allclose(two.run(*cycle).net * [2, 2, 1], Table(field / "field.nc").run(*cycle).net, rtol=1e-9)
+    metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
+    told.save_field(tmp_path / "m.nc", metres)
+    assert (Table(tmp_path / "m.nc").length, Table(tmp_path / "m.nc").unit) == (0.3, "m")
+
+
+def test_damaged_fields_are_refused(field, tmp_path):
+    raw = (field / "field.nc").read_bytes()
+    rng = np.random.default_rng(1)
+    head = raw.index(b"gait_spread")
+    for _ in range(25):
+        bad = bytearray(raw)
+        bad[rng.integers(0, head + 400)] = rng.integers(0, 256)
+        (tmp_path / "bad.nc").write_bytes(bytes(bad))
+        with contextlib.suppress(ValueError):  # and nothing else
+            Table(tmp_path / "bad.nc").run(*gaits.Circle().cycle(16))
+
+
+def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_path):
+    f = fitted(viscous, seed=1, spread=0.0, cycles=14)
+    assert not f.across
+    net, off = f.displacement
+    assert (np.abs(net - true_net(f, viscous)) <= off).all() and off.max() < 2e-3
+    t = np.arange(6.0)
+    n = f.known.loop.normals(t)[..., 0]
+    assert np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min() > 0.05  # not known
+    told.save_field(tmp_path / "a.nc", f)
+    np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
+    assert told.numbers(f)["status"].startswith("fitted along the gait alone")
+
+
+def written(path, made, names=NAMES, change=None):
+    rows = np.column_stack([made.t, made.alpha, made.pose])
+    rows = rows if change is None else change(rows)
+    path.write_text("\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def short(viscous):
+    return synthetic.made(viscous, GAIT, cycles=14, samples=30, seed=1)
+
+
+def changed(column, value, rows=slice(None)):
+    def change(table):
+        table[rows, column] = value(table[rows, column])
+        return table
+
+    return change
+
+
+def noise(values):
+    return np.random.default_rng(0).uniform(-1, 1, values.shape)
+
+
+def swapped(rows):
+    rows[[100, 101]] = rows[[101, 100]]
+    return rows
+
+
+def faster(rows):
+    rows[:, 0] += np.maximum(np.arange(len(rows)) - len(rows) // 2, 0) / 30
+    return rows
+
+
+def larger(rows):
+    """From one cycle to the next, where the gait passes its centre."""
+    rows[205:, 1:3] = GAIT.middle + 1.25 * (rows[205:, 1:3] - GAIT.middle)
+    return rows
+
+
+BAD = {
+    "gap": (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one"),
+    "unsorted": (swapped, "line 103: t = .* comes after .*: sort the rows by time"),
+    "twice": (changed(0, lambda t: t[0] + 0 * t, slice(99, 101)), "line 102: t = .* is given twice: keep one"),
+    "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say --degrees"),
+    "heading in degrees": (
+        changed(5, lambda x: np.degrees(x) % 360), "line .*: heading jumps by .*, a turn in degrees: say --degrees",
+    ),
+    "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
+    "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
+    "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
+    "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 9 cycles"),
+    "fewer": (lambda r: r[:90], "90 rows are too few"),
+    "thin": (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),
+    "noise": (changed(slice(1, 6), noise), "the joints (do not repeat|repeat 2.. times)"),
+    "spike": (changed(3, lambda x: x + 1, 200), "line 202: x is .* off the rows before and after: mend that row"),
+    "slip": (changed(3, lambda x: x + 1, slice(200, None)), "line 202: x jumps by .*: the tracking slipped"),
+    "two rates": (faster, "(the joints repeat every .* two gaits are in it|the gait stands, slips or runs back)"),
+    "two gaits": (changed(1, lambda x: 0.4 * x - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
+    "two sizes": (larger, "line 2..: (two gaits: . cycles are of one kind and . of another|alpha_. jumps)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_logs_get_one_line(name, short, tmp_path):
+    change, said = BAD[name]
+    with pytest.raises(SceneError, match="^log.csv(, |: )") as refused:
+        measured.fit_log(written(tmp_path / "log.csv", short, change=change))
+    assert refused.match(said)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "said"),
+    [
+        (("t", "alpha_1", "alpha_2", "x", "y", "course"), (), "no column heading; it has"),
+        (("t", "alpha_1", "bend", "x", "y", "heading"), (), "1 columns of joint angles"),
+        (("t", "alpha_1", "alpha_1", "x", "y", "heading"), (), "column 'alpha_1' is there twice"),
+        (NAMES, ("t", "alpha_1", "alpha_3", "x", "y", "heading"), "no column 'alpha_3'"),
+        (NAMES, ("t", "alpha_1", "x", "y", "heading"), "--columns are those of t, two joint angles or more"),
+    ],
+)
+def test_missing_columns_are_named(names, columns, said, short, tmp_path):
+    with pytest.raises(SceneError, match=f"log.csv.*{said}"):
+        measured.fit_log(written(tmp_path / "log.csv", short, names), columns=columns)
+
+
+@pytest.mark.parametrize("text", ["", "hello\nworld\n", "t;alpha_1;alpha_2\n1;2;3\n", "\0\1\2", "1,2,3\n4,5,6\n"])
+def test_what_is_no_log_is_refused(text, tmp_path):
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(SceneError, match="t,alpha_1,alpha_2,x,y,heading"):
+        measured.fit_log(tmp_path / "log.csv")
+
+
+def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
+    one = measured.fit_log(written(tmp_path / "a.csv", short), harmonics=3)
+
+    def other_way(rows):
+        rows[:, 5] = np.mod(rows[:, 5], 2 * np.pi)
+        rows[:, [1, 2, 5]] = np.degrees(rows[:, [1, 2, 5]])
+        return rows[:, [3, 5, 2, 0, 4, 1]]
+
+    path = written(tmp_path / "b.csv", short, ("X", "psi", "q2", "Clock", "Y", "q1"), other_way)
+    other = measured.fit_log(path, columns=["clock", "q1", "q2", "x", "y", "psi"], degrees=True, harmonics=3)
+    np.testing.assert_allclose(other.known.A, one.known.A, rtol=1e-6, atol=1e-9)
+    names = ("time", "joint1_deg", "joint2_deg", "x", "y", "theta")
+    third = measured.fit_log(written(tmp_path / "c.csv", short, names, changed(slice(1, 3), np.degrees)), harmonics=3)
+    np.testing.assert_allclose(third.known.A, one.known.A, rtol=1e-6, atol=1e-9)
+    with pytest.warns(UnitWarning, match="drop --degrees"):
+        measured.read(tmp_path / "a.csv", degrees=True)
+
+
+def test_rows_at_uneven_times_tell_the_same(viscous):
+    made = synthetic.made(viscous, GAIT, cycles=40, samples=60, seed=1)
+    keep = np.sort(np.random.default_rng(0).permutation(len(made.t))[: int(0.7 * len(made.t))])
+    f = measured.fit_log(log_of(synthetic.Made(*(x[keep] for x in made))), harmonics=5)
+    assert (np.abs(f.displacement[0] - true_net(f, viscous)) <= f.displacement[1]).all()
+
+
+def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        cli.main(["trajectory", str(field / "mine.toml"), "--cycles", "12", "-o", "tr.csv"])
+    f = measured.fit_log("tr.csv")
+    net = Study(load(field / "mine.toml")).displacement("direct")
+    np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
+    np.testing.assert_allclose(f.displacement[0], net, atol=1e-4)
+
+
+def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    log = usual.log
+    synthetic.save("log.csv", synthetic.Made(log.t, log.alpha, log.pose, log.t))
+    with pytest.raises(SystemExit) as left:
+        cli.main(["fit", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json"])
+    assert left.value.code == 0
+    found = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(found["displacement_predicted"], usual.displacement[0], atol=1e-7)
+    assert all(a < x < b for x, (a, b) in zip(found["displacement_predicted"], found["interval"]))
+    np.testing.assert_allclose(found["displacement_measured"], np.mean(found["per_cycle"]["measured"], 0), atol=1e-12)
+    assert (found["cycles"], found["coverage_level"], found["status"]) == (len(usual.measured), 0.95, "fitted")
+    assert np.shape(found["A"]) == np.shape(found["A_error"]) == (3, 2, len(found["phase"]))
+    assert {p.name for p in tmp_path.iterdir()} == {"log.csv", "field.nc", "mine.toml"}
+    scene = load("mine.toml")
+    assert isinstance(scene, Scene) and scene.gait.joints == 2
+
+
+def test_the_picture_shows_all_there_is(usual):
+    fig = plots.measured_figure(usual)
+    labels = " ".join(ax.get_xlabel() + ax.get_ylabel() for ax in fig.axes)
+    assert "BL/rad" in labels and "x predicted (BL)" in labels and "heading logged (rad)" in labels
