@@ -2,7 +2,7 @@
 
 With theta(phi) the gait, phi the phase of its point nearest to a shape and delta = alpha - theta(phi), which is normal to it,
 A(alpha) = A(phi) + sum_k dA/dn_k(phi) (n_k . delta), n_k orthonormal along the gait (Bittner, Hatton and Revzen, Nonlinear
-Dynamics 94, 1933 (2018), Eq. 10, with the phase of the nearest point). All are Fourier series in phi.
+Dynamics 94, 1933 (2018), here with the phase of the nearest point). All are Fourier series in phi.
 """
 
 from __future__ import annotations

@@ -10,13 +10,14 @@ import pytest
 
 import geomech
 import rft
+from figures import measured_gait
 from geomech import cli, connection, gaits, measured
 from geomech.connection import Connection
 from geomech.curvature import ccf
 from geomech.errors import SceneError, UnitWarning
 from geomech.measured import cycles, phase, regression, smooth, synthetic
 from geomech.output import measured as told
-from geomech.output import netcdf, plots
+from geomech.output import netcdf
 from geomech.output.explain import explain
 from geomech.reconstruct import displacement
 from geomech.scene import Scene, load
@@ -100,17 +101,17 @@ def test_intervals_cover_the_net_pose_in_sand():
 @pytest.mark.parametrize(
     ("medium", "gait", "asked", "least"),
     [
-        ("viscous", GAIT, {}, 0.93), ("viscous", GAIT, {"cycles": 12}, 0.93), ("viscous", GAIT, {"noise": 5e-3}, 0.93),
-        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.93), ("sand", GAIT, {}, 0.6),
-        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.4),
+        ("viscous", GAIT, {}, 0.93), ("viscous", GAIT, {"cycles": 14}, 0.93), ("viscous", GAIT, {"noise": 5e-3}, 0.93),
+        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.9), ("sand", GAIT, {}, 0.7),
+        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.55),
     ],
 )  # fmt: skip
 def test_intervals_cover_the_truth_in_many_logs(medium, gait, asked, least, viscous):
-    sand = Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
-    count = 100 if medium == "viscous" else 30
-    net, A = covered(viscous if medium == "viscous" else sand, range(count), gait=gait, **{"cycles": 60, **asked})
+    """In sand A has corners, where links begin and cease to stick: its entries are covered less often than net poses."""
+    velocity = viscous if medium == "viscous" else Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
+    net, A = covered(velocity, range(100), gait=gait, **{"cycles": 60, **asked})
     print(f"{medium}, {type(gait).__name__}, {asked}: net poses {net:.3f}, entries of A {A:.3f}")
-    assert net >= 0.93
+    assert net >= (0.93 if medium == "viscous" else 0.88)
     assert A >= least
 
 
@@ -191,13 +192,35 @@ def test_splines_give_rates_and_halves_with_noise_of_their_own():
     assert abs((one * other).mean()) < 0.2 * (one**2).mean()
 
 
+def test_pieces_of_a_long_spline_are_the_whole(monkeypatch):
+    rng = np.random.default_rng(0)
+    t = np.sort(rng.uniform(0, 20, 1300))
+    rows = np.stack([np.sin(2 * np.pi * t), np.cos(3 * t)], -1) + 0.1 * rng.normal(size=(1300, 2))
+    whole = smooth.smoothed(t, rows, 1.0)
+    monkeypatch.setattr(smooth, "PIECE", 400)
+    parts = smooth.smoothed(t, rows, 1.0)
+    for a, b in ((whole.values, parts.values), (whole.rates, parts.rates), (whole.halves[1][1], parts.halves[1][1])):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+
+
 def test_errors_of_neighbours_add_up_as_bartlett_has_it():
     rng = np.random.default_rng(0)
     x = rng.normal(size=(40, 2))
-    lags = regression.LAGS
+    lags = 5  # an eighth of them
     wanted = (x**2).sum(0) + 2 * sum((1 - k / lags) * (x[k:] * x[:-k]).sum(0) for k in range(1, lags))
     np.testing.assert_allclose((regression.lagged(x) ** 2).sum(0), wanted)
     assert len(regression.lagged(x[:10])) == 10
+    assert len(regression.lagged(np.tile(x, (5, 1)))) == 200 + regression.LAGS - 1
+
+
+def test_half_of_what_the_second_order_changes_is_an_error(usual):
+    held = regression.sums(usual.known.loop, usual.samples, 3)
+    found, errors = regression.solution(held)
+    first = held.terms * 7
+    plain = dataclasses.replace(held, matrix=held.matrix[:, :first, :first], right=held.right[:, :first])
+    change = found[:first] - plain.solved(np.ones(len(held.square)))
+    np.testing.assert_allclose(errors[-1, :first], change / 2, atol=1e-12)
+    assert np.abs(change).max() > 1e-4 and len(found) > first
 
 
 def test_noise_in_the_joints_draws_nothing_to_zero(viscous):
@@ -345,6 +368,7 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     two = Table(field / "field.nc", body_length=2.0)
     cycle = usual.gait.cycle(64)
     np.testing.assert_allclose(two.run(*cycle).net * [2, 2, 1], Table(field / "field.nc").run(*cycle).net, rtol=1e-9)
+    np.testing.assert_allclose(two.own_error(*cycle), Table(field / "field.nc").own_error(*cycle) * [0.5, 1])
     metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
     told.save_field(tmp_path / "m.nc", metres)
     assert (Table(tmp_path / "m.nc").length, Table(tmp_path / "m.nc").unit) == (0.3, "m")
@@ -522,7 +546,9 @@ def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch, capsy
     assert isinstance(scene, Scene) and scene.gait.joints == 2
 
 
-def test_the_picture_shows_all_there_is(usual):
-    fig = plots.measured_figure(usual)
+def test_the_picture_shows_all_there_is():
+    numbers = measured_gait.compute(cycles=12)
+    assert "log.csv: 10 whole cycles of alpha_1, alpha_2, " in measured_gait.table(numbers)
+    fig = measured_gait.draw(numbers)
     labels = " ".join(ax.get_xlabel() + ax.get_ylabel() for ax in fig.axes)
     assert "BL/rad" in labels and "x predicted (BL)" in labels and "heading logged (rad)" in labels

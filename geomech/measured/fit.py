@@ -21,6 +21,8 @@ from rft import se2
 HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
 PHASES = 128  # of the mean gait, at which it is integrated
 SHOWN = 24  # phases at which numbers are told
+SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
+PLACES = 64  # phases at which what the splines and the harmonics leave is averaged
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
 
@@ -30,10 +32,10 @@ class Fitted:
     net pose of each cycle, in the body frame at its start, as logged and by the connection along the cycle's own shapes.
     frequency: cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual:
     (3,), rms of what the fit leaves of xi, over that of the joint rates; explained: (3,), share of the squares of xi
-    that it does not leave. misfit: (3,), rms over the phase of the residual's mean over all cycles, per rad: what as many
-    harmonics cannot follow. noise: (d + 3,), of the rows' joint angles, x, y and heading.
-    across: whether the cycles vary enough to tell A across the gait. length: of the body in m; 1 for a log in body
-    lengths."""
+    that it does not leave. misfit: (3,), rms over the phase of what as many harmonics, and the splines through the rows,
+    leave of xi in the mean over all cycles, beyond noise, per rad. noise: (d + 3,), of the rows' joint angles, x, y and
+    heading. across: whether the cycles vary enough to tell A across the gait. length: of the body in m; 1 for a log in
+    body lengths."""
 
     log: Log
     known: Known
@@ -83,10 +85,18 @@ class Fitted:
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """(A (T, 3, d) at phases t of the mean gait, half widths of its interval), with what the harmonics cannot follow."""
         A, errors = series(self.known.A, t), series(self.known.errors[:, :, :, 0], t)
-        rate = np.linalg.norm(self.known.loop.shape(t, 1), axis=-1)
-        tangent = self.known.loop.shape(t, 1) / rate[:, None]
-        off = self.misfit[:, None] * np.abs(tangent)[:, None, :]
-        return A, self.known.factor * np.sqrt((errors**2).sum(1) + off**2)
+        tangent = self.known.loop.shape(t, 1)
+        tangent = np.abs(tangent) / np.linalg.norm(tangent, axis=-1, keepdims=True)
+        off = self.misfit[:, None] * tangent[:, None, :]
+        return A, self.known.factor * np.sqrt((errors**2).sum(1) + self.cut_off**2 + off**2)
+
+    @cached_property
+    def cut_off(self) -> np.ndarray:
+        """(3, d), rms of what more harmonics would add to A, as the last two tell beyond their errors: those of a function with
+        corners, which A has where links begin and cease to stick, fall with the square of their order."""
+        last, errors = self.known.A[..., -4:], self.known.errors[:, :, :, 0, -4:]
+        square = ((last**2).sum(-1) - (errors**2).sum((0, -1))) / 2
+        return np.sqrt(np.maximum(square, 0.0) * self.known.A.shape[-1] / 12)
 
 
 def fit_log(
@@ -127,9 +137,15 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
     nearest = loop.projected(joints.values, phase)
     samples = regression.Samples(nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi[kept], halves)
     across = regression.varied(loop, samples)
-    held = regression.sums(loop, samples, HARMONICS if harmonics is None else harmonics, across)
-    held = held.kept(regression.chosen(held)) if harmonics is None else held
-    found, errors = regression.solution(held)
+    most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
+    if harmonics is not None and harmonics > most:
+        raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
+    try:
+        held = regression.sums(loop, samples, most if harmonics is None else harmonics, across)
+        held = held.kept(regression.chosen(held)) if harmonics is None else held
+        found, errors = regression.solution(held)
+    except np.linalg.LinAlgError:
+        raise log.wrong("its cycles do not settle so many unknowns: lower --harmonics, or give more cycles") from None
     A, errors = (held.split(x, loop) for x in (found, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A)])
@@ -139,9 +155,13 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
     )  # fmt: skip
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
     mean, mean_off = mean_of(measured, level)
-    beyond = np.sqrt(np.maximum((_net(known)[0] - mean) ** 2 - mean_off**2, 0.0))  # less what the mean leaves open
+    beyond = SAFETY * np.sqrt(
+        np.maximum((_net(known)[0] - mean) ** 2 - mean_off**2, 0.0)
+    )  # less what the mean leaves open
     known = replace(known, beyond=beyond)
-    residual, explained, misfit = _left(known, samples)
+    rough = log.pose - pose.values
+    rough = np.column_stack([*se2.rotated(-heading, *rough[:, :2].T), rough[:, 2]])[kept]
+    residual, explained, misfit = _left(known, samples, rough)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
@@ -163,18 +183,29 @@ def _net(known: Known) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return displacement(np.einsum("nij,nj->ni", known.of(alpha), alphadot)), alpha, alphadot
 
 
-def _left(known: Known, samples: regression.Samples):
-    """(residual, explained, misfit), (3,) each, of `Fitted`."""
+def _left(known: Known, samples: regression.Samples, rough: np.ndarray):
+    """(residual, explained, misfit), (3,) each, of `Fitted`. rough: (N, 3), what the splines leave of the poses, in the body's
+    axes."""
     w, terms = known.terms_at(samples.phase, samples.alpha, samples.rate)
     left = samples.xi - np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
     size = np.sqrt((samples.rate**2).sum(-1).mean())
     explained = 1 - (left**2).mean(0) / samples.xi.var(0).clip(1e-300)
-    bins = (samples.phase % (2 * np.pi) / (2 * np.pi) * 64).astype(int) % 64
-    n = np.maximum(np.bincount(bins, minlength=64), 1)
-    mean, square = (np.stack([np.bincount(bins, x, 64) / n for x in y.T], -1) for y in (left, left**2))
-    cycles_in = samples.cycle[-1] + 1
-    pure = np.maximum(mean**2 - (square - mean**2) / cycles_in, 0.0)  # less what noise leaves of a mean over the cycles
-    return np.sqrt((left**2).mean(0)) / size, explained, np.sqrt(pure.mean(0)) / size
+    mean, noise = _by_phase(samples.phase, left)
+    unfollowed = np.maximum(mean**2 - noise, 0.0).mean(0) / size**2
+    mean, noise = _by_phase(samples.phase, rough)
+    k = np.arange(PLACES // 4 + 1)[:, None]
+    waves = np.abs(np.fft.rfft(mean, axis=0)[: len(k)] / PLACES) ** 2 - noise.mean(0) / PLACES
+    rates = (2 * k**2 * waves).sum(0).clip(0.0)  # squares of xi per rad of phase
+    pace = (known.loop.shape(samples.phase, 1) ** 2).sum(-1).mean()
+    return np.sqrt((left**2).mean(0)) / size, explained, np.sqrt(unfollowed + rates / pace)
+
+
+def _by_phase(phase, values) -> tuple[np.ndarray, np.ndarray]:
+    """(means of values (N, 3) at PLACES phases, and the variance of these by the scatter of the values)."""
+    bins = (phase % (2 * np.pi) / (2 * np.pi) * PLACES).astype(int) % PLACES
+    n = np.maximum(np.bincount(bins, minlength=PLACES), 2)[:, None]
+    mean, square = (np.stack([np.bincount(bins, x, PLACES) for x in y.T], -1) / n for y in (values, values**2))
+    return mean, (square - mean**2) / (n - 1)
 
 
 def _cycles(log: Log, known: Known, phase, count, joints, pose):

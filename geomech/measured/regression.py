@@ -22,7 +22,7 @@ MOST_BLOCKS = 120  # of cycles, that are left out as one
 MOST_NUMBERS = 20_000_000  # of all their matrices
 LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
 SECOND = 2  # harmonics of what is of the second order in the deviation
-LAGS = 4  # blocks over which errors are correlated
+LAGS = 8  # blocks over which errors are correlated
 CERTAIN = 5.0  # standard errors by which the cycles must vary
 LEAST_VARIED = 3e-3  # of the joint rates, that those across the gait must be: splines make up as much
 

@@ -1,0 +1,31 @@
+"""A measured gait: a log of sixty noisy cycles of a three-link swimmer in a viscous fluid, the connection near its mean gait by
+regression, and the displacement that this predicts (Bittner, Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018)).
+
+The log is made from the swimmer's own velocity, so that the truth is known: joints deviate by 0.05 rad from the gait, each
+row has noise of 1e-3 rad and 1e-3 BL.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from figures import main
+from geomech.gaits import Ellipse
+from geomech.measured import Fitted, Log, fit_log, synthetic
+from geomech.output import measured, plots
+from geomech.scene import load
+
+GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
+JOINTS = ("alpha_1", "alpha_2")
+
+
+def compute(scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1) -> Fitted:
+    """What the log tells."""
+    made = synthetic.made(load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed)
+    return fit_log(Log("log.csv", made.t, made.alpha, made.pose, JOINTS, np.arange(len(made.t)) + 2))
+
+
+draw, table = plots.measured_figure, measured.text
+
+if __name__ == "__main__":
+    main("measured", compute, draw, table)
