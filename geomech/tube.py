@@ -136,20 +136,23 @@ class Known:
     factor: float
     level: float
 
-    def deviation(self, alpha, t=None) -> tuple[np.ndarray, np.ndarray]:
+    def deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
         """(phases (...,), deviations (..., d)) of shapes (..., d)."""
-        t = self.loop.nearest(alpha) if t is None else t
+        t = self.loop.nearest(alpha)
         return t, alpha - self.loop.shape(t)
+
+    def spread_at(self, t) -> np.ndarray:
+        """(..., d, d) at phases t (...)."""
+        count = self.spread.shape[-1]
+        places = 2 * np.pi * np.arange(count + 1) / count
+        closed = np.concatenate([self.spread, self.spread[..., :1]], -1).reshape(-1, count + 1)
+        at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
+        return at.reshape(*np.shape(t), *self.spread.shape[:2])
 
     def reach(self, alpha) -> np.ndarray:
         """(...,): how far shapes (..., d) are from the gait, 1 where the data end."""
         t, delta = self.deviation(real_array("alpha", alpha))
-        count = self.spread.shape[-1]
-        places = 2 * np.pi * np.arange(count + 1) / count
-        closed = np.concatenate([self.spread, self.spread[..., :1]], -1)
-        at = np.stack([np.interp(t % (2 * np.pi), places, row) for row in closed.reshape(-1, count + 1)], -1)
-        inverse = np.linalg.inv(at.reshape(*np.shape(t), *closed.shape[:2]))
-        return np.sqrt(np.einsum("...i,...ij,...j->...", delta, inverse, delta))
+        return np.sqrt(np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta))
 
     def terms(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """(waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of whole_i,j,m,k terms_j,m waves_k with `whole`."""

@@ -81,7 +81,16 @@ def scenes() -> list[Any]:
         cheapest(scene, [0.5], 1e-3),
         sweep(scene, {"gait.amplitude": [0.5]}),
     )
-    asked = accuracy.study, cost.price, undulation.performance, undulation.activation, text, net
+    asked = (
+        geomech.fit_log,
+        geomech.measured.Fitted,
+        accuracy.study,
+        cost.price,
+        undulation.performance,
+        undulation.activation,
+        text,
+        net,
+    )
     return [
         parse(text),
         tables(scene),

@@ -119,7 +119,7 @@ def fit_log(
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
     rows = len(log.t) * period / (log.t[-1] - log.t[0])
-    most = int(min(HARMONICS, joints.knots / 2, rows / 4))
+    most = max(1, int(min(HARMONICS, joints.knots / 2, rows / 4)))
     phase, loop = cycles.phased(log, joints, period, most)
     count = cycles.whole(log, phase, period)
     if count.max() + 1 < cycles.FEWEST:

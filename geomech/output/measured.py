@@ -56,7 +56,7 @@ def numbers(fit: Fitted) -> dict:
     }  # fmt: skip
 
 
-def reach(fit: Fitted, t=None) -> np.ndarray:
+def reach(fit: Fitted) -> np.ndarray:
     """Half width, rad, of what the data reach across the gait, in the direction in which that is least, at SHOWN phases."""
     spread = fit.known.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])

@@ -38,11 +38,10 @@ def measured_figure(fit: Fitted):
 def _shapes(fit: Fitted, ax) -> None:
     alpha, t = fit.samples.alpha, np.linspace(0, 2 * np.pi, 400)
     ax.plot(*alpha[:: max(1, len(alpha) // DOTS), :2].T, ".", ms=1.2, color="0.6", label="rows of the log")
-    loop, spread = fit.known.loop.shape(t), fit.known.spread
+    loop = fit.known.loop.shape(t)
     if loop.shape[1] == 2:
         normal = fit.known.loop.normals(t)[..., 0]
-        places = 2 * np.pi * np.arange(spread.shape[-1] + 1) / spread.shape[-1]
-        wide = np.einsum("tij,ti,tj->t", _at(spread, places, t), normal, normal) ** 0.5
+        wide = np.einsum("tij,ti,tj->t", fit.known.spread_at(t), normal, normal) ** 0.5
         for sign, label in ((1, "where the data end"), (-1, None)):
             ax.plot(*(loop + sign * wide[:, None] * normal).T, "--", lw=0.8, color=COLOURS[1], label=label)
     ax.plot(*loop[:, :2].T, color="black", lw=1.4, label="mean gait")
@@ -55,11 +54,6 @@ def _shapes(fit: Fitted, ax) -> None:
     ax.legend(
         loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, markerscale=4, handlelength=1.2, columnspacing=1.0
     )
-
-
-def _at(spread: np.ndarray, places: np.ndarray, t: np.ndarray) -> np.ndarray:
-    closed = np.concatenate([spread, spread[..., :1]], -1).reshape(-1, len(places))
-    return np.stack([np.interp(t, places, row) for row in closed], -1).reshape(len(t), *spread.shape[:2])
 
 
 def _noted(fit: Fitted, ax) -> None:
