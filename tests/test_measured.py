@@ -225,7 +225,7 @@ def test_half_of_what_the_second_order_changes_is_an_error(usual):
 
 def test_noise_in_the_joints_draws_nothing_to_zero(viscous):
     """Plain least squares would have A across the gait too small by a third."""
-    f = fitted(viscous, seed=5, noise=2e-2, spread=0.05, cycles=80, samples=32, pose_noise=1e-4, fit={"harmonics": 4})
+    f = fitted(viscous, seed=5, noise=4e-2, spread=0.05, cycles=80, samples=32, pose_noise=1e-4, fit={"harmonics": 4})
     t = 2 * np.pi * np.arange(16) / 16
     n = f.known.loop.normals(t)[..., 0]
     found, true = (np.einsum("tij,tj->ti", A, n)[:, 2] for A in (f.along(t)[0], true_A(f, viscous, t)))
