@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import geomech
 import rft
@@ -397,6 +398,26 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     told.save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
     assert told.numbers(f)["status"].startswith("fitted along the gait alone")
+
+
+def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous, monkeypatch):
+    monkeypatch.setattr(regression, "varied", lambda *_: regression.SHAPES)
+    rng, t = np.random.default_rng(1), np.arange(50 * 160 + 1) / 160
+    size = CubicSpline(np.arange(52), 1 + 0.1 * rng.normal(size=52))
+    unit, rate = GAIT.shape(2 * np.pi * t) - GAIT.middle, 2 * np.pi * GAIT.rate(2 * np.pi * t)
+    alpha, alphadot = GAIT.middle + size(t)[:, None] * unit, size(t)[:, None] * rate + size(t, 1)[:, None] * unit
+    pose = synthetic._integrated(viscous(alpha, alphadot), t[1])[::4]
+    noise = 1e-3 * rng.normal(size=(len(pose), 5))
+    f = measured.fit_log(
+        log_of(synthetic.Made(t[::4], alpha[::4] + noise[:, :2], pose + noise[:, 2:], t[::4])), harmonics=4
+    )
+    net, off = f.displacement
+    assert not f.across and (np.abs(net - true_net(f, viscous)) <= off).all() and off.max() < 4e-3
+    alpha, alphadot = f.gait.cycle(12, 1.1)
+    found = np.einsum("tij,tj->ti", f.known.of(alpha), alphadot)
+    at_the_gait = np.einsum("tij,tj->ti", f.along(2 * np.pi * np.arange(12) / 12)[0], alphadot)
+    true = viscous(alpha, alphadot)
+    assert np.square(found - true).sum() < 0.35 * np.square(at_the_gait - true).sum()
 
 
 def written(path, made, names=NAMES, change=None):

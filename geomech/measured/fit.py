@@ -136,21 +136,22 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
     halves = tuple((a[kept], u[kept]) for a, u in joints.halves)
     nearest = loop.projected(joints.values, phase)
     samples = regression.Samples(nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi[kept], halves)
-    across = regression.varied(loop, samples)
+    varies = regression.varied(loop, samples)
+    across = varies == regression.RATES
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
         raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
     try:
-        held = regression.sums(loop, samples, most if harmonics is None else harmonics, across)
+        held = regression.sums(loop, samples, most if harmonics is None else harmonics, varies)
         held = held.kept(regression.chosen(held)) if harmonics is None else held
         found, errors = regression.solution(held)
     except np.linalg.LinAlgError:
         raise log.wrong("its cycles do not settle so many unknowns: lower --harmonics, or give more cycles") from None
     A, errors = (held.split(x, loop) for x in (found, errors))
     if not across:
-        errors = np.concatenate([errors, regression.unknown(loop, A)])
+        errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
     known = Known(
-        loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, across), np.zeros(3),
+        loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
         regression.factor(len(held.square), level), level,
     )  # fmt: skip
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)

@@ -13,12 +13,12 @@ WIDTH = 0.3  # rad of phase, over which it is averaged
 LEAST = 0.02  # of the gait's size: as far from it A is that of the gait, where its cycles do not vary
 
 
-def spread(loop: Loop, samples: Samples, within: float | None, across: bool) -> np.ndarray:
+def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:
     """(d, d, P) of `tube.Known`: at phases, REACH^2 times the covariance of deviations, without their noise; or the square of
     ``within``, rad, in all directions. Along the gait, where nothing deviates, it is the mean of what it is across."""
     d = samples.alpha.shape[1]
     least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
-    if within is not None or not across:
+    if within is not None or not varied:
         return np.repeat((np.eye(d) * (least if within is None else within) ** 2)[..., None], PLACES, -1)
     (one, _), (other, _) = samples.halves
     theta, normal = loop.shape(samples.phase), loop.normals(samples.phase)

@@ -24,7 +24,10 @@ LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best predictio
 SECOND = 2  # harmonics of what is of the second order in the deviation
 LAGS = 8  # blocks over which errors are correlated
 CERTAIN = 5.0  # standard errors by which the cycles must vary
-LEAST_VARIED = 3e-3  # of the joint rates, that those across the gait must be: splines make up as much
+LEAST_VARIED = 3e-3  # of the joint rates, or of the gait's size, that those across it must be: splines make up as much
+NOTHING, SHAPES, RATES = range(
+    3
+)  # what varies from cycle to cycle beyond noise: then A along the gait is told, its slope, all
 
 
 class Samples(NamedTuple):
@@ -43,19 +46,23 @@ class Samples(NamedTuple):
 class Sums:
     """Of products over the samples of each block of cycles: matrix (B, P, P), right (B, P, 3), square (B, 3). The first
     ``terms`` times 2 ``harmonics`` + 1 of the P columns, waves last, make the connection, the others take up the second
-    order. terms is 1 where there is but the rate along the gait."""
+    kinds: of rates, and of deviations, that they are products of."""
 
     matrix: np.ndarray
     right: np.ndarray
     square: np.ndarray
-    terms: int
+    kinds: tuple[int, int]
     harmonics: int
+
+    @property
+    def terms(self) -> int:
+        return self.kinds[0] * self.kinds[1]
 
     def kept(self, harmonics: int) -> Sums:
         """With no higher waves in the connection."""
         wide, all_columns = 2 * self.harmonics + 1, np.arange(self.matrix.shape[1])
         pick = all_columns[(all_columns >= self.terms * wide) | (all_columns % wide <= 2 * harmonics)]
-        return Sums(self.matrix[:, pick][:, :, pick], self.right[:, pick], self.square, self.terms, harmonics)
+        return Sums(self.matrix[:, pick][:, :, pick], self.right[:, pick], self.square, self.kinds, harmonics)
 
     def solved(self, weights: np.ndarray) -> np.ndarray:
         """(..., P, 3) for weights (..., B) of the blocks."""
@@ -72,32 +79,32 @@ class Sums:
     def split(self, found: np.ndarray, loop: Loop) -> np.ndarray:
         """(..., 3, d, d, 2 K + 1): A, and then its slopes along the normals, of solutions (..., P, 3)."""
         wide, d = 2 * self.harmonics + 1, len(loop.coefficients)
-        if self.terms == 1:
-            return _spread_out(loop, np.moveaxis(found, -1, -2))
-        found = found[..., : self.terms * wide, :].reshape(*found.shape[:-2], d, d, wide, 3)
-        return np.moveaxis(found, -1, -4)
+        found = found[..., : self.terms * wide, :].reshape(*found.shape[:-2], *self.kinds, wide, 3)
+        found = np.moveaxis(found, -1, -4)
+        if self.kinds[0] == 1:
+            found = _spread_out(loop, found[..., 0, :, :])
+        none = np.zeros((*found.shape[:-2], d - self.kinds[1], found.shape[-1]))
+        return np.concatenate([found, none], -2)
 
 
 def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
-    """The least A, as `Sums.split` gives it, with A theta' = along (..., 3, 2 K + 1); of as many waves, and as the gait has."""
+    """(..., 3, d, S, 2 K + 1): the least A, and slopes, with A theta' = along (..., 3, S, 2 K + 1); of as many waves, or as
+    many as the gait has."""
     d, wide = len(loop.coefficients), max(along.shape[-1], loop.coefficients.shape[1])
     t = 2 * np.pi * np.arange(8 * wide) / (8 * wide)
     rows = np.einsum("td,tw->tdw", loop.shape(t, 1), waves(t, wide // 2)).reshape(len(t), -1)
     least = np.linalg.lstsq(rows, waves(t, along.shape[-1] // 2), rcond=1e-9)[0]
-    A = np.zeros((*along.shape[:-1], d, d, wide))
-    A[..., 0, :] = (along @ least.T).reshape(*along.shape[:-1], d, wide)
-    return A
+    return np.moveaxis((along @ least.T).reshape(*along.shape[:-1], d, wide), -2, -3)
 
 
-def columns(loop: Loop, phase, alpha, rate, harmonics: int, across: bool) -> np.ndarray:
-    """(N, P): of alphadot_j and s_k alphadot_j, times waves in phase, and of s_k s_l alphadot_j times a few; without ``across``
-    of the pace along the gait alone."""
-    one = np.ones((len(phase), 1))
-    if not across:
-        mean = loop.shape(phase, 1)
-        return _times(
-            (rate * mean).sum(-1, keepdims=True) / (mean**2).sum(-1, keepdims=True), one, waves(phase, harmonics)
-        )
+def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int) -> np.ndarray:
+    """(N, P): of alphadot_j and s_k alphadot_j, times waves in phase, and of s_k s_l alphadot_j times a few. Where not all
+    varies, the pace along the gait stands for alphadot, and s_k are left out."""
+    one, mean = np.ones((len(phase), 1)), loop.shape(phase, 1)
+    if varies < RATES:
+        rate = ((rate * mean).sum(-1) / (mean**2).sum(-1))[:, None]
+    if varies == NOTHING:
+        return _times(rate, one, waves(phase, harmonics))
     normal = np.einsum("nik,ni->nk", loop.normals(phase), alpha - loop.shape(phase))
     k, m = np.triu_indices(normal.shape[1])
     groups = ((np.concatenate([one, normal], 1), harmonics), (normal[:, k] * normal[:, m], SECOND))
@@ -109,20 +116,21 @@ def _times(rate, s, w) -> np.ndarray:
     return np.einsum("nj,ns,nw->njsw", rate, s, w).reshape(len(rate), -1)
 
 
-def sums(loop: Loop, samples: Samples, harmonics: int, across: bool = True) -> Sums:
+def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES) -> Sums:
     """Over blocks of cycles. The product of a regressor with itself is that of its two halves: these have independent noise,
     which then biases nothing (instrumental variables; noise in a regressor would draw its coefficient to 0)."""
     d = samples.alpha.shape[1]
-    count = columns(loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, across).shape[1]
+    count = columns(loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, varies).shape[1]
     most = min(MOST_BLOCKS, max(FOLDS * LAGS, MOST_NUMBERS // count**2))
     found = []
     for some in blocks(samples, most):
         one, other = (
-            columns(loop, samples.phase[some], x[some], u[some], harmonics, across) for x, u in samples.halves
+            columns(loop, samples.phase[some], x[some], u[some], harmonics, varies) for x, u in samples.halves
         )
         product, xi = one.T @ other, samples.xi[some]
         found.append(((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0)))
-    return Sums(*map(np.array, zip(*found)), d * d if across else 1, harmonics)
+    kinds = d if varies == RATES else 1, 1 if varies == NOTHING else d
+    return Sums(*map(np.array, zip(*found)), kinds, harmonics)
 
 
 def blocks(samples: Samples, most: int = MOST_BLOCKS) -> list[slice]:
@@ -133,37 +141,42 @@ def blocks(samples: Samples, most: int = MOST_BLOCKS) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(ends)]
 
 
-def varied(loop: Loop, samples: Samples) -> bool:
-    """Whether cycles vary about the gait in every direction across it, by their rates, beyond what noise does: products of
-    the two halves, in which it cancels, are surely positive."""
-    normal, mean = loop.normals(samples.phase), loop.shape(samples.phase, 1)
+def varied(loop: Loop, samples: Samples) -> int:
+    """What varies about the gait in every direction across it, beyond what noise does: RATES, SHAPES alone, or NOTHING."""
+    normal, theta, mean = loop.normals(samples.phase), loop.shape(samples.phase), loop.shape(samples.phase, 1)
     pace = (samples.rate * mean).sum(-1) / (mean**2).sum(-1)
-    one, other = (np.einsum("nik,ni->nk", normal, u - pace[:, None] * mean) for _, u in samples.halves)
+    off = lambda x: np.einsum("nik,ni->nk", normal, x)
+    if _sure(samples, [off(u - pace[:, None] * mean) for _, u in samples.halves], (samples.rate**2).sum()):
+        return RATES
+    size = ((theta - theta.mean(0)) ** 2).sum()
+    return SHAPES if _sure(samples, [off(x - theta) for x, _ in samples.halves], size) else NOTHING
+
+
+def _sure(samples: Samples, halves, size: float) -> bool:
+    """Whether the products of two halves (N, d - 1), in which noise cancels, are surely positive in all directions."""
+    one, other = halves
     each = np.array([one[some].T @ other[some] for some in blocks(samples)])
     least = np.linalg.eigh((each + each.swapaxes(1, 2)).mean(0))[1][:, 0]
     q = np.einsum("bij,i,j->b", each, least, least)
-    size = LEAST_VARIED**2 * (samples.rate**2).sum() / len(q)
-    return bool(q.mean() > max(CERTAIN * q.std(ddof=1) / np.sqrt(len(q)), size))
+    return bool(q.mean() > max(CERTAIN * q.std(ddof=1) / np.sqrt(len(q)), LEAST_VARIED**2 * size / len(q)))
 
 
-def unknown(loop: Loop, A: np.ndarray) -> np.ndarray:
-    """(3 (d - 1) 2, 3, d, d, 2 K + 1): errors of A across the gait, and of its slopes, that are not known: as large as A is
-    along it, and that over the gait's size. A: as `Sums.split` gives it."""
+def unknown(loop: Loop, A: np.ndarray, varies: int) -> np.ndarray:
+    """(E, 3, d, d, 2 K + 1): errors of what is not known of A, as `Sums.split` gives it, across the gait, and of its slopes: as
+    large as A is along it, and that over the gait's size."""
     d, wide = A.shape[1], A.shape[-1]
     t = 2 * np.pi * np.arange(4 * wide) / (4 * wide)
     rate = loop.shape(t, 1)
-    along = np.einsum("ijk,tk,tj->ti", A[:, :, 0], waves(t, wide // 2), rate) / np.linalg.norm(rate, axis=-1)[:, None]
-    size, found = np.sqrt((along**2).mean(0)), []
     speed = np.linalg.norm(rate, axis=-1)
-    normal = loop.normals(t) * (speed / np.sqrt((speed**2).mean()))[:, None, None]  # which are as few waves as the gait
-    across = np.linalg.lstsq(waves(t, wide // 2), normal.reshape(len(t), -1), rcond=None)[0].T
-    across, extent = across.reshape(d, d - 1, wide), np.linalg.norm(loop.coefficients[:, 1:])
-    for i in range(3):
-        for k in range(d - 1):
-            off = np.zeros((2, 3, d, d, wide))
-            off[0, i, :, 0] = size[i] * across[:, k]
-            off[1, i, :, 1 + k, 0] = size[i] / extent
-            found += [*off]
+    along = np.einsum("ijk,tk,tj->ti", A[:, :, 0], waves(t, wide // 2), rate) / speed[:, None]
+    size, extent = np.sqrt((along**2).mean(0)), np.linalg.norm(loop.coefficients[:, 1:])
+    ways = np.concatenate([loop.normals(t) * speed[:, None, None], rate[..., None]], -1) / np.sqrt((speed**2).mean())
+    ways = np.linalg.lstsq(waves(t, wide // 2), ways.reshape(len(t), -1), rcond=None)[0].T  # as few waves as the gait
+    ways, found = np.moveaxis(ways.reshape(d, d, wide), 1, 0), []
+    for i, (way, k) in itertools.product(range(3), itertools.product(range(d), range(d))):
+        if way < d - 1 or (varies == NOTHING and k > 0):  # the last way is along the gait, k = 0 is A itself
+            found.append(np.zeros((3, d, d, wide)))
+            found[-1][i, :, k] = ways[way] * size[i] / (extent if k else 1.0)
     return np.array(found)
 
 
