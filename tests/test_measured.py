@@ -246,7 +246,7 @@ def wave(alpha, alphadot):
 
 def test_three_joints(tmp_path):
     gait = gaits.Fourier(cos=((0.5,), (0.2,), (-0.3,)), sin=((0.1,), (0.5,), (0.4,)), centre=(0.1, 0.0, -0.2))
-    f = fitted(wave, gait, cycles=40, samples=24, seed=1, fit={"harmonics": 4})
+    f = fitted(wave, gait, cycles=30, samples=20, seed=1, fit={"harmonics": 3})
     alpha = f.known.loop.shape(np.arange(6.0))
     true = np.stack([wave(alpha, x) for x in np.eye(3)], -1)
     found, off = f.along(np.arange(6.0))
@@ -542,7 +542,7 @@ def test_rows_at_uneven_times_tell_the_same(viscous):
 def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit):
-        cli.main(["trajectory", str(field / "mine.toml"), "--cycles", "12", "-o", "tr.csv"])
+        cli.main(["trajectory", str(field / "mine.toml"), "--cycles", "10", "-o", "tr.csv"])
     f = measured.fit_log("tr.csv")
     net = Study(load(field / "mine.toml")).displacement("direct")
     np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
