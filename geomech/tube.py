@@ -31,7 +31,7 @@ def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
     turned = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
     both = np.stack([np.cos(turned), np.sin(turned)], -1) * (k.astype(float) ** order)[:, None]
     one = np.full((*np.shape(t), 1), float(order == 0))
-    return np.concatenate([one, both.reshape(*np.shape(t), -1)], -1)
+    return np.concatenate([one, both.reshape(*np.shape(t), 2 * harmonics)], -1)
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
@@ -180,6 +180,12 @@ class Known:
         w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.whole, w, terms)
 
+    def of_error(self, alpha) -> np.ndarray:
+        """(..., 3, d): of `of`."""
+        w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
+        squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
+        return self.factor * np.sqrt(sum(squares))
+
     def ccf(self, alpha, whole: np.ndarray | None = None) -> np.ndarray:
         """(..., 3): the CCF of two joints at shapes (..., 2), of this connection or another ``whole`` along the same gait.
         alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
@@ -231,11 +237,13 @@ class Tube(Connection):
         return alpha
 
     def at_grid(self, function: Callable) -> np.ndarray:
-        """(3, N_1, ..., N_d): a function of shapes (n, d) that gives (n, 3), on the grid, nan where the data do not reach."""
+        """(..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A is."""
         shapes = np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)
-        reached, found = ~np.isnan(self.A[0, 0]), np.full(shapes.shape[:-1] + (3,), np.nan)
-        found[reached] = function(shapes[reached])
-        return np.moveaxis(found, -1, 0)
+        reached, d = ~np.isnan(self.A[0, 0]), len(self.axes)
+        values = function(shapes[reached])
+        found = np.full((*reached.shape, *values.shape[1:]), np.nan)
+        found[reached] = values
+        return np.moveaxis(found, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
@@ -244,9 +252,9 @@ class Tube(Connection):
 
 def grid_of(known: Known, points: int) -> tuple[np.ndarray, ...]:
     """Axes, of so many points, that span all that the data reach."""
-    count = known.spread.shape[-1]
-    t = 2 * np.pi * np.arange(count) / count
-    wide = np.sqrt(np.einsum("iip->pi", known.spread))
+    t = 2 * np.pi * np.arange(PLACES) / PLACES
+    step = np.abs(known.loop.shape(t, 2)).max(0) * (np.pi / PLACES) ** 2 / 2  # what a curve may do between two places
+    wide = np.sqrt(np.einsum("tii->ti", known.spread_at(t))) + step
     low, high = (known.loop.shape(t) - wide).min(0), (known.loop.shape(t) + wide).max(0)
     return tuple(np.linspace(a, b, points) for a, b in zip(low, high))
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray
 from scipy.interpolate import CubicSpline
 
 import geomech
@@ -24,7 +25,7 @@ from geomech.reconstruct import displacement
 from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
-from geomech.tube import Loop, Tube, waves
+from geomech.tube import Loop, Tube, series, waves
 from rft import se2
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
@@ -310,6 +311,11 @@ def test_a_field_is_read_back_as_a_system(usual, field):
     tube = Connection.load(field / "field.nc")
     assert isinstance(tube, Tube)
     np.testing.assert_array_equal(tube.A, usual.tube.A)
+    file = xarray.open_dataset(field / "field.nc", engine="scipy")
+    assert (file.A_error.isnull() == file.A.isnull()).all() and (file.A_error > 0).sum() == file.A.notnull().sum()
+    t = np.arange(4.0)  # at the gait it is that of the series
+    at = np.sqrt((series(usual.known.errors[:, :, :, 0], t) ** 2).sum(1)) * usual.known.factor
+    np.testing.assert_allclose(usual.known.of_error(usual.known.loop.shape(t)), at, rtol=1e-6)
     scene = load(field / "mine.toml")
     np.testing.assert_allclose(scene.gait.cycle(64), usual.gait.cycle(64), atol=1e-12)
     assert math.isclose(scene.frequency, usual.frequency)
@@ -373,6 +379,15 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
     told.save_field(tmp_path / "m.nc", metres)
     assert (Table(tmp_path / "m.nc").length, Table(tmp_path / "m.nc").unit) == (0.3, "m")
+
+
+def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, tmp_path):
+    thin = measured.fit_log(usual.log, within=1e-5, harmonics=4)
+    told.save_field(tmp_path / "thin.nc", thin)
+    study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
+    assert np.isnan(study.fitted.A).all()
+    np.testing.assert_allclose(study.displacement("direct"), thin.displacement[0], rtol=1e-9)
+    assert study.scene.system.single(thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])["residual"] is None
 
 
 def test_damaged_fields_are_refused(field, tmp_path):

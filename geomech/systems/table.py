@@ -127,7 +127,8 @@ class Table(Plain):
     def _times(self, values, alpha, alphadot) -> np.ndarray:
         """(..., 3): values (3, N_1, ...) at a shape times |alphadot|; near one gait they are the same everywhere."""
         if self.tube is not None:
-            return np.nanmean(values.reshape(3, -1), 1) * np.linalg.norm(alphadot, axis=-1)[..., None]
+            there = values[:, np.isfinite(values[0])]  # nowhere, where the data reach no point of the grid
+            return (there[:, 0] if there.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
         return Field(self.held.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
     def own_error(self, alpha, alphadot) -> np.ndarray:

@@ -70,7 +70,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
         raise ValueError(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
     masked = np.isnan(A).any((0, 1))
     _masks("A", A, masked, told)
-    unknown = np.isnan(residual).all()
+    unknown = np.isnan(residual).all() and not masked.all()
     _masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
     speed = pick("speed", "component") if "speed" in found else rms(A, residual)
     length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))

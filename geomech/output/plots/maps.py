@@ -229,6 +229,8 @@ def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 def largest(values: np.ndarray) -> float:
     """Of the magnitudes, for a scale; beside singular shapes, where these grow beyond all bounds, of nine tenths of them."""
     size = np.abs(values[np.isfinite(values)])
+    if not size.size:
+        return 1.0
     return float(size.max() if size.size == values.size else np.quantile(size, 0.9)) or 1.0
 
 
