@@ -4,12 +4,10 @@
     study.displacement("direct", amplitudes=[0.5, 1.0])
 
 load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
-Study, tiers                            what follows: connection, CCF, cost, displacements, their errors
+Study, tiers, workers                   what follows: connection, CCF, cost, displacements, errors; who computes it
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
-optimise, undulation, plots             the best gait; swimmers that undulate; figures
-fit_log, measured                       the connection near a measured gait, from a log
-workers                                 who computes what is large: `with geomech.workers.using(4): ...`
+optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
 
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """
@@ -46,12 +44,8 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
 __version__ = "0.1.0"
 
 _MODULES = {  # by the name they have here; none is imported before it is asked for
-    **{
-        name: f"geomech.{name}"
-        for name in (
-            "connection", "curvature", "gaits", "measured", "optimise", "reconstruct", "systems", "tiers", "workers",
-        )  # fmt: skip
-    },
+    **{name: f"geomech.{name}" for name in ("connection", "curvature", "gaits", "measured", "optimise")},
+    **{name: f"geomech.{name}" for name in ("reconstruct", "systems", "tiers", "workers")},
     **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
     "plots": "geomech.output.plots",
     "undulation": "geomech.study.undulation",
