@@ -4,7 +4,7 @@
     study.displacement("direct", amplitudes=[0.5, 1.0])
 
 load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
-Study, tiers, workers                   what follows: connection, CCF, cost, displacements, errors; who computes it
+Study, tiers, workers                   connection, CCF, cost, displacements, errors; who computes
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
 optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
