@@ -1,4 +1,4 @@
-"""Which code makes the solver's descents: NumPy's batches, or compiled scalar code (`rft.scalar`) where numba is installed
+"""Which code makes the solver's descents: NumPy's batches, or compiled code (`rft.lanes`) where numba is installed
 and a model is nothing but numbers.
 
 Both take the same steps to the same answer, but for rounding. For a hundred samples compiled code is some twenty times as

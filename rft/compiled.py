@@ -1,4 +1,4 @@
-"""Making the compiled code of `rft.scalar`, once for an installation."""
+"""Making the compiled code of `rft.lanes`, once for an installation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import sys
 from pathlib import Path
 
-SOURCES = [Path(__file__).with_name(f"{name}.py") for name in ("scalar", "scalar_loads", "loads")]
+SOURCES = [Path(__file__).with_name(f"{name}.py") for name in ("lanes", "lane_nets", "lane_loads", "loads")]
 STAMP = hashlib.sha256(b"".join(source.read_bytes() for source in SOURCES)).hexdigest()[:16]
 
 
@@ -17,9 +17,9 @@ def _mark() -> tuple[Path, str]:
     import llvmlite.binding
     import numba
 
-    from rft.scalar import attempt
+    from rft.lanes import attempt
 
-    name = f"scalar.{sys.implementation.cache_tag}.made"
+    name = f"lanes.{sys.implementation.cache_tag}.made"
     parts = STAMP, os.stat(SOURCES[0]).st_mtime, numba.__version__, llvmlite.binding.get_host_cpu_name()
     return Path(attempt.stats.cache_path or os.devnull) / name, " ".join(map(str, parts))
 

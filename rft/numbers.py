@@ -1,4 +1,4 @@
-"""A model as plain arrays, for compiled code (`rft.scalar`): what its parts tell of themselves as ``numbers``."""
+"""A model as plain arrays, for compiled code (`rft.lanes`): what its parts tell of themselves as ``numbers``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def foreign(model: Model):
 
 
 class Numbers(NamedTuple):
-    """A model as `rft.scalar.attempt` takes it. law: dry terms (T, 3), viscous coefficients (n, 2), which terms each element
+    """A model as `rft.lanes.attempt` takes it. law: dry terms (T, 3), viscous coefficients (n, 2), which terms each element
     has and whether it is a point (n, 3). factors: (4, n, B or 1). pasts, rates, masses: see there."""
 
     law: tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -93,8 +93,8 @@ def _factors(contact, count: int) -> np.ndarray:
 
 
 def attempt(of: Samples, rows: list[slice], descent: tuple, limits: list, guess: np.ndarray, scaled: bool) -> tuple:
-    """A descent of samples by compiled code, as `rft.scalar.attempt` returns it; scaled: whether their drag knows speed."""
-    from rft.scalar import attempt
+    """A descent of samples by compiled code, as `rft.lanes.attempt` returns it; scaled: whether their drag knows speed."""
+    from rft.lanes import attempt
 
     size = of.size
     scale = of.scale if scaled else np.ones(size)

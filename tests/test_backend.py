@@ -127,7 +127,7 @@ def test_parameters_of_each_sample_and_threads():
 @pytest.mark.usefixtures("compiled_code")
 def test_compiled_once_for_all():
     """One signature: whatever the model, no call waits for another compilation."""
-    from rft.scalar import attempt
+    from rft.lanes import attempt
 
     alpha, alphadot = GAIT.cycle(8)
     every = [make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name]

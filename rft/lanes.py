@@ -1,0 +1,219 @@
+"""The descents of `rft.newton` as compiled code, for several samples at once; the reasons are there.
+
+Every step is that of the batched solver, with its constants. Each sample has a lane. One evaluation serves all lanes; then
+each chooses its next step for itself, and one that has ended gives its lane to the next sample. So no sample hangs on
+the others, to the last digit, and none waits for the slowest. Imported only where it is used: numba takes a while.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rft.compiled import STAMP
+from rft.lane_loads import OPTIONS, ROW, ROWS, compiled, inlined
+from rft.lane_nets import (
+    C, C_X, C_Y, DX, ENDED, FACTORS, FRESH, HALF, KEPT, LANE_ROWS, LANES, NEXT, NOW, OWN, PAST, R_N, R_T, RESIDUAL, S,
+    SCALE, SLOW, SLOWEST, STEPS, STRIDE, TOTAL, TRIED, UNIT, V, WEIGHT, XI, evaluate, place,
+)  # fmt: skip
+
+VISCOUS = 1e3  # rounding at which every law is a viscous one
+
+
+@inlined
+def solved3(of, lane, x, y, z):
+    """(x, y, z) over the tangent in TOTAL, by Cramer's rule; a singular one gives no step."""
+    at = TOTAL * LANES + lane
+    a, b, c = of[at + LANES], of[at + 2 * LANES], of[at + 3 * LANES]
+    d, e, f = of[at + 6 * LANES], of[at + 7 * LANES], of[at + 8 * LANES]
+    g, h, i = of[at + 11 * LANES], of[at + 12 * LANES], of[at + 13 * LANES]
+    A, B, D = e * i - f * h, f * g - d * i, d * h - e * g
+    det = a * A + b * B + c * D
+    inverse = 0.0 if det == 0.0 else 1.0 / det
+    return (
+        (A * x + (c * h - b * i) * y + (b * f - c * e) * z) * inverse,
+        (B * x + (a * i - c * g) * y + (c * d - a * f) * z) * inverse,
+        (D * x + (b * g - a * h) * y + (a * e - b * d) * z) * inverse,
+    )
+
+
+@compiled
+def add_momentum(of, lane, mass, sample):
+    """Add strength (rate p - past + ad*_xi p), p = M xi + shape, to the force and its tangent: `rft.effects.body_inertia`.
+    mass (17, B): M, shape, past, rate and strength of each sample."""
+    at, scale, rate, strength = TOTAL * LANES + lane, of[SCALE * LANES + lane], mass[15, sample], mass[16, sample]
+    x, y, turn = (
+        (of[(XI + 0) * LANES + lane] + of[(DX + 0) * LANES + lane]) * scale,
+        (of[(XI + 1) * LANES + lane] + of[(DX + 1) * LANES + lane]) * scale,
+        (of[(XI + 2) * LANES + lane] + of[(DX + 2) * LANES + lane]) * scale,
+    )
+    p0 = mass[0, sample] * x + mass[1, sample] * y + mass[2, sample] * turn + mass[9, sample]
+    p1 = mass[3, sample] * x + mass[4, sample] * y + mass[5, sample] * turn + mass[10, sample]
+    p2 = mass[6, sample] * x + mass[7, sample] * y + mass[8, sample] * turn + mass[11, sample]
+    of[at] += strength * (rate * p0 - turn * p1 - mass[12, sample])
+    of[at + 5 * LANES] += strength * (rate * p1 + turn * p0 - mass[13, sample])
+    of[at + 10 * LANES] += strength * (rate * p2 + x * p1 - y * p0 - mass[14, sample])
+    for k in range(3):
+        m0, m1, m2 = mass[k, sample], mass[3 + k, sample], mass[6 + k, sample]
+        of[at + (k + 1) * LANES] += strength * scale * (rate * m0 - turn * m1)
+        of[at + (k + 6) * LANES] += strength * scale * (rate * m1 + turn * m0)
+        of[at + (k + 11) * LANES] += strength * scale * (rate * m2 + x * m1 - y * m0)
+    of[at + 11 * LANES] += strength * scale * p1
+    of[at + 12 * LANES] -= strength * scale * p0
+    of[at + 3 * LANES] -= strength * scale * p1
+    of[at + 8 * LANES] += strength * scale * p0
+
+
+@compiled
+def judge(of, lanes, first, descent, limits):
+    """Keep the step of every lane that helps, choose the next, and say which lanes have ended. first: the rounding after that
+    of the viscous solution, which FRESH lanes begin with. Without branches, for all at once."""
+    ratio, loose, free, budget = descent[1], descent[2], descent[3], descent[4]
+    last, limit, largest, shortest, lengthen = limits[0], limits[1], limits[2], limits[3], limits[4]
+    for l in range(lanes):
+        at = TOTAL * LANES + l
+        f_x, f_y, moment = of[at], of[at + 5 * LANES], of[at + 10 * LANES]
+        cx, cy, fresh = of[C_X * LANES + l], of[C_Y * LANES + l], of[FRESH * LANES + l] > 0.0
+        before, eps, stride, worst = of[NOW * LANES + l], of[NEXT * LANES + l], of[STRIDE * LANES + l], of[RESIDUAL * LANES + l]
+        force, about = math.sqrt(f_x * f_x + f_y * f_y), moment - cx * f_y + cy * f_x
+        now = max(force, abs(about)) / of[UNIT * LANES + l]
+        kept = ((eps < before) | (now < worst) | (stride <= shortest)) & (not fresh)
+        down = kept & (eps > last) & (now < loose)
+        slow, slowest = of[SLOW * LANES + l], of[SLOWEST * LANES + l]
+        freely = math.sqrt(slow) > free * eps
+        lower = last if freely else max(ratio * eps, last)
+        change = lower / eps
+        pull = (change * change - 1.0) / 2.0 if freely else change - 1.0
+        pull = pull if down else 0.0
+        longer = stride if fresh else min(1.0, lengthen * stride)
+        x, y, turn = solved3(
+            of,
+            l,
+            pull * of[at + 4 * LANES] - longer * f_x,
+            pull * of[at + 9 * LANES] - longer * f_y,
+            pull * of[at + 14 * LANES] - longer * moment,
+        )
+        place_x, place_y = x - cy * turn, y + cx * turn
+        far = math.sqrt(place_x * place_x + place_y * place_y + turn * turn)
+        cut = largest / max(far, largest) if (max(abs(x), abs(y), abs(turn)) > 1.0) & (not fresh) else 1.0
+        dx, dy, dturn = of[DX * LANES + l], of[(DX + 1) * LANES + l], of[(DX + 2) * LANES + l]
+        of[XI * LANES + l] += dx if kept else 0.0
+        of[(XI + 1) * LANES + l] += dy if kept else 0.0
+        of[(XI + 2) * LANES + l] += dturn if kept else 0.0
+        chosen = kept | fresh
+        of[DX * LANES + l] = cut * x if chosen else 0.5 * dx
+        of[(DX + 1) * LANES + l] = cut * y if chosen else 0.5 * dy
+        of[(DX + 2) * LANES + l] = cut * turn if chosen else 0.5 * dturn
+        of[STRIDE * LANES + l] = longer if chosen else 0.5 * stride
+        of[RESIDUAL * LANES + l] = now if kept else worst
+        of[NOW * LANES + l], of[NEXT * LANES + l] = first if fresh else eps, first if fresh else (lower if down else eps)
+        of[SLOWEST * LANES + l] = slow if kept else slowest
+        steps = of[STEPS * LANES + l] + (0.0 if fresh else 1.0)
+        done = (kept & (eps <= last) & (now <= limit)) | (steps >= budget)
+        of[STEPS * LANES + l], of[FRESH * LANES + l] = steps, 0.0
+        of[KEPT * LANES + l], of[ENDED * LANES + l] = 1.0 if kept else 0.0, 1.0 if done else 0.0
+
+
+@compiled
+def keep(body, of, lanes, n):
+    """Velocities of the lanes that keep their steps."""
+    together = ROW // lanes
+    for first in range(0, n, together):
+        here, count = body[place(first, 0, lanes) :] if first else body, min(together, n - first)
+        for e in range(count):
+            for l in range(lanes):
+                i, kept = e * lanes + l, of[KEPT * LANES + l] > 0.0
+                for j in range(3):
+                    old, new = here[(V + j) * ROW + i], here[(TRIED + j) * ROW + i]
+                    here[(V + j) * ROW + i] = new if kept else old
+
+
+@compiled
+def enter(body, of, lane, lanes, i, motion, factors, pasts, centre, scale, unit):
+    """Give a lane to the sample i, at rest."""
+    cos, sin, r_t, r_n, half, weight, own = motion
+    for e in range(len(cos)):
+        at = place(e, lane, lanes)
+        body[at + C * ROW], body[at + S * ROW], body[at + R_T * ROW] = cos[e, i], sin[e, i], r_t[e, i]
+        body[at + R_N * ROW], body[at + HALF * ROW], body[at + WEIGHT * ROW] = r_n[e, i], half[e, 0], weight[e, 0]
+        for j in range(3):
+            body[at + (V + j) * ROW] = own[j, e, i]
+        for j in range(4):
+            body[at + (FACTORS + j) * ROW] = factors[j, e, i % factors.shape[2]]
+    for e in range(pasts.shape[1]):
+        for j in range(5):
+            body[place(e, lane, lanes) + (PAST + j) * ROW] = pasts[j, e, i]
+    for row in range(TOTAL):
+        of[row * LANES + lane] = 0.0
+    of[STRIDE * LANES + lane], of[RESIDUAL * LANES + lane] = 1.0, np.inf
+    of[SCALE * LANES + lane], of[UNIT * LANES + lane] = scale[i], unit[i]
+    of[C_X * LANES + lane], of[C_Y * LANES + lane] = centre[0, i], centre[1, i]
+
+
+@compiled
+def begin(of, lane, i, first, guess):
+    """Its first step: the guess, if there is one, else that to the viscous solution."""
+    warm = guess.shape[1] > 0
+    of[FRESH * LANES + lane] = 0.0 if warm else 1.0
+    of[NOW * LANES + lane], of[NEXT * LANES + lane] = first, first if warm else VISCOUS
+    if warm:
+        for j in range(3):
+            of[(DX + j) * LANES + lane] = guess[j, i]
+
+
+@compiled
+def leave(of, lane, i, last, out):
+    """Write what a lane has come to. A balance with wider rounding is not the one that was asked for."""
+    xi, residual, evaluations, slow = out
+    for j in range(3):
+        xi[j, i] = of[(XI + j) * LANES + lane]
+    residual[i] = of[RESIDUAL * LANES + lane] if of[NOW * LANES + lane] <= last else np.inf
+    evaluations[i], slow[i] = int(of[STEPS * LANES + lane]), math.sqrt(of[SLOWEST * LANES + lane])
+
+
+def built(stamp: str):
+    def attempt(descent, limits, law, motion, factors, pasts, rates, masses, centre, scale, unit, guess, out):
+        """A descent of samples on the last axis of the arrays of a motion, written to out: xi (3, B), residual, evaluations,
+        the slowest element's speed (B,). law: dry terms (T, 3), viscous coefficients (n, 2), and which terms an element has
+        (n, 3). factors: (4, n, B or 1). pasts: (5, k, B), shares developed left and right, velocity across before, and shares
+        that are given, of the first k elements. rates: (2, B or 1), dt and e-foldings a length, dt < 0 where nothing
+        develops. masses: (17, B) as `add_momentum` has them, or (0, B)."""
+        _ = stamp  # this source's, so that numba's cache knows which it keeps
+        terms, viscous, which = law
+        n, size, shared = motion[0].shape[0], motion[0].shape[1], pasts.shape[1]
+        lanes = max(1, min(LANES, size, 4 * ROW // n))
+        x, whole, of = np.zeros(ROWS * ROW), np.zeros(ROW, np.int64), np.zeros(LANE_ROWS * LANES)
+        bits, body = x.view(np.int64), np.zeros((1 + (n - 1) // (ROW // lanes)) * OWN * ROW)
+        who, rate, changed = np.full(lanes, -1), np.zeros((2, lanes)), ((factors[:3] != 1.0).any(), factors[3].any())
+        last = limits[0]
+        first = last if len(terms) == 0 else max(descent[0], last)
+        come, gone = 0, 0
+        while gone < size:
+            for lane in range(lanes):
+                if who[lane] < 0 and come < size:
+                    i = who[lane] = come
+                    come += 1
+                    enter(body, of, lane, lanes, i, motion, factors, pasts, centre, scale, unit)
+                    begin(of, lane, i, first, guess)
+                    rate[0, lane], rate[1, lane] = rates[0, i % rates.shape[1]], rates[1, i % rates.shape[1]]
+            evaluate(x, bits, whole, body, of, lanes, n, shared, terms, viscous, which, rate, changed)
+            if len(masses):
+                for lane in range(lanes):
+                    if who[lane] >= 0:
+                        add_momentum(of, lane, masses, who[lane])
+            judge(of, lanes, first, descent, limits)
+            keep(body, of, lanes, n)
+            for lane in range(lanes):
+                if of[ENDED * LANES + lane] > 0.0 and who[lane] >= 0:
+                    leave(of, lane, who[lane], last, out)
+                    who[lane], gone = -1, gone + 1
+
+    try:
+        return njit(cache=True, **OPTIONS)(attempt)
+    except RuntimeError:  # no folder for it: neither beside this file, nor the user's, nor where NUMBA_CACHE_DIR points
+        return njit(**OPTIONS)(attempt)
+
+
+attempt = built(STAMP)
