@@ -98,14 +98,18 @@ def foreign_to(medium, body: Body, effects: Sequence[Effect], loads: str):
     return foreign(model)
 
 
-@contextlib.contextmanager
 def counted(backend: str):
     """Count NumPy's work in the body of the statement, so that "auto" knows when compiled code pays: its own, not what it
     waits for on a busy machine."""
+    counts = backend == "auto" and not AUTO.is_ready and not _settled.get()
+    return _counted() if counts else contextlib.nullcontext()
+
+
+@contextlib.contextmanager
+def _counted():
     start = time.process_time()
     yield
-    if backend == "auto" and not _settled.get():
-        AUTO.worked += time.process_time() - start
+    AUTO.worked += time.process_time() - start
 
 
 class Auto:

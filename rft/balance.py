@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +10,15 @@ import numpy as np
 from rft.backend import check
 from rft.bodies.base import Body, Kinematics, pace
 from rft.bodies.pieces import PIECES
+from rft.contact import Model
 from rft.effects.base import Effect, Prepared, broken, engine
-from rft.media.base import Medium, in_range, real_array, require, require_drag, shown
+from rft.media.base import Medium, in_range, real_array
 from rft.newton import Balance
 from rft.premise import not_so
+
+STATUSES = np.array(["sliding", "stuck", "unconverged"])
+UNCONVERGED = 2
+LEAST = 1e-100  # of a rate that is not 0
 
 
 class Solution(NamedTuple):
@@ -76,8 +81,8 @@ def body_velocity(
     if engine(effects) != "algebraic":
         lost = not_so(broken(effects))
         raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.time_steps")
+    cut, model, rows = Prepared.of(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
-    require_drag(medium)
     check(backend)
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
@@ -86,22 +91,32 @@ def body_velocity(
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
     speed = pace(body, alphadot)
     moving = speed > 0
-    body, model, rows = Prepared.of(medium, body, effects, loads, pieces)
     problem = Balance(model, rows, regularisation, tolerance, backend)
-    xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
-    iterations, stuck = np.zeros(speed.size, int), ~moving
-    if moving.any():
-        shape, rate, model = alpha[:, moving], alphadot[:, moving], model.take(moving)
+    if moving.all():
+        solved = problem.solve(_moving(model, cut, alpha, alphadot), speed, threads, guess, model)
+        xi, residual, iterations, stuck = solved
+    else:
+        xi, residual = np.zeros((3, speed.size)), np.zeros(speed.size)
+        iterations, stuck = np.zeros(speed.size, int), ~moving
+        if moving.any():
+            shape, rate, model = alpha[:, moving], alphadot[:, moving], model.take(moving)
+            guess = None if guess is None else guess[:, moving]
+            solved = problem.solve(_moving(model, cut, shape, rate), speed[moving], threads, guess, model)
+            xi[:, moving], residual[moving], iterations[moving], stuck[moving] = solved
+    xi = (xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
+    status = STATUSES[np.where(residual <= problem.limit, stuck.astype(int), UNCONVERGED)]
+    return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
-        def motion(index):
-            return Kinematics.stacked(list(model.motions(body.motion(shape[:, index], rate[:, index])).values()))
 
-        guess = None if guess is None else guess[:, moving]
-        solved = problem.solve(motion, speed[moving], threads, guess, model)
-        xi[:, moving] = solved.xi * [[body.length], [body.length], [1.0]]
-        residual[moving], iterations[moving], stuck[moving] = solved.residual, solved.iterations, solved.stuck
-    status = np.where(residual <= problem.limit, np.where(stuck, "stuck", "sliding"), "unconverged")
-    return Solution(xi.T.reshape(*batch, 3), *(x.reshape(batch) for x in (residual, status, iterations)))
+def _moving(model: Model, body: Body, alpha: np.ndarray, alphadot: np.ndarray) -> Callable:
+    """Kinematics of all contacts' elements, of some of the samples (joints, B)."""
+
+    def motion(index):
+        whole = index.size == alpha.shape[1]
+        plain = body.motion(alpha, alphadot) if whole else body.motion(alpha[:, index], alphadot[:, index])
+        return Kinematics.stacked(list(model.motions(plain).values()))
+
+    return motion
 
 
 def _started(start, batch: tuple, length: float) -> np.ndarray:
@@ -117,15 +132,7 @@ def _started(start, batch: tuple, length: float) -> np.ndarray:
     return start.reshape(-1, 3).T / [[length], [length], [1.0]]
 
 
-def checked_body(body) -> Body:
-    """body, or ValueError if it is nothing of the kind."""
-    good = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
-    require(good, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
-    return body
-
-
 def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
-    checked_body(body)
     in_range("regularisation", regularisation, 1e-15, 1e3)
     in_range("tolerance", tolerance, 1e-15, 1e3)
     arrays = []
@@ -133,12 +140,16 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
         x = real_array(name, x)
         if x.ndim == 0 or x.shape[-1] != body.joints:
             raise ValueError(f"{name} must have shape (..., {body.joints}) for this body, got {x.shape}")
-        if not np.isfinite(x).all():
-            raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
         size = np.abs(x)
-        if size.max(initial=0.0) > largest or (name == "alphadot" and size[size > 0].min(initial=1.0) < 1e-100):
+        if not size.max(initial=0.0) <= largest:
+            if not np.isfinite(x).all():
+                raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+        if name == "alphadot" and size.min(initial=1.0) < LEAST and size.min(initial=1.0, where=size > 0) < LEAST:
             raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         arrays.append(x)
+    if arrays[0].shape == arrays[1].shape:
+        return arrays
     try:
         return np.broadcast_arrays(*arrays)
     except ValueError:

@@ -202,7 +202,17 @@ class Model:
         """With one term more."""
         return replace(self, terms=(*self.terms, term))
 
-    @property
+    @cached_property
+    def numbers(self) -> dict:
+        """What `rft.numbers` has made of it."""
+        return {}
+
+    @cached_property
+    def lateral(self) -> float:
+        """The drag across at unit speed, (-) as traction has it."""
+        return abs(float(self.medium.traction(0.0, 1.0)[1]))
+
+    @cached_property
     def rate_independent(self) -> bool:
         return not self.terms and all(c.rate_independent for c in self.contacts.values())
 

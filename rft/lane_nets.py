@@ -8,8 +8,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from rft.lane_loads import BY, BY_M, BY_W, EPS, FIRST, LAST, LOAD, NET, POINT, ROW, SHARE, SUM, WHOLE_M, WHOLE_W, A, M, W
-from rft.lane_loads import add_square, apply_factors, begin_part, compiled, end_part, inlined, set_plain, share, side_of
+from rft.lane_loads import (
+    BY,
+    BY_M,
+    BY_W,
+    EPS,
+    FIRST,
+    LAST,
+    LOAD,
+    NET,
+    POINT,
+    ROW,
+    SHARE,
+    SUM,
+    WHOLE_M,
+    WHOLE_W,
+    A,
+    M,
+    W,
+    add_square,
+    apply_factors,
+    begin_part,
+    compiled,
+    end_part,
+    inlined,
+    set_plain,
+    share,
+    side_of,
+)
+
+# isort: on
 
 LANES = 16  # at most, and as many numbers to a row of lanes
 C, S, R_T, R_N, HALF, WEIGHT = range(6)  # rows of an element's own: `rft.bodies.base.Kinematics`
@@ -31,17 +59,17 @@ def place(e, lane, lanes):
 def set_velocities(x, body, of, count, lanes):
     """Velocities of a block's elements after the step that is to be tried."""
     for e in range(count):
-        for l in range(lanes):
-            i = e * lanes + l
-            dx, dy, turn = of[DX * LANES + l], of[(DX + 1) * LANES + l], of[(DX + 2) * LANES + l]
-            c, s, scale = body[C * ROW + i], body[S * ROW + i], of[SCALE * LANES + l]
+        for lane in range(lanes):
+            i = e * lanes + lane
+            dx, dy, turn = of[DX * LANES + lane], of[(DX + 1) * LANES + lane], of[(DX + 2) * LANES + lane]
+            c, s, scale = body[C * ROW + i], body[S * ROW + i], of[SCALE * LANES + lane]
             a = body[V * ROW + i] + (c * dx + s * dy + body[R_T * ROW + i] * turn)
             m = body[(V + 1) * ROW + i] + (c * dy - s * dx + body[R_N * ROW + i] * turn)
             w = body[(V + 2) * ROW + i] + body[HALF * ROW + i] * turn
             body[TRIED * ROW + i], body[(TRIED + 1) * ROW + i], body[(TRIED + 2) * ROW + i] = a, m, w
             x[A * ROW + i], x[M * ROW + i], x[W * ROW + i] = a * scale, m * scale, w * scale
-            x[EPS * ROW + i], x[BY * ROW + i] = of[NEXT * LANES + l] * scale, scale
-            of[SLOW * LANES + l] = min(of[SLOW * LANES + l], a * a + (abs(m) + abs(w)) * (abs(m) + abs(w)))
+            x[EPS * ROW + i], x[BY * ROW + i] = of[NEXT * LANES + lane] * scale, scale
+            of[SLOW * LANES + lane] = min(of[SLOW * LANES + lane], a * a + (abs(m) + abs(w)) * (abs(m) + abs(w)))
 
 
 @compiled
@@ -57,9 +85,11 @@ def set_sided(x, bits, whole, body, count, lanes, terms, law, c_t, c_n, rates):
         for i in range(count):
             for j in range(5):
                 past[j] = body[(PAST + j) * ROW + i]
-            m, w, l = x[WHOLE_M * ROW + i], x[WHOLE_W * ROW + i], i % lanes
+            m, w, lane = x[WHOLE_M * ROW + i], x[WHOLE_W * ROW + i], i % lanes
             side = side_of(k, m, w)
-            x[SHARE * ROW + i], x[BY_M * ROW + i], x[BY_W * ROW + i] = share(past, side, rates[0, l], rates[1, l], m, w)
+            x[SHARE * ROW + i], x[BY_M * ROW + i], x[BY_W * ROW + i] = share(
+                past, side, rates[0, lane], rates[1, lane], m, w
+            )
         set_plain(x, bits, whole, count, terms, law, c_t, c_n)
         end_part(x, count)
     for i in range(count):
@@ -101,8 +131,8 @@ def add_net(x, body, of, count, lanes):
         x[(NET + 14) * ROW + i] = r_t * t4 + r_n * n4 + half * s4
     for e in range(count):
         for j in range(15):
-            for l in range(lanes):
-                of[(TOTAL + j) * LANES + l] += x[(NET + j) * ROW + e * lanes + l]
+            for lane in range(lanes):
+                of[(TOTAL + j) * LANES + lane] += x[(NET + j) * ROW + e * lanes + lane]
 
 
 @compiled
@@ -110,8 +140,8 @@ def evaluate(x, bits, whole, body, of, lanes, n, shared, terms, viscous, which, 
     """Set TOTAL and SLOW of every lane, at the velocities its next step leads to."""
     for i in range(15 * LANES):
         of[TOTAL * LANES + i] = 0.0
-    for l in range(lanes):
-        of[SLOW * LANES + l] = np.inf
+    for lane in range(lanes):
+        of[SLOW * LANES + lane] = np.inf
     together = ROW // lanes
     for first in range(0, n, together):
         here, count = body[place(first, 0, lanes) :] if first else body, min(together, n - first)

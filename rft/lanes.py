@@ -14,10 +14,13 @@ from numba import njit
 
 from rft.compiled import STAMP
 from rft.lane_loads import OPTIONS, ROW, ROWS, compiled, inlined
+
+# isort: off
 from rft.lane_nets import (
     C, C_X, C_Y, DX, ENDED, FACTORS, FRESH, HALF, KEPT, LANE_ROWS, LANES, NEXT, NOW, OWN, PAST, R_N, R_T, RESIDUAL, S,
     SCALE, SLOW, SLOWEST, STEPS, STRIDE, TOTAL, TRIED, UNIT, V, WEIGHT, XI, evaluate, place,
 )  # fmt: skip
+# isort: on
 
 VISCOUS = 1e3  # rounding at which every law is a viscous one
 
@@ -72,16 +75,21 @@ def judge(of, lanes, first, descent, limits):
     of the viscous solution, which FRESH lanes begin with. Without branches, for all at once."""
     ratio, loose, free, budget = descent[1], descent[2], descent[3], descent[4]
     last, limit, largest, shortest, lengthen = limits[0], limits[1], limits[2], limits[3], limits[4]
-    for l in range(lanes):
-        at = TOTAL * LANES + l
+    for lane in range(lanes):
+        at = TOTAL * LANES + lane
         f_x, f_y, moment = of[at], of[at + 5 * LANES], of[at + 10 * LANES]
-        cx, cy, fresh = of[C_X * LANES + l], of[C_Y * LANES + l], of[FRESH * LANES + l] > 0.0
-        before, eps, stride, worst = of[NOW * LANES + l], of[NEXT * LANES + l], of[STRIDE * LANES + l], of[RESIDUAL * LANES + l]
+        cx, cy, fresh = of[C_X * LANES + lane], of[C_Y * LANES + lane], of[FRESH * LANES + lane] > 0.0
+        before, eps, stride, worst = (
+            of[NOW * LANES + lane],
+            of[NEXT * LANES + lane],
+            of[STRIDE * LANES + lane],
+            of[RESIDUAL * LANES + lane],
+        )
         force, about = math.sqrt(f_x * f_x + f_y * f_y), moment - cx * f_y + cy * f_x
-        now = max(force, abs(about)) / of[UNIT * LANES + l]
+        now = max(force, abs(about)) / of[UNIT * LANES + lane]
         kept = ((eps < before) | (now < worst) | (stride <= shortest)) & (not fresh)
         down = kept & (eps > last) & (now < loose)
-        slow, slowest = of[SLOW * LANES + l], of[SLOWEST * LANES + l]
+        slow, slowest = of[SLOW * LANES + lane], of[SLOWEST * LANES + lane]
         freely = math.sqrt(slow) > free * eps
         lower = last if freely else max(ratio * eps, last)
         change = lower / eps
@@ -90,7 +98,7 @@ def judge(of, lanes, first, descent, limits):
         longer = stride if fresh else min(1.0, lengthen * stride)
         x, y, turn = solved3(
             of,
-            l,
+            lane,
             pull * of[at + 4 * LANES] - longer * f_x,
             pull * of[at + 9 * LANES] - longer * f_y,
             pull * of[at + 14 * LANES] - longer * moment,
@@ -98,22 +106,25 @@ def judge(of, lanes, first, descent, limits):
         place_x, place_y = x - cy * turn, y + cx * turn
         far = math.sqrt(place_x * place_x + place_y * place_y + turn * turn)
         cut = largest / max(far, largest) if (max(abs(x), abs(y), abs(turn)) > 1.0) & (not fresh) else 1.0
-        dx, dy, dturn = of[DX * LANES + l], of[(DX + 1) * LANES + l], of[(DX + 2) * LANES + l]
-        of[XI * LANES + l] += dx if kept else 0.0
-        of[(XI + 1) * LANES + l] += dy if kept else 0.0
-        of[(XI + 2) * LANES + l] += dturn if kept else 0.0
+        dx, dy, dturn = of[DX * LANES + lane], of[(DX + 1) * LANES + lane], of[(DX + 2) * LANES + lane]
+        of[XI * LANES + lane] += dx if kept else 0.0
+        of[(XI + 1) * LANES + lane] += dy if kept else 0.0
+        of[(XI + 2) * LANES + lane] += dturn if kept else 0.0
         chosen = kept | fresh
-        of[DX * LANES + l] = cut * x if chosen else 0.5 * dx
-        of[(DX + 1) * LANES + l] = cut * y if chosen else 0.5 * dy
-        of[(DX + 2) * LANES + l] = cut * turn if chosen else 0.5 * dturn
-        of[STRIDE * LANES + l] = longer if chosen else 0.5 * stride
-        of[RESIDUAL * LANES + l] = now if kept else worst
-        of[NOW * LANES + l], of[NEXT * LANES + l] = first if fresh else eps, first if fresh else (lower if down else eps)
-        of[SLOWEST * LANES + l] = slow if kept else slowest
-        steps = of[STEPS * LANES + l] + (0.0 if fresh else 1.0)
+        of[DX * LANES + lane] = cut * x if chosen else 0.5 * dx
+        of[(DX + 1) * LANES + lane] = cut * y if chosen else 0.5 * dy
+        of[(DX + 2) * LANES + lane] = cut * turn if chosen else 0.5 * dturn
+        of[STRIDE * LANES + lane] = longer if chosen else 0.5 * stride
+        of[RESIDUAL * LANES + lane] = now if kept else worst
+        of[NOW * LANES + lane], of[NEXT * LANES + lane] = (
+            first if fresh else eps,
+            first if fresh else (lower if down else eps),
+        )
+        of[SLOWEST * LANES + lane] = slow if kept else slowest
+        steps = of[STEPS * LANES + lane] + (0.0 if fresh else 1.0)
         done = (kept & (eps <= last) & (now <= limit)) | (steps >= budget)
-        of[STEPS * LANES + l], of[FRESH * LANES + l] = steps, 0.0
-        of[KEPT * LANES + l], of[ENDED * LANES + l] = 1.0 if kept else 0.0, 1.0 if done else 0.0
+        of[STEPS * LANES + lane], of[FRESH * LANES + lane] = steps, 0.0
+        of[KEPT * LANES + lane], of[ENDED * LANES + lane] = 1.0 if kept else 0.0, 1.0 if done else 0.0
 
 
 @compiled
@@ -123,23 +134,27 @@ def keep(body, of, lanes, n):
     for first in range(0, n, together):
         here, count = body[place(first, 0, lanes) :] if first else body, min(together, n - first)
         for e in range(count):
-            for l in range(lanes):
-                i, kept = e * lanes + l, of[KEPT * LANES + l] > 0.0
+            for lane in range(lanes):
+                i, kept = e * lanes + lane, of[KEPT * LANES + lane] > 0.0
                 for j in range(3):
                     old, new = here[(V + j) * ROW + i], here[(TRIED + j) * ROW + i]
                     here[(V + j) * ROW + i] = new if kept else old
 
 
 @compiled
-def enter(body, of, lane, lanes, i, motion, factors, pasts, centre, scale, unit):
+def enter(body, of, lane, lanes, i, motion, factors, pasts, scale, unit, scaled):
     """Give a lane to the sample i, at rest."""
     cos, sin, r_t, r_n, half, weight, own = motion
+    c_x, c_y, length = 0.0, 0.0, 0.0  # the mean place
     for e in range(len(cos)):
+        c_x += half[e, 0] * (r_t[e, i] * sin[e, i] + r_n[e, i] * cos[e, i])
+        c_y += half[e, 0] * (r_n[e, i] * sin[e, i] - r_t[e, i] * cos[e, i])
+        length += half[e, 0]
         at = place(e, lane, lanes)
         body[at + C * ROW], body[at + S * ROW], body[at + R_T * ROW] = cos[e, i], sin[e, i], r_t[e, i]
         body[at + R_N * ROW], body[at + HALF * ROW], body[at + WEIGHT * ROW] = r_n[e, i], half[e, 0], weight[e, 0]
         for j in range(3):
-            body[at + (V + j) * ROW] = own[j, e, i]
+            body[at + (V + j) * ROW] = own[j, e, i] / scale[i]
         for j in range(4):
             body[at + (FACTORS + j) * ROW] = factors[j, e, i % factors.shape[2]]
     for e in range(pasts.shape[1]):
@@ -148,8 +163,8 @@ def enter(body, of, lane, lanes, i, motion, factors, pasts, centre, scale, unit)
     for row in range(TOTAL):
         of[row * LANES + lane] = 0.0
     of[STRIDE * LANES + lane], of[RESIDUAL * LANES + lane] = 1.0, np.inf
-    of[SCALE * LANES + lane], of[UNIT * LANES + lane] = scale[i], unit[i]
-    of[C_X * LANES + lane], of[C_Y * LANES + lane] = centre[0, i], centre[1, i]
+    of[SCALE * LANES + lane], of[UNIT * LANES + lane] = scale[i] if scaled else 1.0, unit[i]
+    of[C_X * LANES + lane], of[C_Y * LANES + lane] = c_x / length, c_y / length
 
 
 @compiled
@@ -174,18 +189,19 @@ def leave(of, lane, i, last, out):
 
 
 def built(stamp: str):
-    def attempt(descent, limits, law, motion, factors, pasts, rates, masses, centre, scale, unit, guess, out):
+    def attempt(descent, limits, law, motion, factors, pasts, rates, masses, scale, unit, guess, scaled, out):
         """A descent of samples on the last axis of the arrays of a motion, written to out: xi (3, B), residual, evaluations,
-        the slowest element's speed (B,). law: dry terms (T, 3), viscous coefficients (n, 2), and which terms an element has
-        (n, 3). factors: (4, n, B or 1). pasts: (5, k, B), shares developed left and right, velocity across before, and shares
-        that are given, of the first k elements. rates: (2, B or 1), dt and e-foldings a length, dt < 0 where nothing
-        develops. masses: (17, B) as `add_momentum` has them, or (0, B)."""
+        the slowest element's speed (B,), velocities over the scale (B,). scaled: drag knows of true ones. law: dry terms
+        (T, 3), viscous coefficients (n, 2), and which terms an element has (n, 3). factors: (4, n, B or 1). pasts: (5, k, B),
+        shares developed left and right, velocity across before, and shares that are given, of the first k elements. rates:
+        (2, B or 1), dt and e-foldings a length, dt < 0 where nothing develops. masses: (17, B) as `add_momentum` has them,
+        or (0, 1)."""
         _ = stamp  # this source's, so that numba's cache knows which it keeps
         terms, viscous, which = law
         n, size, shared = motion[0].shape[0], motion[0].shape[1], pasts.shape[1]
         lanes = max(1, min(LANES, size, 4 * ROW // n))
-        x, whole, of = np.zeros(ROWS * ROW), np.zeros(ROW, np.int64), np.zeros(LANE_ROWS * LANES)
-        bits, body = x.view(np.int64), np.zeros((1 + (n - 1) // (ROW // lanes)) * OWN * ROW)
+        x, whole, of = np.empty(ROWS * ROW), np.empty(ROW, np.int64), np.zeros(LANE_ROWS * LANES)
+        bits, body = x.view(np.int64), np.empty((1 + (n - 1) // (ROW // lanes)) * OWN * ROW)
         who, rate, changed = np.full(lanes, -1), np.zeros((2, lanes)), ((factors[:3] != 1.0).any(), factors[3].any())
         last = limits[0]
         first = last if len(terms) == 0 else max(descent[0], last)
@@ -195,7 +211,7 @@ def built(stamp: str):
                 if who[lane] < 0 and come < size:
                     i = who[lane] = come
                     come += 1
-                    enter(body, of, lane, lanes, i, motion, factors, pasts, centre, scale, unit)
+                    enter(body, of, lane, lanes, i, motion, factors, pasts, scale, unit, scaled)
                     begin(of, lane, i, first, guess)
                     rate[0, lane], rate[1, lane] = rates[0, i % rates.shape[1]], rates[1, i % rates.shape[1]]
             evaluate(x, bits, whole, body, of, lanes, n, shared, terms, viscous, which, rate, changed)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from rft.contact import SIDE, Model
 from rft.media.base import is_frozen
-from rft.samples import Samples
 
 
 def foreign(model: Model):
@@ -30,19 +30,37 @@ class Numbers(NamedTuple):
 
 
 def numbers(model: Model, rows: list[slice], size: int) -> Numbers:
-    """Of a model that has nothing foreign, for so many samples. rows: of each contact's elements among all of them."""
-    counts = [here.stop - here.start for here in rows]
-    laws = tuple(contact.law for contact in model.contacts.values())
-    lasting = all(is_frozen(law) and is_frozen(getattr(law, "medium", law)) for law in laws)
-    law = (_law if lasting else _law.__wrapped__)(laws, tuple(counts))
-    factors = [_factors(contact, count) for contact, count in zip(model.contacts.values(), counts)]
-    side = model.contacts[SIDE]
-    pasts, rates = _shared(side.shares, counts[0], size)
+    """Of a model that has nothing foreign, for so many samples. rows: of each contact's elements among all of them. Those of
+    a model that cannot change, and is the same for all samples, are made once."""
+    counts = tuple(here.stop - here.start for here in rows)
+    if counts not in model.numbers:
+        made = _made(model, counts, size)
+        if not _lasting(model):
+            return made
+        model.numbers[counts] = made
+    return model.numbers[counts]
+
+
+def _lasting(model: Model) -> bool:
+    free = not model.terms and not model.contacts[SIDE].shares
+    return free and model.alike and _fixed(tuple(contact.law for contact in model.contacts.values()))
+
+
+def _fixed(laws: tuple) -> bool:
+    return all(is_frozen(law) and is_frozen(getattr(law, "medium", law)) for law in laws)
+
+
+def _made(model: Model, counts: tuple, size: int) -> Numbers:
+    contacts = model.contacts.values()
+    laws = tuple(contact.law for contact in contacts)
+    law = (_law if _fixed(laws) else _law.__wrapped__)(laws, counts)
+    factors = [_factors(contact, count) for contact, count in zip(contacts, counts)]
+    pasts, rates = _shared(model.contacts[SIDE].shares, counts[0], size)
     masses = sum(np.stack([np.broadcast_to(x, size) for x in term.numbers]) for term in model.terms)
     if len(factors) > 1:
         samples = max(f.shape[-1] for f in factors)
         factors = [np.concatenate([np.broadcast_to(f, (*f.shape[:-1], samples)) for f in factors], 1)]
-    return Numbers(law, factors[0], pasts, rates, masses if model.terms else np.zeros((0, size)))
+    return Numbers(law, factors[0], pasts, rates, masses if model.terms else np.zeros((0, 1)))
 
 
 @functools.lru_cache(maxsize=32)
@@ -59,9 +77,9 @@ def _law(laws: tuple, counts: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def _shared(shares: tuple, count: int, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the shares of the side's elements come to: (5, count or 0, B), and (2, B or 1)."""
+    """What the shares of the side's elements come to: (5, count, B) or (5, 0, 1), and (2, B or 1)."""
     if not shares:
-        return np.zeros((5, 0, size)), np.array([[-1.0], [0.0]])
+        return np.zeros((5, 0, 1)), np.array([[-1.0], [0.0]])
     pasts, rates = np.ones((5, count, size)), np.array([[-1.0], [0.0]])
     for share in shares:
         given, growing = share.numbers
@@ -92,19 +110,27 @@ def _factors(contact, count: int) -> np.ndarray:
     return np.stack(np.broadcast_arrays(along, back, across, square))
 
 
-def attempt(of: Samples, rows: list[slice], descent: tuple, limits: list, guess: np.ndarray, scaled: bool) -> tuple:
-    """A descent of samples by compiled code, as `rft.lanes.attempt` returns it; scaled: whether their drag knows speed."""
-    from rft.lanes import attempt
+NO_GUESS = np.zeros((3, 0))
 
-    size = of.size
-    scale = of.scale if scaled else np.ones(size)
-    given = numbers(of.model, rows, size)
-    asked = _plain((of.motion, of.centre, scale, of.unit, guess))
+
+@functools.cache
+def _attempt() -> Callable:
+    from rft.lanes import attempt  # which takes half a second
+
+    return attempt
+
+
+def attempt(motion, model: Model, rows, scale, unit, guess, descent: tuple, limits: np.ndarray, scaled: bool) -> tuple:
+    """A descent by compiled code, as `rft.lanes.attempt` has it, of all samples of a motion: (xi (3, B) over the scale,
+    residual, evaluations, the slowest element's speed). guess: (3, B), over the scale, or None. scaled: drag knows speed."""
+    size, given = scale.size, numbers(model, rows, scale.size)
+    asked = tuple(map(_plain, (*motion[:4], motion.half, motion.weight, motion.v)))
+    own = given.factors, given.pasts, given.rates, given.masses, scale, unit, NO_GUESS if guess is None else guess
     out = np.empty((3, size)), np.empty(size), np.empty(size, np.int64), np.empty(size)
-    attempt(np.array(descent), np.array(limits), given.law, asked[0], *given[1:], *asked[1:], out)
+    _attempt()(np.array(descent), limits, given.law, asked, *map(_plain, own), scaled, out)
     return out
 
 
-def _plain(x) -> np.ndarray | tuple[np.ndarray, ...]:
-    """An array, or a tuple of them, of one's own, rows one after the other: code is compiled for these alone."""
-    return tuple(map(_plain, x)) if isinstance(x, tuple) else np.array(x, order="C")
+def _plain(x: np.ndarray) -> np.ndarray:
+    """An array of one's own, rows one after the other: code is compiled for these alone."""
+    return x if x.flags.carray and x.dtype == float else np.array(x, float, order="C")

@@ -36,13 +36,16 @@ class Jacobian(NamedTuple):
         """As `Kinematics.wrench`, of (3, n, B)."""
         return np.einsum("ijnb,inb->jb", self.matrix, self.weight * force)
 
-    def assembled(self, load: np.ndarray) -> np.ndarray:
-        """As `Kinematics.assembled`."""
-        columns = np.empty_like(load)
+    def assembled(self, load: np.ndarray, v: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray | None]:
+        """As `Kinematics.assembled`, and what the loads' tangents times velocities v (3, n, B) do to the frame, (3, B)."""
+        columns = np.empty((3, 4 if v is None else 5, *load.shape[2:]))
         columns[:, 0] = load[:, 0]
-        np.einsum("ijnb,jknb->iknb", load[:, 1:], self.matrix, out=columns[:, 1:])
+        np.einsum("ijnb,jknb->iknb", load[:, 1:], self.matrix, out=columns[:, 1:4])
+        if v is not None:
+            np.einsum("ijnb,jnb->inb", load[:, 1:], v, out=columns[:, 4])
         columns *= self.weight
-        return np.einsum("ijnb,iknb->jkb", self.matrix, columns)
+        net = np.einsum("ijnb,iknb->jkb", self.matrix, columns)
+        return net[:, :4], None if v is None else net[:, 4]
 
     def take(self, keep: np.ndarray) -> Jacobian:
         return Jacobian(self.matrix[..., keep], self.weight, self.v[..., keep])

@@ -22,7 +22,7 @@ from rft.bodies.pieces import PIECES
 from rft.contact import Model
 from rft.effects.base import Effect, Prepared, Site, broken, under_way
 from rft.limit_cycle import Approach, HeavyApproach
-from rft.media.base import Medium, in_range, require, require_drag
+from rft.media.base import Medium, in_range, require
 from rft.newton import Balance
 from rft.premise import Premise
 from rft.work import Work, done_by
@@ -97,8 +97,9 @@ def time_steps(
     cycles: exactly so many; if left out, as many as it takes to reach the limit cycle, and one where effects break
     symmetry (there no cycle is like another). Other arguments as in `rft.body_velocity`. ValueError for what makes no sense.
     """
+    lost = broken(effects)
+    cut, model, rows = Prepared.of(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
-    require_drag(medium)
     check(backend)
     require(alpha.ndim >= 2 and alpha.shape[-2] >= 8, f"time stepping takes 8 phases or more, got alpha {alpha.shape}")
     if cycles is not None:
@@ -106,10 +107,9 @@ def time_steps(
     batch, (phases, joints) = alpha.shape[:-2], alpha.shape[-2:]
     if 0 in batch:
         return _nothing(batch, phases)
-    if cycles is None and broken(effects) & Premise.SE2_SYMMETRIC:
+    if cycles is None and lost & Premise.SE2_SYMMETRIC:
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
-    cut, model, rows = Prepared.of(medium, body, effects, loads, pieces)
     problem = Balance(model, rows, regularisation, tolerance, backend)
     steps = _Steps(problem, cut, halves(body), *shapes, effects)
     found = _round_and_round(steps, phases, cycles, with_work, with_path)

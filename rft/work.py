@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Kinematics, halves, pace
+from rft.bodies.base import Body, Kinematics, checked_body, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.contact import SIDE, Model
 from rft.effects.base import Effect, broken, folded, pieced
@@ -46,6 +46,7 @@ def work_done(
     pieces: int = PIECES,
 ) -> Work:
     """Power and internal moments for body velocities xi (..., 3) that `body_velocity` gave for the same arguments."""
+    checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
     require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")

@@ -11,6 +11,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
+NEVER = threading.Event()
 LARGE_BLOCK = 2**24  # bytes; glibc learns from blocks of up to 32 MB
 
 
@@ -43,7 +44,7 @@ def one_thread() -> Iterator[None]:
 
 def workers(threads: int | None, useful: int) -> int:
     """How many threads to take of those allowed, by default one a core."""
-    return max(1, min(1 if _one.get() else threads or cores(), useful))
+    return 1 if useful < 2 or _one.get() else max(1, min(threads or cores(), useful))
 
 
 def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
@@ -54,9 +55,9 @@ def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
 def each(f: Callable, shares: list) -> None:
     """f(share, stop) of each share, side by side: NumPy lets go of the interpreter inside its loops. What is raised here, by
     a signal among others, sets ``stop``, so that no share goes on for more than a step."""
-    stop = threading.Event()
     if len(shares) == 1:
-        return f(shares[0], stop)
+        return f(shares[0], NEVER)
+    stop = threading.Event()
     with ThreadPoolExecutor(len(shares)) as pool:
         try:
             list(pool.map(lambda share: f(share, stop), shares))

@@ -15,9 +15,8 @@ from geomech.reconstruct import displacement, poses, repeated
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
 from geomech.systems.said import name_in, told
 from geomech.systems.solver import Solver
-from rft.balance import checked_body
 from rft.bodies import KINDS as BODIES
-from rft.bodies.base import halves, pace
+from rft.bodies.base import checked_body, halves, pace
 from rft.contact import Model
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from rft.media.base import require, shown
+
 
 class Kinematics(NamedTuple):
     """Kinematics of n straight elements for B samples, in the body frame and in body lengths; arrays (n, B) if not said.
@@ -28,10 +30,10 @@ class Kinematics(NamedTuple):
     @classmethod
     def of(cls, along, place, velocity, turn, half) -> Kinematics:
         """From complex headings, places and velocities (n, B), turning rates (n, B) and half lengths (n, 1)."""
-        own = velocity * along.conj()
-        lever = 1j * place * along.conj()
+        back = along.conj()
+        own, lever = velocity * back, place * back
         v = np.array([own.real, own.imag, turn * half])
-        return cls(along.real.copy(), along.imag.copy(), lever.real.copy(), lever.imag.copy(), half, 2.0 * half, v)
+        return cls(along.real.copy(), along.imag.copy(), -lever.imag, lever.real.copy(), half, 2.0 * half, v)
 
     @property
     def place(self) -> np.ndarray:
@@ -121,6 +123,13 @@ class Body(Protocol):
     def joints(self) -> int: ...
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics: ...
+
+
+def checked_body(body) -> Body:
+    """body, or ValueError if it is nothing of the kind."""
+    good = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
+    require(good, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
+    return body
 
 
 def numbered(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:

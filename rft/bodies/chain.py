@@ -93,21 +93,32 @@ class Chain:
         """A frame's own value from per-link values (n, ...): its link's, or the length-weighted mean."""
         return x[link] if link is not None else self.fractions @ x
 
+    def _in_frame(self, steps: np.ndarray, link: int | None) -> np.ndarray:
+        """Values of all links, (n, B), from what each has more than the one before, less the frame's own."""
+        x = np.zeros((len(self.lengths), steps.shape[1]), steps.dtype)
+        np.cumsum(steps, 0, out=x[1:])
+        x -= self._of_link(x, link)
+        return x
+
     def _links(self, alpha, alphadot):
-        """Headings (n, B), their rates, and complex places and velocities of the link centres in the body frame."""
-        alpha, alphadot = self.joint_angles(alpha), self.joint_angles(alphadot)
-        zero = np.zeros_like(alpha[:1])
-        heading = np.concatenate([zero, np.cumsum(alpha, 0)])
-        turn = np.concatenate([zero, np.cumsum(alphadot, 0)])
-        heading, turn = (x - self._of_link(x, self._link) for x in (heading, turn))
-        half_links = (self.fractions / 2)[:, None] * np.exp(1j * heading)  # complex numbers carry the plane here
-        place, velocity = _centres(half_links, zero), _centres(half_links * (1j * turn), zero)
-        return heading, turn, *(x - self._of_link(x, self._link) for x in (place, velocity))
+        """Of the links in the body frame: complex headings (n, B), the headings' rates, and complex places and velocities of
+        the centres; and heading angles."""
+        size, link = alpha.shape[1], self._link
+        both = self._in_frame(np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1), link)
+        heading, turn = both[:, :size], both[:, size:]
+        along = np.empty(heading.shape, complex)  # complex numbers carry the plane here
+        np.cos(heading, out=along.real)
+        np.sin(heading, out=along.imag)
+        halves = np.empty((len(heading), 2 * size), complex)  # half links, and how they turn
+        np.multiply((self.fractions / 2)[:, None], along, out=halves[:, :size])
+        np.multiply(1j * turn, halves[:, :size], out=halves[:, size:])
+        centres = self._in_frame(halves[:-1] + halves[1:], link)
+        return along, turn, centres[:, :size], centres[:, size:], heading
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
         """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
-        heading, turn, place, velocity = self._links(alpha, alphadot)
-        return Kinematics.of(np.exp(1j * heading), place, velocity, turn, (self.fractions / 2)[:, None])
+        along, turn, place, velocity, _ = self._links(alpha, alphadot)
+        return Kinematics.of(along, place, velocity, turn, (self.fractions / 2)[:, None])
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Pose h of another frame of this body in the body's own, and dh/dt: each (..., 3), in length units and rad.
@@ -115,9 +126,9 @@ class Chain:
         alpha, alphadot: (..., joints). With `geomech.coordinates` this changes velocities and connections of frame.
         """
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
-        links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
+        _, *links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
         link = self._link_of(frame)
-        heading, turn, place, velocity = (self._of_link(x, link).reshape(alpha.shape[:-1]) for x in links)
+        turn, place, velocity, heading = (self._of_link(x, link).reshape(alpha.shape[:-1]) for x in links)
         place, velocity = self.length * place, self.length * velocity
         h, hdot = (place.real, place.imag, heading), (velocity.real, velocity.imag, turn)
         return np.stack(h, -1), np.stack(hdot, -1)
@@ -131,14 +142,9 @@ class Chain:
         require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last, got {alpha.shape}")
         require(pose.shape[-1:] == (3,), f"pose must be (x, y, theta), got {pose.shape}")
         flat = alpha.reshape(-1, self.joints).T
-        heading, _, place, _ = self._links(flat, np.zeros_like(flat))
-        half = (self.fractions / 2)[:, None] * np.exp(1j * heading)
+        along, _, place, *_ = self._links(flat, np.zeros_like(flat))
+        half = (self.fractions / 2)[:, None] * along
         ends = self.length * np.concatenate([place - half, (place + half)[-1:]]).T.reshape(*alpha.shape[:-1], -1)
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)
         across, up = rotated(theta, ends.real, ends.imag)
         return np.stack([x + across, y + up], -1)
-
-
-def _centres(half_links: np.ndarray, zero: np.ndarray) -> np.ndarray:
-    """Link centres from half-link vectors (n, B), the first at the origin; velocities from their rates alike."""
-    return np.concatenate([zero + 0j, np.cumsum(half_links[:-1] + half_links[1:], 0)])

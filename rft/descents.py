@@ -1,0 +1,114 @@
+"""Descents of `rft.newton` for many samples at once, by NumPy; its heading has the reasons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from rft.linear import solve3
+from rft.samples import Samples, State
+
+LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
+SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
+LENGTHEN = 2.0  # the next part to try, after a success
+CROWDED = 0.8  # of samples that go on, below which those that have ended leave the arrays
+
+
+class Descent(NamedTuple):
+    """How an attempt comes down to the wanted regularisation."""
+
+    widest: float  # the first rounding of the kinks, in body lengths per radian
+    ratio: float  # of the rounding from one level to the next
+    loose: float  # residual at which a level is left
+    free: float  # elements faster than this many times the rounding let a sample go all the way at once
+    budget: int  # iterations allowed
+
+
+class Descending:
+    """Some samples of a `rft.newton.Balance` under way, on their way down. guess: (3, B) of the whole batch, or None. wrote:
+    called with places in the batch of samples that have ended, their xi, residual, evaluations and slowest elements' speed."""
+
+    def __init__(self, problem, descent: Descent, guess: np.ndarray | None, wrote: Callable):
+        self.problem, self.descent, self.guess, self.wrote = problem, descent, guess, wrote
+        self.last, self.limit = problem.regularisation, problem.limit
+
+    def run(self, share: np.ndarray, stop, together: int) -> None:
+        """Solve the samples ``share``, so many side by side: as some end, others come."""
+        queue, state = np.array_split(share, math.ceil(2 * share.size / together)), None
+        while (queue or state is not None) and not stop.is_set():
+            while queue and (state is None or state.of.size <= together // 2):
+                fresh = self._start(self.problem.samples(queue.pop()))
+                state = fresh if state is None else State.join([state, fresh], self.problem.model)
+            state = self._advance(state)
+
+    def _start(self, of: Samples) -> State:
+        """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
+        size = of.size
+        eps = np.full(size, self.last if self.problem.linear else max(self.descent.widest, self.last))
+        dx = self.problem.viscous(of) if self.guess is None else self.guess[:, of.index]
+        at_rest, worst, steps = np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int)
+        return State(of, at_rest, dx, of.motion.v, eps, eps, np.ones(size), worst, steps, np.ones(size, bool))
+
+    def _advance(self, s: State) -> State | None:
+        """One step of all samples; those that end are written and leave. None when none are left."""
+        kept = self._step(s)
+        ended = kept & (s.eps <= self.last) & (s.residual <= self.limit)
+        ended |= s.iterations >= self.descent.budget
+        ended &= s.going
+        if ended.any():
+            self._write(s, np.flatnonzero(ended))
+            s.going = s.going & ~ended
+            left = np.flatnonzero(s.going)
+            if left.size < CROWDED * s.of.size:
+                s = s.take(left)
+        return s if s.of.size else None
+
+    def _step(self, s: State) -> np.ndarray:
+        """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
+        xi, v = s.xi + s.dx, s.v + s.of.motion.carried(s.dx)
+        net, slope = self.problem.net(s.of, v, xi, s.eps_next, with_slope=True)
+        residual = self.problem.residual(net[:, 0], s.of)
+        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
+        s.iterations, s.eps = s.iterations + 1, s.eps_next
+        stride = np.minimum(1.0, LENGTHEN * s.stride)
+        if not kept.all():
+            stride = np.where(kept, stride, 0.5 * s.stride)
+            xi, v, residual = (np.where(kept, a, b) for a, b in ((xi, s.xi), (v, s.v), (residual, s.residual)))
+        s.xi, s.v, s.residual, s.stride = xi, v, residual, stride
+        dx = self._next_step(s, net, slope, kept)
+        s.dx = dx if kept.all() else np.where(kept, dx, 0.5 * s.dx)
+        return kept
+
+    def _next_step(self, s: State, net, slope, kept) -> np.ndarray:
+        """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
+        down = kept & (s.eps > self.last) & (s.residual < self.descent.loose)
+        right = -s.stride * net[:, 0]
+        if down.any():
+            # Where every element moves much faster than the rounding, its kinks no longer matter: go all the way.
+            free = slowest(s.v) > self.descent.free * s.eps
+            lower = np.where(free, self.last, np.maximum(self.descent.ratio * s.eps, self.last))
+            s.eps_next = np.where(down, lower, s.eps)
+            # A dry law is homogeneous of degree 0 in (v, eps), so eps dF/d(eps) = -(dF/dv) v. An element at rest creeps
+            # in proportion to eps; one that slides feels eps^2.
+            change = s.eps_next / s.eps
+            right += np.where(free, (change * change - 1.0) / 2.0, change - 1.0) * slope
+        dx = solve3(net[:, 1:], right)
+        if np.abs(dx).max(initial=0.0) <= 1.0:  # then no place within a body length moves by LARGEST_STEP
+            return dx
+        x, y, turn = dx
+        size2 = (x - s.of.centre[1] * turn) ** 2 + (y + s.of.centre[0] * turn) ** 2 + turn * turn
+        return dx * (LARGEST_STEP / np.sqrt(np.maximum(size2, LARGEST_STEP**2)))
+
+    def _write(self, s: State, ended: np.ndarray) -> None:
+        # A balance with wider rounding is not the one that was asked for.
+        residual = np.where(s.eps[ended] <= self.last, s.residual[ended], np.inf)
+        self.wrote(s.of.index[ended], s.xi[:, ended], residual, s.iterations[ended], slowest(s.v[..., ended]))
+
+
+def slowest(v: np.ndarray) -> np.ndarray:
+    """(B,): the speed of the slowest element, each by its faster end, from velocities (3, n, B)."""
+    v_t, v_n, spin = v
+    return np.sqrt((v_t * v_t + (np.abs(v_n) + np.abs(spin)) ** 2).min(0))
