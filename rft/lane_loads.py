@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from rft.loads import TINY
+from rft.loads import SERIES, TINY
 
 OPTIONS = {"nogil": True, "error_model": "numpy"}
 compiled = njit(**OPTIONS)
@@ -30,14 +29,7 @@ FIRST, LAST, POINT = range(3)  # of an element's law: rows of dry terms, and whe
 LN2 = math.log(2.0)
 
 
-def _series() -> tuple[float, ...]:
-    """Powers of z in k(z), z = t^2 in [0, 1/9], to 1e-17: k = (atanh t - t) / t^3 = sum_j z^j / (2j + 3)."""
-    k = lambda z: sum(z**j / (2 * j + 3) for j in range(40))
-    chebyshev = np.polynomial.Chebyshev.interpolate(k, 11, domain=[0.0, 1.0 / 9.0])
-    return tuple(map(float, chebyshev.convert(kind=np.polynomial.Polynomial).coef))
-
-
-K0, K1, K2, K3, K4, K5, K6, K7, K8, K9, K10, K11 = _series()
+K0, K1, K2, K3, K4, K5, K6, K7, K8, K9, K10, K11 = SERIES
 
 
 @inlined

@@ -7,17 +7,19 @@ import numpy as np
 
 def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """x (3, B) with matrix x = right, by Cramer's rule on (3, 3, B); a singular matrix gives no step."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix
-    A, B, C = e * i - f * h, f * g - d * i, d * h - e * g
-    det = a * A + b * B + c * C
-    inverse = np.where(det == 0.0, 0.0, 1.0 / np.where(det == 0.0, 1.0, det))
-    x, y, z = right
-    rows = (
-        A * x + (c * h - b * i) * y + (b * f - c * e) * z,
-        B * x + (a * i - c * g) * y + (c * d - a * f) * z,
-        C * x + (b * g - a * h) * y + (a * e - b * d) * z,
-    )
-    return np.stack(rows) * inverse
+    twice = np.empty((5, 5, matrix.shape[2]))  # rows and columns go round, so that every minor is of neighbours
+    twice[:3, :3] = matrix
+    twice[3:, :3] = matrix[:2]
+    twice[:, 3:] = twice[:, :2]
+    cofactors = twice[1:4, 1:4] * twice[2:, 2:]
+    cofactors -= twice[1:4, 2:] * twice[2:, 1:4]
+    det = (matrix[0] * cofactors[0]).sum(0)
+    x = np.einsum("ijb,ib->jb", cofactors, right)
+    singular = det == 0.0
+    if singular.any():
+        x[:, singular], det[singular] = 0.0, 1.0
+    x /= det
+    return x
 
 
 def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

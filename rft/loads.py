@@ -20,61 +20,55 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from rft.media.base import Medium, TermLaw, is_closed, require_law
 
 TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
-SERIES_BELOW = 0.04  # t^2 below which k is summed; above it atanh t - t loses at most two digits
+SERIES_BELOW = 1.0 / 9.0  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
 QUADRATURE = "gauss:24"  # in place of "exact" where a medium has no closed form
-SERIES = tuple(1.0 / (2 * j + 3) for j in range(11))  # k = sum_j t^2j / (2j + 3)
 
 
 # (v_t, v_n, spin, eps) -> (3, 4, n, B)
 LoadLaw = Callable[..., np.ndarray]
 
 
+def _polynomial(count: int = 12) -> tuple[float, ...]:
+    """Coefficients of k = sum_j t^2j / (2j + 3) in powers of t^2 below SERIES_BELOW, to 1e-17: through Chebyshev's points."""
+    k = lambda z: sum(z**j / (2 * j + 3) for j in range(40))
+    series = np.polynomial.Chebyshev.interpolate(k, count - 1, domain=[0.0, SERIES_BELOW])
+    return tuple(map(float, series.convert(kind=np.polynomial.Polynomial).coef))
+
+
+SERIES = _polynomial()
+FOURS = np.array(SERIES).reshape(3, 4)  # of powers 0 to 3, times t^8 to the power of the row
+
+
 def k_function(z: np.ndarray, one_minus_z: np.ndarray) -> np.ndarray:
     """k = (atanh t - t) / t^3 for z = t^2 in [0, 1). ``one_minus_z`` is passed for its digits near z = 1."""
-    small = np.minimum(z, SERIES_BELOW)
-    series = np.full_like(z, SERIES[-1])
-    for c in SERIES[-2::-1]:
-        series *= small
-        series += c
-    t = np.sqrt(np.maximum(z, SERIES_BELOW))
-    atanh = 0.5 * np.log((1.0 + t) ** 2 / np.maximum(one_minus_z, TINY))
-    return np.where(z < SERIES_BELOW, series, (atanh - t) / (t * t * t))
-
-
-@dataclass(frozen=True)
-class Ends:
-    """Elliptic coordinates of an element and the pieces all averages share (see the module's heading)."""
-
-    S: np.ndarray
-    mu: np.ndarray
-    t: np.ndarray
-    c_mu: np.ndarray  # 1 - mu^2
-    c_t: np.ndarray  # 1 - t^2
-    k: np.ndarray
-    h: np.ndarray
-
-    @classmethod
-    def of(cls, A2: np.ndarray, v_n: np.ndarray, spin: np.ndarray) -> Ends:
-        abs_n, abs_spin = np.abs(v_n), np.abs(spin)
-        lead = abs_n - abs_spin
-        u_near, u_far = np.abs(lead), abs_n + abs_spin
-        R_near, R_far = np.sqrt(A2 + u_near * u_near), np.sqrt(A2 + u_far * u_far)
-        S = R_near + R_far + TINY
-        # S - 2 max(|v_n|, |spin|) as a sum of positive terms: S - 2|v_n| and S - 2|spin| would cancel.
-        excess = A2 / (R_near + u_near + TINY) + A2 / (R_far + u_far + TINY)
-        inv = 1.0 / S
-        mu, t = 2.0 * v_n * inv, 2.0 * spin * inv
-        c_mu = (excess + (u_near - lead)) * (1.0 + np.abs(mu)) * inv
-        c_t = (excess + (u_near + lead)) * (1.0 + np.abs(t)) * inv
-        k = k_function(t * t, c_t)
-        return cls(S, mu, t, c_mu, c_t, k, 1.0 - c_t * k)
+    powers = np.empty((4, z.size))
+    powers[0] = 1.0
+    np.minimum(z.ravel(), SERIES_BELOW, out=powers[1])
+    np.multiply(powers[1], powers[1], out=powers[2])
+    np.multiply(powers[1], powers[2], out=powers[3])
+    fourth = powers[2] * powers[2]
+    low, middle, high = FOURS @ powers
+    high *= fourth
+    high += middle
+    high *= fourth
+    high += low
+    far = np.maximum(z, SERIES_BELOW)
+    t = np.sqrt(far)
+    atanh = 1.0 + t
+    atanh *= atanh
+    atanh /= np.maximum(one_minus_z, TINY)
+    np.log(atanh, out=atanh)
+    atanh *= 0.5
+    atanh -= t
+    far *= t
+    atanh /= far
+    return np.where(z < SERIES_BELOW, high.reshape(z.shape), atanh)
 
 
 def exact(medium: Medium) -> LoadLaw:
@@ -84,21 +78,31 @@ def exact(medium: Medium) -> LoadLaw:
     """
     if not is_closed(medium):
         raise ValueError(f"{type(medium).__name__} has no closed-form link integral: use loads={QUADRATURE!r}")
-    terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)  # those with an axial part first
-    axial = sum(k_t != 0.0 for _, k_t, _ in terms)
-    q, k_t, k_n = np.array(terms).reshape(-1, 3).T
-    q2, k_t = (q * q)[:, None, None], k_t[:axial]
+    q2, weights = _weights(medium.dry) if medium.dry else (None, None)
 
     def load(v_t, v_n, spin, eps):
-        if not terms:
-            out = np.zeros((3, 4, *v_t.shape))
-        else:
-            out = _dry(Ends.of(q2 * (v_t * v_t) + eps * eps, v_n, spin), v_t, q2 * v_t, k_t, k_n)
+        out = np.zeros((3, 4, *v_t.shape)) if weights is None else _dry(v_t, np.array([v_n, spin]), eps, q2, weights)
         if any(medium.viscous):
             _add_viscous(out, medium.viscous, v_t, v_n, spin)
         return out
 
     return load
+
+
+PIECES = 9  # of a term's load, in `_dry`
+
+
+def _weights(terms) -> tuple[np.ndarray, np.ndarray]:
+    """q^2 (T, 1, 1) and what the pieces of each term are weighed with in its load: (12, PIECES T)."""
+    q, k_t, k_n = np.array(terms).T
+    q2, weights = q * q, np.zeros((3, 4, PIECES, len(q)))
+    for row, column, piece, weight in (
+        (0, 0, 0, k_t), (0, 1, 1, k_t * q2), (0, 2, 2, -k_t), (0, 3, 3, k_t),
+        (1, 0, 4, k_n), (1, 1, 2, -k_n * q2), (1, 2, 5, k_n), (1, 3, 6, -k_n),
+        (2, 0, 7, 0.5 * k_n), (2, 1, 3, k_n * q2), (2, 2, 6, -k_n), (2, 3, 8, k_n),
+    ):  # fmt: skip
+        weights[row, column, piece] = weight
+    return q2[:, None, None], weights.reshape(12, -1)
 
 
 def _add_viscous(out, coefficients, v_t, v_n, spin) -> None:
@@ -108,44 +112,78 @@ def _add_viscous(out, coefficients, v_t, v_n, spin) -> None:
         out[i, i + 1] += c
 
 
-def _dry(e: Ends, v_t, q2_v_t, k_t, k_n) -> np.ndarray:
-    """Sum over terms of f_t = k_t v_t / R, f_n = k_n u / R; ``e`` and ``q2_v_t`` = q^2 v_t have the terms on axis 0."""
-    out = np.empty((3, 4, *v_t.shape))
-    two_S = 2.0 / e.S
-    mt = e.mu * e.t
-    p = 1.0 / (e.c_mu + e.mu * e.mu * e.c_t + TINY)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
-    cmp = e.c_mu * p
-    four_S2 = two_S * two_S
-    per_c_t = four_S2 / (e.c_t + TINY)
-    by_n = -four_S2 * e.mu * p  # d<1/R>/dv_n = -<u/R^3>
-    by_spin = per_c_t * e.t * (e.h - cmp)  # d<1/R>/dspin = -<s u/R^3>
-    first = k_t.size
-    rows = np.empty((first, 4, *v_t.shape))
-    if first:
-        inverse = two_S[:first] * (1.0 + e.t[:first] * e.t[:first] * e.k[:first])  # <1/R>
-        by_t = -q2_v_t[:first] * per_c_t[:first] * two_S[:first] * p[:first]  # -q^2 v_t <1/R^3>
-        np.multiply(v_t, inverse, out=rows[:, 0])
-        np.add(inverse, v_t * by_t, out=rows[:, 1])
-        np.multiply(v_t, by_n[:first], out=rows[:, 2])
-        np.multiply(v_t, by_spin[:first], out=rows[:, 3])
-    _weigh(k_t, rows, out[0])
-    rows = np.empty((k_n.size, 2, 4, *v_t.shape))
-    across, turning = rows[:, 0], rows[:, 1]
-    across[:, 0] = e.mu
-    np.multiply(q2_v_t, by_n, out=across[:, 1])
-    np.multiply(two_S, cmp, out=across[:, 2])
-    np.multiply(-mt, across[:, 2], out=across[:, 3])
-    np.multiply(0.5 * e.c_mu * e.t, e.h, out=turning[:, 0])
-    np.multiply(q2_v_t, by_spin, out=turning[:, 1])
-    turning[:, 2] = across[:, 3]
-    np.multiply(two_S * e.c_mu, p - e.h, out=turning[:, 3])
-    _weigh(k_n, rows, out[1:])
+def _dry(v_t, across, eps, q2, weights) -> np.ndarray:
+    """The sum over terms of f_t = k_t v_t / R, f_n = k_n u / R; across: (v_n, spin). Terms are on the axis before elements.
+    In place where it can be, and all terms at once: where batches are small every call counts, where they are large memory."""
+    squares = v_t * v_t
+    A2 = q2 * squares
+    A2 += eps * eps
+    abs_n, abs_spin = np.abs(across)
+    lead = abs_n - abs_spin
+    u = np.array([np.abs(lead), abs_n + abs_spin])[:, None]  # at the nearer end and the farther one
+    R = u * u + A2
+    np.sqrt(R, out=R)
+    R += TINY
+    two_S = R[0] + R[1]
+    np.divide(2.0, two_S, out=two_S)
+    R += u
+    np.divide(A2, R, out=R)
+    # S - 2 max(|v_n|, |spin|) as a sum of positive terms: S - 2|v_n| and S - 2|spin| would cancel.
+    excess = R[0] + R[1]
+    excess *= 0.5
+    ends = across[:, None] * two_S
+    c = np.maximum([-lead, lead], 0.0)[:, None] + excess
+    c *= two_S
+    np.abs(ends, out=R)
+    R += 1.0
+    c *= R
+    (mu, t), (c_mu, c_t) = ends, c
+    return _load(v_t, squares, two_S, mu, t, c_mu, c_t, weights)
+
+
+def _load(v_t, squares, two_S, mu, t, c_mu, c_t, weights) -> np.ndarray:
+    """The load from an element's elliptic coordinates (see the module's heading); c = 1 - mu^2, 1 - t^2."""
+    pieces = np.empty((PIECES, *mu.shape))
+    mean, cube, by_n, by_spin, copied, normal, cross, turning, swing = pieces
+    z = t * t
+    k = k_function(z, c_t)
+    p = mu * mu
+    p *= c_t
+    p += c_mu
+    p += TINY
+    np.divide(1.0, p, out=p)  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
+    h = c_t * k
+    np.subtract(1.0, h, out=h)
+    four = two_S * two_S
+    np.add(c_t, TINY, out=cube)
+    np.divide(four, cube, out=cube)
+    np.multiply(c_mu, p, out=normal)
+    np.subtract(h, normal, out=by_spin)
+    by_spin *= t
+    by_spin *= cube  # <s u/R^3>, negative
+    cube *= two_S
+    cube *= p  # <1/R^3>
+    normal *= two_S
+    np.multiply(z, k, out=mean)
+    mean += 1.0
+    mean *= two_S  # <1/R>
+    np.multiply(four, mu, out=by_n)
+    by_n *= p  # <u/R^3>
+    copied[...] = mu
+    np.multiply(normal, mu, out=cross)
+    cross *= t
+    np.multiply(c_mu, t, out=turning)
+    turning *= h
+    np.subtract(p, h, out=swing)
+    swing *= c_mu
+    swing *= two_S
+    out = (weights @ pieces.reshape(weights.shape[1], -1)).reshape(3, 4, *v_t.shape)
+    squares *= out[0, 1]
+    np.subtract(out[0, 0], squares, out=out[0, 1])
+    out[0, 0] *= v_t
+    out[0, 2:] *= v_t
+    out[1:, 1] *= v_t
     return out
-
-
-def _weigh(k: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-    """To ``out``: the sum over the terms on axis 0 of k times rows."""
-    np.matmul(k, rows.reshape(k.size, -1) if k.size else np.zeros((0, out.size)), out=out.reshape(-1))
 
 
 def quadrature(medium: Medium, nodes: np.ndarray, weights: np.ndarray) -> LoadLaw:

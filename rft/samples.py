@@ -13,10 +13,11 @@ from rft.contact import Model
 
 class Jacobian(NamedTuple):
     """What `Kinematics` does with a frame's velocity, by one matrix. matrix: (3, 3, n, B), of the velocities (v_t, v_n, spin)
-    that unit velocities of the frame add to every element's. weight (n, 1) and v (3, n, B) are those of the motion."""
+    that unit velocities of the frame add to every element's. weighed: the same times the weights of elements. v (3, n, B):
+    that of the motion."""
 
     matrix: np.ndarray
-    weight: np.ndarray
+    weighed: np.ndarray
     v: np.ndarray
 
     @classmethod
@@ -26,7 +27,7 @@ class Jacobian(NamedTuple):
         np.negative(motion.s, out=matrix[1, 0])
         matrix[1, 1:] = motion.c, motion.r_n
         matrix[2, 2] = motion.half
-        return cls(matrix, motion.weight, motion.v)
+        return cls(matrix, motion.weight * matrix, motion.v)
 
     def carried(self, xi: np.ndarray) -> np.ndarray:
         """As `Kinematics.carried`."""
@@ -34,7 +35,7 @@ class Jacobian(NamedTuple):
 
     def wrench(self, force: np.ndarray) -> np.ndarray:
         """As `Kinematics.wrench`, of (3, n, B)."""
-        return np.einsum("ijnb,inb->jb", self.matrix, self.weight * force)
+        return np.einsum("ijnb,inb->jb", self.weighed, force)
 
     def assembled(self, load: np.ndarray, v: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray | None]:
         """As `Kinematics.assembled`, and what the loads' tangents times velocities v (3, n, B) do to the frame, (3, B)."""
@@ -43,17 +44,15 @@ class Jacobian(NamedTuple):
         np.einsum("ijnb,jknb->iknb", load[:, 1:], self.matrix, out=columns[:, 1:4])
         if v is not None:
             np.einsum("ijnb,jnb->inb", load[:, 1:], v, out=columns[:, 4])
-        columns *= self.weight
-        net = np.einsum("ijnb,iknb->jkb", self.matrix, columns)
+        net = np.einsum("ijnb,iknb->jkb", self.weighed, columns)
         return net[:, :4], None if v is None else net[:, 4]
 
     def take(self, keep: np.ndarray) -> Jacobian:
-        return Jacobian(self.matrix[..., keep], self.weight, self.v[..., keep])
+        return Jacobian(*(x[..., keep] for x in self))
 
     @staticmethod
     def join(some: list[Jacobian]) -> Jacobian:
-        matrices, weights, v = zip(*some)
-        return Jacobian(np.concatenate(matrices, -1), weights[0], np.concatenate(v, -1))
+        return Jacobian(*(np.concatenate(x, -1) for x in zip(*some)))
 
 
 class Samples(NamedTuple):
