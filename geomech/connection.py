@@ -16,6 +16,7 @@ import numpy as np
 from geomech import summary, workers
 from geomech.errors import is_whole, number, real_array, short
 from geomech.field import Field, as_axes, half_of
+from geomech.images import Image, images, to_solve
 from geomech.velocity import Telling, Velocity, evaluate, tried
 
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
@@ -126,13 +127,15 @@ def sampled(
     progress: Callable | None = None,
     mirror: bool = False,
     singularity: Callable | None = None,
+    reversible: bool = False,
 ) -> list[np.ndarray]:
     """`sampled_at` at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    return sampled_on(velocity, alpha, unit, keep, progress, mirror, singularity)
+    alike = images(axes, unit, mirror, reversible)
+    return sampled_on(velocity, alpha, unit, keep, progress, alike, singularity)
 
 
 def sampled_on(
@@ -141,12 +144,12 @@ def sampled_on(
     unit,
     keep: Callable,
     progress: Callable | None = None,
-    mirror: bool = False,
+    alike: Sequence[Image] = (),
     singularity: Callable | None = None,
 ) -> list[np.ndarray]:
     """`sampled_at` on a mesh of shapes alpha (N_1, ..., d); arrays are (..., N_1, ...), nan where shapes are singular."""
     flat, shape = alpha.reshape(-1, alpha.shape[-1]), alpha.shape[:-1]
-    fields = sampled_at(velocity, flat, unit, keep, progress, mirror, masked=singularity is not None)
+    fields = sampled_at(velocity, flat, unit, keep, progress, alike, masked=singularity is not None)
     fields = [x.reshape(*x.shape[:-1], *shape) for x in fields]
     if singularity is not None:
         mask = crossed(singularity(alpha))
@@ -160,32 +163,33 @@ def sampled_at(
     unit,
     keep: Callable,
     progress: Callable | None = None,
-    mirror: bool = False,
+    alike: Sequence[Image] = (),
     masked: bool = False,
 ) -> list[np.ndarray]:
     """What ``keep`` keeps of the velocity at shapes alpha (S, d) for the directions ``unit`` (C, d) of alphadot: keep takes xi
     (s, C, 3) at some shapes and gives arrays (..., s), here (..., S). Velocities themselves are not kept: of 2,000,000 shapes
-    and 1,000 directions they would fill 48 GB. mirror: as in `fit`, of shapes that read backwards are those of the other
-    side, as on a grid in C order."""
-    mirror = mirror and np.array_equal(alpha, -alpha[::-1])
-    alpha = alpha[:, None]
-    todo = (len(alpha) + 1) // 2 if mirror else len(alpha)
+    and 1,000 directions they would fill 48 GB. alike: images of shapes among themselves, of which one is solved."""
+    first = to_solve(alike, len(alpha))
+    todo = np.flatnonzero(first)
     step = max(1, SAMPLES_TOGETHER // len(unit))
     fields: list[np.ndarray] = []
-    parts = [slice(k, min(k + step, todo)) for k in range(0, todo, step)]
-    asked = velocity, unit, masked
-    for here, (xi, *more) in zip(parts, workers.each(_asked, asked, (alpha[x] for x in parts), len(parts))):
+    parts = [todo[k : k + step] for k in range(0, len(todo), step)]
+    asked, done = (velocity, unit, masked), 0
+    for here, (xi, *more) in zip(parts, workers.each(_asked, asked, (alpha[x, None] for x in parts), len(parts))):
         if more:
             velocity.heard(*more)
-        kept = keep(xi)
+        places, velocities = [here], [xi]
+        for image in alike:
+            some = ~first[image.index[here]]
+            places.append(image.index[here[some]])
+            velocities.append(image.of(xi[some]))
+        kept = keep(np.concatenate(velocities))
         fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in kept]
-        _put(fields, here, kept)
-        # There xi(-alpha, alphadot) = -(xi_x, -xi_y, -xi_theta).
-        if twins := min(here.stop, len(alpha) - todo) - here.start:
-            there = slice(len(alpha) - here.start - twins, len(alpha) - here.start)
-            _put(fields, there, keep([-1.0, 1.0, 1.0] * xi[:twins][::-1]))
+        for field, x in zip(fields, kept):
+            field[..., np.concatenate(places)] = x
+        done += len(here)
         if progress:
-            progress(here.stop / todo)
+            progress(done / len(todo))
     return fields
 
 
@@ -224,11 +228,6 @@ def crossed(d: np.ndarray) -> np.ndarray:
     return mask
 
 
-def _put(fields: list[np.ndarray], where: slice, values) -> None:
-    for field, x in zip(fields, values):
-        field[..., where] = x
-
-
 def fit(
     velocity: Velocity,
     axes,
@@ -239,13 +238,14 @@ def fit(
     *,
     singularity: Callable | None = None,
     trusted: bool = False,
+    reversible: bool = False,
 ) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
-    progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that
-    xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half. singularity: a
-    function of shapes (..., d) that passes through 0 where the velocity does not exist; there the connection is nan.
-    Raises what ``velocity`` raises.
+    progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that xi(-alpha, -alphadot) =
+    (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half. reversible: so are its head and tail
+    (`geomech.images`), which halves it again where the directions allow. singularity: a function of shapes (..., d) that
+    passes through 0 where the velocity does not exist; there the connection is nan. Raises what ``velocity`` raises.
 
     A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
@@ -256,7 +256,8 @@ def fit(
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = tried(velocity, axes, singularity is not None)
     keep = least_squares(unit)
-    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, singularity), degree)
+    known = mirror, singularity, reversible
+    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, *known), degree)
 
 
 def fitted_at(velocity: Velocity, joints: int, count: int, degree_one: bool = False) -> Callable:

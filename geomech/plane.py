@@ -14,6 +14,7 @@ from geomech.curvature import ccf, error
 from geomech.errors import is_whole, real_array, short
 from geomech.field import Field
 from geomech.gaits import Gait
+from geomech.images import mirrored
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
 
@@ -91,7 +92,8 @@ def plane(
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
     alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
     unit = directions(len(at), count)
-    A, residual, speed = sampled_on(velocity, alpha, unit, least_squares(unit), progress, mirror, singularity)
+    alike = mirrored(alpha.reshape(-1, len(at)), count) if mirror else ()
+    A, residual, speed = sampled_on(velocity, alpha, unit, least_squares(unit), progress, alike, singularity)
     return Plane(pair, tuple(at.tolist()), Connection(axes, A[:, list(pair)], residual, speed, degree))
 
 

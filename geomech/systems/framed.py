@@ -33,7 +33,7 @@ class Framed:
     directions: int
     degree: int
 
-    frame, carried = NAME, True
+    frame, carried, starts = NAME, True, False
 
     def __post_init__(self):
         self.inner.refuse("minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
@@ -60,7 +60,8 @@ class Framed:
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         keep = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
-        A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, self.inner.mirror)
+        alike = {"mirror": self.inner.mirror, "reversible": self.inner.reversible}
+        A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, **alike)
         nothing = np.zeros_like(A[:, 0])
         frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree))
         h, dh = np.moveaxis(frame.field.values, 0, -1), frame.grid_slopes

@@ -16,14 +16,14 @@ from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plai
 from geomech.systems.said import name_in, told
 from geomech.systems.solver import Solver
 from rft.bodies import KINDS as BODIES
-from rft.bodies.base import checked_body, halves, pace
+from rft.bodies.base import checked_body, halves, is_reversible, pace
 from rft.contact import Model
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
 from rft.effects.base import pieced
 from rft.loads import QUADRATURE, element_load, rule_for
 from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
-from rft.media.base import require_law
+from rft.media.base import is_central, require_law
 from rft.newton import ELEMENTS_TOGETHER
 from rft.symbolic import viscous_body
 
@@ -43,6 +43,7 @@ class Swimmer(Plain):
 
     kind = "swimmer"
     together = ELEMENTS_TOGETHER
+    starts = True
 
     def __post_init__(self):
         require_law(self.medium)
@@ -82,6 +83,7 @@ class Swimmer(Plain):
     points = property(lambda self: getattr(self.body, "points", None))
     shape_labels = property(lambda self: getattr(self.body, "shape_labels", super().shape_labels))
     mirror = property(lambda self: is_mirror(self.medium))
+    reversible = property(lambda self: not self.effects and is_central(self.medium) and is_reversible(self.body))
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
     power_degree = property(lambda self: None if self.lacks & RATES else power_of(self.medium) + 1.0)
@@ -208,15 +210,16 @@ class Swimmer(Plain):
         asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
         return rft.time_steps(self.medium, self.body, alpha, alphadot, **asked)
 
-    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
+    def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
-        right. RuntimeError if a force balance did not converge or cycles did not become periodic."""
+        right; balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a force
+        balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
         speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.steps:
             samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
             each = dataclasses.replace(self, effects=tuple(e.take(samples) for e in self.effects))
-            solution = each.solve(alpha, alphadot).checked()
+            solution = each.solve(alpha, alphadot, start).checked()
             done = each.work(alpha, alphadot, solution.xi) if work else None
             return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()

@@ -11,6 +11,7 @@ from geomech import connection
 from geomech.connection import Connection, Velocity
 from geomech.field import Field, inside
 from geomech.gaits import Gait
+from geomech.images import images, to_solve
 from geomech.plane import Plane, looked_up
 from geomech.plane import plane as fit_plane
 from geomech.tiers.base import Tier
@@ -65,9 +66,13 @@ def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None
     return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how)
 
 
-def shapes(system, numerics) -> int:
-    """Of the field, that are solved: none of one that is stored."""
-    return 0 if system.stored("connection") else numerics.grid**system.joints // (2 if system.mirror else 1)
+def shapes(system, numerics, directions: int = 0) -> int:
+    """Of the field, that are solved: none of one that is stored. directions: of alphadot, where head and tail alike count."""
+    if system.stored("connection"):
+        return 0
+    unit = connection.directions(system.joints, directions) if directions else np.eye(system.joints)
+    alike = images(axes(system, numerics), unit, system.mirror, directions > 0)
+    return int(to_solve(alike, numerics.grid**system.joints).sum())
 
 
 def zeros(system, numerics, components: tuple[int, ...]) -> Field:
@@ -115,7 +120,8 @@ class Path(Tier):
         )
 
     def solves(self, system, numerics, count, phases) -> int:
-        return shapes(system, numerics) * self.directions(system, numerics)
+        directions = self.directions(system, numerics)
+        return shapes(system, numerics, directions if system.reversible else 0) * directions
 
     def size(self, system, numerics) -> int:
         return (system.joints + 3) * 3 * numerics.grid**system.joints

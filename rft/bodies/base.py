@@ -132,6 +132,17 @@ def checked_body(body) -> Body:
     return body
 
 
+def is_reversible(body: Body) -> bool:
+    """Whether a body with its head taken for its tail is the same one, its frame too: tried at a few shapes. Then the frame
+    is turned by pi, and the joints of -alpha backwards are those of alpha."""
+    rng = np.random.default_rng(0)
+    alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
+    one, other = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
+    turned = Kinematics(one.c, one.s, -one.r_t, -one.r_n, one.half, one.weight, one.v * [[[-1.0]], [[-1.0]], [[1.0]]])
+    pairs = zip([*turned[:6], *turned.v], [*other[:6], *other.v])
+    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in pairs)
+
+
 def numbered(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
     """(name, unit) of each of so many shape variables, numbered from 1."""
     return tuple((name.format(k + 1), unit) for k in range(joints))

@@ -85,6 +85,15 @@ SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.
 TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
+def is_central(medium: Medium) -> bool:
+    """Whether drag only turns round with the velocity, so that no end of an element is its front: tried at many."""
+    with np.errstate(all="ignore"):
+        forth, back = (
+            np.stack(np.broadcast_arrays(*medium.traction(sign * TRIED[0], sign * TRIED[1]))) for sign in (1, -1)
+        )
+    return bool((np.abs(forth + back) <= 1e-13 * np.abs(forth).max(0)).all())
+
+
 def require_law(medium: Medium) -> None:
     """Raise ValueError for what is no medium, or whose `traction` cannot be asked for the drag on arrays of elements."""
     good = hasattr(medium, "traction") and not isinstance(medium, type)

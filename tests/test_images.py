@@ -1,0 +1,100 @@
+"""Shapes whose velocities follow from others by symmetry, and bodies that are alike in no such way."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from registry import BODIES
+
+from geomech import connection
+from geomech.images import images, to_solve
+from geomech.systems.swimmer import Swimmer
+from rft import CATALOGUE, Chain, EndCaps, SkinFriction
+from rft.bodies.base import is_reversible
+from rft.media.base import TermLaw, is_central
+
+GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+REVERSIBLE = {
+    "two": False, "three": True, "three-middle": True, "uneven": False, "five": True, "modes": False,
+    "serpenoid": False, "arcs": False, "backbone": True,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_which_bodies_are_reversible(name):
+    """By their own elements: a link longer at one end, a frame that sits at one end, modes that are not."""
+    assert is_reversible(BODIES[name]) == REVERSIBLE[name]
+
+
+def test_what_else_tells_head_from_tail():
+    chain = Chain((1, 2, 1))
+    assert Swimmer(GLASS, chain).reversible
+    assert not Swimmer(GLASS, chain, (EndCaps(radius=0.06),)).reversible
+    assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).reversible
+    assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).reversible
+    assert not Swimmer(Scales(), chain).reversible
+    assert is_central(GLASS)
+    assert not is_reversible(Chain((1, 2, 1 + 1e-9)))
+
+
+@dataclasses.dataclass(frozen=True)
+class Scales(TermLaw):
+    """Drag that is less forwards."""
+
+    def traction(self, v_t, v_n, eps=0.0):
+        R = np.sqrt(v_t**2 + v_n**2 + eps**2) + 1e-300
+        return np.where(v_t > 0, 0.8, 1.0) * v_t / R, 2.0 * v_n / R
+
+
+@pytest.mark.parametrize(("body", "points", "count"), [
+    (Chain((1, 2, 1)), 8, 8), (Chain((1, 1, 1), length=0.3, frame="link-2"), 9, 6), (Chain((1, 2, 2, 1)), 4, 12),
+])  # fmt: skip
+def test_fields_are_those_of_all_shapes(body, points, count):
+    """With fewer balances: a quarter, or half where the directions of three joints are not their own images."""
+    asked = []
+
+    def velocity(alpha, alphadot):
+        xi = Swimmer(GLASS, body).velocity(alpha, alphadot)
+        asked.append(xi[..., 0].size)
+        return xi
+
+    axes = connection.grid(body.joints, points, 2.2)
+    whole, part = (
+        connection.fit(velocity, axes, count, trusted=True, mirror=alike, reversible=alike) for alike in (False, True)
+    )
+    for name in ("A", "residual", "speed"):
+        np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
+    share = 4 if body.joints == 2 else 2
+    assert asked[1] / asked[0] < 1 / share + 0.6 / points
+    assert to_solve([], 5).all()
+
+
+def test_axes_and_directions_that_do_not_match():
+    square, unit = connection.grid(2, 6, 1.0), connection.directions(2, 8)
+    assert len(images(square, unit, True, True)) == 3
+    assert len(images(square, unit, False, True)) == len(images(square, unit, True, False)) == 1
+    assert len(images(square, connection.directions(2, 5), True, True)) == 1  # the mirror alone
+    shifted = tuple(a + 0.1 for a in square)
+    assert [x.factor[0].tolist() for x in images(shifted, unit, True, True)] == [[-1.0, 1.0, -1.0]]
+    assert images((square[0], square[1][:5]), unit, True, True) == []
+
+
+def test_the_table_says_what_it_took():
+    """Foreseen balances are those that are solved."""
+    from geomech import scene as scenes
+    from geomech.tiers import TIERS
+
+    for name in ("three-link-glass", "butterfly-glass"):
+        scene = scenes.load(name).with_numerics(grid=7)
+        seen, swimmer = [], scene.system
+        velocity = Swimmer.velocity
+
+        def counted(self, alpha, alphadot):
+            xi = velocity(self, alpha, alphadot)
+            seen.append(xi[..., 0].size)
+            return xi
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Swimmer, "velocity", counted)
+            TIERS["path"].table(swimmer, scene.numerics)
+        assert sum(seen) == TIERS["path"].solves(swimmer, scene.numerics, 1, 8)
