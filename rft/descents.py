@@ -14,7 +14,7 @@ from rft.samples import Samples, State
 LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body moves that fast
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
 LENGTHEN = 2.0  # the next part to try, after a success
-CROWDED = 0.8  # of samples that go on, below which those that have ended leave the arrays
+CROWDED = 0.65  # of samples that go on, below which those that have ended leave the arrays
 
 
 class Descent(NamedTuple):
@@ -55,10 +55,11 @@ class Descending:
     def _advance(self, s: State) -> State | None:
         """One step of all samples; those that end are written and leave. None when none are left."""
         kept = self._step(s)
-        ended = kept & (s.eps <= self.last) & (s.residual <= self.limit)
+        ended = (s.residual <= self.limit) & (s.eps <= self.last)
+        ended &= kept
         ended |= s.iterations >= self.descent.budget
         ended &= s.going
-        if ended.any():
+        if np.count_nonzero(ended):
             self._write(s, np.flatnonzero(ended))
             s.going = s.going & ~ended
             left = np.flatnonzero(s.going)
@@ -68,25 +69,33 @@ class Descending:
 
     def _step(self, s: State) -> np.ndarray:
         """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
-        xi, v = s.xi + s.dx, s.v + s.of.motion.carried(s.dx)
+        xi, v = s.xi + s.dx, s.of.motion.carried(s.dx)
+        v += s.v
         net, slope = self.problem.net(s.of, v, xi, s.eps_next, with_slope=True)
         residual = self.problem.residual(net[:, 0], s.of)
-        kept = (s.eps_next < s.eps) | (residual < s.residual) | (s.stride <= SHORTEST)
+        kept = residual < s.residual
+        all_kept = np.count_nonzero(kept) == kept.size
+        if not all_kept:
+            kept |= (s.eps_next < s.eps) | (s.stride <= SHORTEST)
+            all_kept = np.count_nonzero(kept) == kept.size
         s.iterations, s.eps = s.iterations + 1, s.eps_next
         stride = np.minimum(1.0, LENGTHEN * s.stride)
-        if not kept.all():
+        if not all_kept:
             stride = np.where(kept, stride, 0.5 * s.stride)
             xi, v, residual = (np.where(kept, a, b) for a, b in ((xi, s.xi), (v, s.v), (residual, s.residual)))
         s.xi, s.v, s.residual, s.stride = xi, v, residual, stride
         dx = self._next_step(s, net, slope, kept)
-        s.dx = dx if kept.all() else np.where(kept, dx, 0.5 * s.dx)
+        s.dx = dx if all_kept else np.where(kept, dx, 0.5 * s.dx)
         return kept
 
     def _next_step(self, s: State, net, slope, kept) -> np.ndarray:
         """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
-        down = kept & (s.eps > self.last) & (s.residual < self.descent.loose)
         right = -s.stride * net[:, 0]
-        if down.any():
+        down = s.eps > self.last
+        if np.count_nonzero(down):
+            down &= kept
+            down &= s.residual < self.descent.loose
+        if np.count_nonzero(down):
             # Where every element moves much faster than the rounding, its kinks no longer matter: go all the way.
             free = slowest(s.v) > self.descent.free * s.eps
             lower = np.where(free, self.last, np.maximum(self.descent.ratio * s.eps, self.last))
@@ -96,7 +105,7 @@ class Descending:
             change = s.eps_next / s.eps
             right += np.where(free, (change * change - 1.0) / 2.0, change - 1.0) * slope
         dx = solve3(net[:, 1:], right)
-        if np.abs(dx).max(initial=0.0) <= 1.0:  # then no place within a body length moves by LARGEST_STEP
+        if -1.0 <= dx.min(initial=0.0) and dx.max(initial=0.0) <= 1.0:  # no place within a body length moves too far
             return dx
         x, y, turn = dx
         size2 = (x - s.of.centre[1] * turn) ** 2 + (y + s.of.centre[0] * turn) ** 2 + turn * turn

@@ -13,10 +13,10 @@ def solve3(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     twice[:, 3:] = twice[:, :2]
     cofactors = twice[1:4, 1:4] * twice[2:, 2:]
     cofactors -= twice[1:4, 2:] * twice[2:, 1:4]
-    det = (matrix[0] * cofactors[0]).sum(0)
+    det = np.einsum("jb,jb->b", matrix[0], cofactors[0])
     x = np.einsum("ijb,ib->jb", cofactors, right)
-    singular = det == 0.0
-    if singular.any():
+    if np.count_nonzero(det) < det.size:
+        singular = det == 0.0
         x[:, singular], det[singular] = 0.0, 1.0
     x /= det
     return x

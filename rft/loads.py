@@ -120,8 +120,11 @@ def _dry(v_t, across, eps, q2, weights) -> np.ndarray:
     A2 += eps * eps
     abs_n, abs_spin = np.abs(across)
     lead = abs_n - abs_spin
-    u = np.array([np.abs(lead), abs_n + abs_spin])[:, None]  # at the nearer end and the farther one
-    R = u * u + A2
+    u, over = np.empty((2, 2, 1, *v_t.shape))
+    np.abs(lead, out=u[0, 0])  # at the nearer end
+    np.add(abs_n, abs_spin, out=u[1, 0])  # and the farther one
+    R = u * u
+    R = R + A2
     np.sqrt(R, out=R)
     R += TINY
     two_S = R[0] + R[1]
@@ -132,7 +135,9 @@ def _dry(v_t, across, eps, q2, weights) -> np.ndarray:
     excess = R[0] + R[1]
     excess *= 0.5
     ends = across[:, None] * two_S
-    c = np.maximum([-lead, lead], 0.0)[:, None] + excess
+    np.maximum(lead, 0.0, out=over[1, 0])
+    np.subtract(over[1, 0], lead, out=over[0, 0])
+    c = over + excess
     c *= two_S
     np.abs(ends, out=R)
     R += 1.0

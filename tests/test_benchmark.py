@@ -11,9 +11,10 @@ import pytest
 
 from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
 from geomech import connection
-from geomech.gaits import Circle, Sine
+from geomech.gaits import Butterfly, Circle, Sine
 from geomech.scene import load
 from geomech.study.bench import Study
+from geomech.systems.swimmer import Swimmer
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
 
@@ -37,21 +38,25 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
 
 
 def test_against_a_loop_of_fsolve():
-    """The built-in field (half of it by mirror symmetry), a gait of 64 phases and a single velocity."""
+    """The built-in field (a quarter of it solved, the rest by symmetry), all of it, a gait of 64 phases, a single velocity."""
     alpha, alphadot = (x.reshape(-1, 2) for x in field_samples())
     some = np.random.default_rng(0).choice(len(alpha), 100, replace=False)
     gait = Circle().cycle(64)
-    field = lambda how, threads: connection.fit(
+    alike = {"mirror": True, "reversible": Swimmer(GLASS, MIDDLE).reversible}
+    field = lambda how, threads, **known: connection.fit(
         lambda a, d: body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi,
         connection.grid(2),
         8,
-        mirror=True,
+        trusted=True,
+        **known,
     )
     asked, samples = {"loop": lambda: [one_scipy_solve(alpha[i], alphadot[i]) for i in some]}, {"loop": len(some)}
     for how in backends():
         for threads in sorted({1, os.cpu_count()}):
-            name = f"field, {NAMES[how]}, {threads} core{'s' * (threads > 1)}"
-            asked[name], samples[name] = lambda how=how, threads=threads: field(how, threads), len(alpha)
+            for what, known in (("field", alike), ("field without symmetry", {})):
+                name = f"{what}, {NAMES[how]}, {threads} core{'s' * (threads > 1)}"
+                solve = lambda how=how, threads=threads, known=known: field(how, threads, **known)
+                asked[name], samples[name] = solve, len(alpha)
         for name, (a, d) in {"gait of 64 phases": gait, "one velocity": (gait[0][3], gait[1][3])}.items():
             solve = lambda a=a, d=d, how=how: [body_velocity(GLASS, MIDDLE, a, d, backend=how) for _ in range(5)]
             asked[f"{name}, {NAMES[how]}"], samples[f"{name}, {NAMES[how]}"] = solve, 5 * a[..., 0].size
@@ -62,7 +67,7 @@ def test_against_a_loop_of_fsolve():
     print(f"\nfsolve, 20 midpoints a link: {1e6 * a_loop:.0f} us a sample; what takes its time over ours:")
     for name in list(asked)[1:]:
         ours = took[name] / samples[name]
-        print(f"  {name:34} {a_loop / ours:8.0f}   ({1e6 * ours:.2f} us a sample)")
+        print(f"  {name:44} {a_loop / ours:8.0f}   ({1e6 * ours:.2f} us a sample)")
     assert a_loop * samples["field, NumPy, 1 core"] / took["field, NumPy, 1 core"] > 50
     answers = [one_scipy_solve(alpha[i], alphadot[i]) for i in some]
     solution = body_velocity(GLASS, MIDDLE, alpha, alphadot)
@@ -71,6 +76,27 @@ def test_against_a_loop_of_fsolve():
     print(f"  the loop says it failed in {100 * np.mean(~flags):.0f} %, is off by more than 0.01 in", end=" ")
     print(f"{100 * np.mean(off > 0.01):.0f} %; ours all converged")
     assert (solution.status != "unconverged").all()
+
+
+def test_starts():
+    """Evaluations of a load a sample, from nothing and from velocities that are at hand anyway."""
+    for name, gait in {"circle": Circle(), "butterfly": Butterfly()}.items():
+        alpha, alphadot = gait.cycle(64)
+        solve = lambda step, first=0, alpha=alpha, alphadot=alphadot, **given: body_velocity(
+            GLASS, MIDDLE, alpha[first::step], alphadot[first::step], **given
+        )
+        xi = solve(1).xi
+        between = (xi[::2] + np.roll(xi[::2], -1, 0)) / 2
+        ways = {
+            "rounding ten times finer, from the usual one": (solve(4, regularisation=1e-7), {"start": xi[::4]}, 4, 0),
+            "every other phase, from its neighbours": (solve(2, 1), {"start": between}, 2, 1),
+        }
+        for what, (cold, start, step, first) in ways.items():
+            warm = solve(step, first, **start, **({"regularisation": 1e-7} if step == 4 else {}))
+            np.testing.assert_allclose(warm.xi, cold.xi, atol=1e-8)
+            counts = cold.iterations.mean(), warm.iterations.mean()
+            print(f"\n{name}, {what}: {counts[0]:.1f} evaluations cold, {counts[1]:.1f} warm", end="")
+            assert counts[1] < counts[0]
 
 
 def test_a_march_of_a_hundred_elements():

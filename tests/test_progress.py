@@ -110,7 +110,7 @@ def test_a_table_from_python_shows_how_far_it_is(notebook, monkeypatch):
     monkeypatch.setattr(progress, "REDRAWN", 0.0)
     study = Study(VISCOUS)
     assert np.isfinite(study.fitted.A).all()
-    assert "connection of three-link-viscous, 96 force balances: done in 0 s" in notebook[-1]
+    assert "connection of three-link-viscous, 72 force balances: done in 0 s" in notebook[-1]
     before = len(notebook)
     study.displacement("path", None, [0.3])
     assert len(notebook) == before  # it is there already

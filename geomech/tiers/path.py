@@ -70,8 +70,10 @@ def shapes(system, numerics, directions: int = 0) -> int:
     """Of the field, that are solved: none of one that is stored. directions: of alphadot, where head and tail alike count."""
     if system.stored("connection"):
         return 0
-    unit = connection.directions(system.joints, directions) if directions else np.eye(system.joints)
-    alike = images(axes(system, numerics), unit, system.mirror, directions > 0)
+    if not directions:
+        return numerics.grid**system.joints // (2 if system.mirror else 1)
+    unit = connection.directions(system.joints, directions)
+    alike = images(axes(system, numerics), unit, system.mirror, True)
     return int(to_solve(alike, numerics.grid**system.joints).sum())
 
 

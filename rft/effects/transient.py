@@ -54,8 +54,9 @@ class Transient(Process):
     def after(self, state: np.ndarray, site: Site, v) -> np.ndarray:
         velocity, left, _ = parts(*v[SIDE][1:])
         step = SIGN * site.before[SIDE][1], SIGN * velocity, site.dt, _rate(self.travel)
-        own = _developed(state, *step)[0]  # to the left in the part that moves left, to the right in the other
-        others = 1 - _developed(1 - state[::-1], *step)[0]  # what one side loses another gains in the same way
+        kept, lacking, *_ = _decays(*step)
+        own = 1 - (1 - kept * state) * lacking  # to the left in the part that moves left, to the right in the other
+        others = (1 - kept * (1 - state[::-1])) * lacking  # what one side loses another gains in the same way
         return np.array([left * own[0] + (1 - left) * others[1], left * others[0] + (1 - left) * own[1]])
 
 
@@ -91,6 +92,15 @@ def _rate(travel):
 def _developed(share, before, now, dt: float, rate):
     """A share after a step in which the velocity towards its side went evenly from ``before`` to ``now`` >= 0, and its
     derivative with respect to ``now``: order 2 in dt. Where it went the other way before, the share first decays."""
+    kept, lacking, back, growth = _decays(before, now, dt, rate)
+    kept = share * kept
+    slope = np.where(np.isinf(rate), 0.0, rate) * dt / 2 * lacking * (growth * (1 - kept) + back * kept)
+    return 1 - (1 - kept) * lacking, slope
+
+
+def _decays(before, now, dt: float, rate):
+    """What is left of a share after the way back, and of what it lacks after the way on (nothing where it develops at once);
+    the way back, and how the way on grows with ``now``, over dt / 2 x e-foldings a length."""
     forth = before >= 0
     total = np.abs(before) + now
     total = np.where(total == 0, 1.0, total)
@@ -98,7 +108,5 @@ def _developed(share, before, now, dt: float, rate):
     back, on = np.where(forth, 0.0, old**2), np.where(forth, old + new, new**2)  # travels, over dt / 2 x total
     growth = np.where(forth, 1.0, new**2 + 2 * old * new)  # of the way on, with ``now``; that back shrinks by old^2
     at_once = np.isinf(rate)
-    step = np.where(at_once, 0.0, rate) * dt / 2
-    kept, lacking = share * np.exp(-step * total * back), np.exp(-step * total * on)
-    slope = step * lacking * (growth * (1 - kept) + back * kept)
-    return np.where(at_once, 1.0, 1 - (1 - kept) * lacking), slope
+    step = np.where(at_once, 0.0, rate) * dt / 2 * total
+    return np.exp(-step * back), np.where(at_once, 0.0, np.exp(-step * on)), back, growth
