@@ -119,8 +119,9 @@ def test_starts_that_are_none(wrong):
 
 
 @pytest.mark.usefixtures("compiled_code")
-def test_parameters_of_each_sample_and_threads():
+def test_parameters_of_each_sample_and_threads(monkeypatch):
     """Effects with a parameter for each sample, in a batch that is cut between threads."""
+    monkeypatch.setattr("rft.newton.COMPILED_WORTH", 64)
     rng = np.random.default_rng(5)
     alpha, alphadot = rng.uniform(-2, 2, (300, 2)), rng.normal(size=(300, 2))
     some = rng.uniform(0.05, 1.0, (3, 300))
@@ -132,6 +133,9 @@ def test_parameters_of_each_sample_and_threads():
     plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
     assert apart(plain, fast, alphadot, BODY).max() < 1e-10
     np.testing.assert_array_equal(plain.status, fast.status)
+    monkeypatch.setattr("rft.newton.COMPILED_WORTH", 10_000)
+    whole = body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend="numba")
+    np.testing.assert_array_equal(whole.xi, fast.xi)  # to the last digit, whatever shares a lane or a thread
     alone = body_velocity(
         GLASS, BODY, alpha[7], alphadot[7], effects=[e.take(slice(7, 8)) for e in effects], backend="numba"
     )
