@@ -120,6 +120,7 @@ def fit(
     mirror: bool = False,
     *,
     highest: int = 9,
+    reversible: bool = False,
 ) -> Harmonics:
     """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their order,
     as in `connection.fit`.
@@ -151,4 +152,4 @@ def fit(
         coefficients = np.einsum("jc,sci->ijs", inverse, xi)
         return coefficients, unseen * np.sqrt(((xi - np.einsum("cj,ijs->sci", at, coefficients)) ** 2).mean(1)).T
 
-    return Harmonics(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror), degree)
+    return Harmonics(axes, *sampled(velocity, axes, unit, keep, degree, progress, mirror, None, reversible), degree)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from registry import BODIES
 
-from geomech import connection
+from geomech import connection, harmonics
 from geomech.images import images, to_solve
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, SkinFriction
@@ -64,6 +64,13 @@ def test_fields_are_those_of_all_shapes(body, points, count):
     )
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
+    if body.joints == 2:
+        given = {"highest": 3, "reversible": True}
+        odd, alike = (
+            harmonics.fit(velocity, axes, count, mirror=known, **{**given, "reversible": known})
+            for known in (False, True)
+        )
+        np.testing.assert_allclose(alike.coefficients, odd.coefficients, rtol=0, atol=1e-9)
     share = 4 if body.joints == 2 else 2
     assert asked[1] / asked[0] < 1 / share + 0.6 / points
     assert to_solve([], 5).all()
@@ -96,5 +103,7 @@ def test_the_table_says_what_it_took():
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Swimmer, "velocity", counted)
-            TIERS["path"].table(swimmer, scene.numerics)
-        assert sum(seen) == TIERS["path"].solves(swimmer, scene.numerics, 1, 8)
+            for tier in (TIERS["path"], TIERS["harmonic"]):
+                seen.clear()
+                tier.table(swimmer, scene.numerics)
+                assert sum(seen) == tier.solves(swimmer, scene.numerics, 1, 8)

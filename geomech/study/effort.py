@@ -104,7 +104,9 @@ def with_harmonics(
 
 
 class _Watched:
-    """A system of which powers are kept as its velocities are asked for."""
+    """A system of which powers are kept as its velocities are asked for, shape after shape of a half of the grid."""
+
+    reversible = False
 
     def __init__(self, system: System):
         self.system, self.powers = system, []

@@ -70,8 +70,8 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
     error += 2 * np.pi * (run.residual * run.speed)[:, None]
     if finer := system.finer():
         # Next to exact integrals all of it is seen; between two rules of an order of 1 or more at least half.
-        near = {"start": run.xi[..., ::4, :]} if system.starts and not stepping else {}
-        error += (1.2 if system.closed else 2.4) * apart(finer.run(*every[1], **near).net, coarse, scene.system.length)
+        near = (False, run.xi[..., ::4, :]) if system.starts and not stepping else ()  # without work, from there
+        error += (1.2 if system.closed else 2.4) * apart(finer.run(*every[1], *near).net, coarse, scene.system.length)
     error += np.asarray(run.to_come)[..., None] + system.own_error(*every[2])
     return full, error, pieces_error(scene, shapes, every[1], coarse)
 

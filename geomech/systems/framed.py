@@ -33,7 +33,7 @@ class Framed:
     directions: int
     degree: int
 
-    frame, carried, starts = NAME, True, False
+    frame, carried, starts, reversible = NAME, True, False, False
 
     def __post_init__(self):
         self.inner.refuse("minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech import harmonics
-from geomech.tiers.path import Path, around, axes, fits, path, shapes, zeros
+from geomech.tiers.path import Path, around, axes, fits, path, zeros
 
 HIGHEST = {2: 15, 3: 9}  # by joints, if [numerics] harmonics is left out
 FEW = 5  # of more: 56 coefficients of each component of four joints, 126 of five
@@ -53,11 +53,9 @@ class Harmonic(Path):
         if own := system.stored(self.looks_up):
             return own
         count, degree = self.directions(system, numerics), numerics.interpolation
-        grid, highest = self.axes(system, numerics), self.highest(system, numerics)
-        return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, highest=highest)
-
-    def solves(self, system, numerics, count, phases) -> int:
-        return shapes(system, numerics) * self.directions(system, numerics)
+        grid = self.axes(system, numerics)
+        known = {"highest": self.highest(system, numerics), "reversible": system.reversible}
+        return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, **known)
 
     def size(self, system, numerics) -> int:
         return (self._terms(system, numerics) + 1) * 3 * numerics.grid**system.joints

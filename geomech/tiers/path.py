@@ -70,11 +70,11 @@ def shapes(system, numerics, directions: int = 0) -> int:
     """Of the field, that are solved: none of one that is stored. directions: of alphadot, where head and tail alike count."""
     if system.stored("connection"):
         return 0
-    if not directions:
-        return numerics.grid**system.joints // (2 if system.mirror else 1)
-    unit = connection.directions(system.joints, directions)
-    alike = images(axes(system, numerics), unit, system.mirror, True)
-    return int(to_solve(alike, numerics.grid**system.joints).sum())
+    size = numerics.grid**system.joints
+    if not directions or size > LARGEST_GRID:
+        return size // (2 if system.mirror else 1)
+    unit, grid = connection.directions(system.joints, directions), connection.grid(system.joints, numerics.grid)
+    return int(to_solve(images(grid, unit, system.mirror, True), size).sum())
 
 
 def zeros(system, numerics, components: tuple[int, ...]) -> Field:
