@@ -72,6 +72,11 @@ class Chain:
         lengths = np.asarray(self.lengths)
         return lengths / lengths.sum()
 
+    @cached_property
+    def _halves(self) -> np.ndarray:
+        """Half lengths of the links, (n, 1), never written to."""
+        return (self.fractions / 2)[:, None]
+
     def _link_of(self, frame: str) -> int | None:
         """Index of the link that carries a frame, None for "mean"; ValueError for no frame of this body."""
         text = frame if isinstance(frame, str) else ""
@@ -110,7 +115,7 @@ class Chain:
         np.cos(heading, out=along.real)
         np.sin(heading, out=along.imag)
         halves = np.empty((len(heading), 2 * size), complex)  # half links, and how they turn
-        np.multiply((self.fractions / 2)[:, None], along, out=halves[:, :size])
+        np.multiply(self._halves, along, out=halves[:, :size])
         np.multiply(1j * turn, halves[:, :size], out=halves[:, size:])
         centres = self._in_frame(halves[:-1] + halves[1:], link)
         return along, turn, centres[:, :size], centres[:, size:], heading
@@ -118,7 +123,7 @@ class Chain:
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
         """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
         along, turn, place, velocity, _ = self._links(alpha, alphadot)
-        return Kinematics.of(along, place, velocity, turn, (self.fractions / 2)[:, None])
+        return Kinematics.of(along, place, velocity, turn, self._halves)
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Pose h of another frame of this body in the body's own, and dh/dt: each (..., 3), in length units and rad.
