@@ -102,7 +102,7 @@ LARGE = {
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
     "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:999", "--methods", "path"],
-    "a map": ["ccf", "three-link-glass", "--grid", "1414", "--plot", "out.png"],
+    "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
     "phases": ["run", "phases.toml", "-o", "out"],
