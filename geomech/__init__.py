@@ -8,7 +8,6 @@ Study, tiers, workers                   connection, CCF, cost, displacements, er
 media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
 connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
 optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
-
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """
 
