@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -47,6 +47,10 @@ class Chain:
         in_range("length", self.length, 1e-15, 1e15)
         self._link_of(self.frame)
         object.__setattr__(self, "modes", checked(self.modes, self.waves, len(self.lengths)))
+
+    def __getstate__(self) -> dict:
+        """What a copy or a worker is sent: the fields, without what is worked out from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def joints(self) -> int:
