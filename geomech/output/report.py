@@ -28,6 +28,7 @@ from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.path import around
 from geomech.tiers.path import axes as field_axes
+from geomech.workers.aside import aside
 
 AMPLITUDES = 10  # or so, in the study that `run` makes of each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
@@ -55,29 +56,36 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
     scene, unit = study.scene, study.scene.system.unit
     gaits = _gaits(scene)
     amplitudes = [reachable(scene, gait) for gait in gaits]
-    if "path" in study.methods and scene.system.joints == 2:
-        study.compute_field(progress)
-        labels = scene.system.shape_labels
-        save_connection(folder / "connection.nc", study)
-        _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
-        if scene.system.carried:
-            _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
-        _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
-    elif "area" in study.methods and scene.system.joints == 3:  # of more there are many slices: `geomech ccf --pair`
+    mapped = {2: "path", 3: "area"}.get(scene.system.joints) in study.methods  # of more: `geomech ccf --pair`
+    if mapped:
         study.compute_field(progress)
         save_connection(folder / "connection.nc", study)
-        planes = [study.plane(pair) for pair in combinations(range(scene.system.joints), 2)]
-        _save(plots.plane_connection_figure(planes, unit, scene.system.shape_labels), folder / "connection")
-        _save(plots.planes_figure(planes, scene.gait, unit, scene.system.shape_labels), folder / "ccf")
     tables = {}
-    for gait, some in zip(gaits, amplitudes):
-        table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
-        if gait is not scene.gait:
-            table["note"] = ADDED
-    _save(plots.displacement_figure(tables, unit, gaits, scene.system.length), folder / "displacement")
+    with aside() as beside:
+        if mapped:
+            beside(lambda: _maps(study, folder, gaits))
+        for gait, some in zip(gaits, amplitudes):
+            table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
+            if gait is not scene.gait:
+                table["note"] = ADDED
+        _save(plots.displacement_figure(tables, unit, gaits, scene.system.length), folder / "displacement")
     (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
     return tables
+
+
+def _maps(study: Study, folder: Path, gaits: list[Gait]) -> None:
+    """Pictures of the connection and of the CCF, of three joints for every pair."""
+    scene, unit, labels = study.scene, study.scene.system.unit, study.scene.system.shape_labels
+    if scene.system.joints == 3:
+        planes = [study.plane(pair) for pair in combinations(range(3), 2)]
+        _save(plots.plane_connection_figure(planes, unit, labels), folder / "connection")
+        _save(plots.planes_figure(planes, scene.gait, unit, labels), folder / "ccf")
+        return
+    _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
+    if scene.system.carried:
+        _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
+    _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
 
 
 def cost(scene: Scene) -> Cost:

@@ -21,7 +21,7 @@ from typing import Any, Protocol
 from geomech.errors import Note, SceneError, number
 from geomech.workers.solving import at_hand, cores, settled, settled_on
 
-__all__ = ["alone", "each", "far", "one_way", "settle", "using"]
+__all__ = ["alone", "each", "far", "one_way", "settle", "shared", "using"]
 
 WORTH = 2.0  # s of computing, below which other processes are not worth their start: half a second of each
 MANY = 4  # parts of a request, from which on "auto" takes compiled code at once, where it lies ready
@@ -154,6 +154,11 @@ def _order(remote: bool, f: Callable, common: Any, back_end: str):
         if error.told:
             warnings.warn(f"computed by one process, others cannot know it: {error}: {cure}", Note, stacklevel=4)
     return None
+
+
+def shared() -> bool:
+    """Whether others compute besides this process."""
+    return _crew.get() is not None
 
 
 @contextlib.contextmanager
