@@ -243,9 +243,10 @@ def fit(
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
     progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that xi(-alpha, -alphadot) =
-    (xi_x, -xi_y, -xi_theta) and half of a symmetric grid tells the other half. reversible: so are its head and tail
-    (`geomech.images`), which halves it again where the directions allow. singularity: a function of shapes (..., d) that
-    passes through 0 where the velocity does not exist; there the connection is nan. Raises what ``velocity`` raises.
+    (xi_x, -xi_y, -xi_theta), and xi turns round with alphadot: half of a symmetric grid tells the other half. reversible:
+    so are its head and tail (`geomech.images`), which halves it again where the directions allow. singularity: a function of
+    shapes (..., d) that passes through 0 where the velocity does not exist; there the connection is nan. Raises what
+    ``velocity`` raises.
 
     A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.

@@ -1,7 +1,8 @@
 """Shapes of a grid whose velocities follow from those of others: where left and right, or head and tail, of a body are alike.
 
 Seen in a mirror a body has the shape -alpha and moves with (xi_x, -xi_y, -xi_theta). With its head taken for its tail it has
-the shape -alpha backwards, alpha_k -> -alpha_(d + 1 - k), and moves with (-xi_x, -xi_y, xi_theta). Rates change as shapes do.
+the shape -alpha backwards, alpha_k -> -alpha_(d + 1 - k), and moves with (-xi_x, -xi_y, xi_theta). Rates change as shapes do,
+and velocities turn round with rates.
 """
 
 from __future__ import annotations

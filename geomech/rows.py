@@ -26,9 +26,9 @@ class Rows:
 
     @property
     def header(self) -> tuple[int, tuple[str, ...]]:
-        """(its line number, the words of the first line that is no comment), in small letters."""
+        """(its line number, the words of the first line that is no comment), in small letters, without quotes."""
         line, text = self.filled[0] if self.filled else (1, "")
-        return line, tuple(word.strip().lower() for word in text.split(","))
+        return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
 
     def numbers(self, columns: tuple[str, ...], wanted: tuple[str, ...] | None = None) -> np.ndarray:
         """(N, columns), or those wanted: the numbers under the header; ValueError naming the line of a row that has others."""
@@ -75,6 +75,6 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
 def _cell(text: str) -> float:
     """nan for what is no number."""
     try:
-        return float(text)
+        return float(text.strip(' "'))
     except ValueError:
         return math.nan

@@ -114,6 +114,14 @@ def test_a_scheduler_that_is_none_is_one_line(word, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_no_client_is_made_of_what_is_no_address(monkeypatch):
+    """One whose connection fails so prints a traceback, seconds later."""
+    monkeypatch.setattr(distributed, "Client", None)
+    for word in ("nonsense", "http://127.0.0.1:80", "tcp://127.0.0.1:1;x", ""):
+        with pytest.raises(SceneError, match="missing port|unknown address|invalid literal"):
+            cluster.Cluster(word)
+
+
 def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
     monkeypatch.setattr(cluster, "WAIT", 0.3)
     with socket.socket() as silent:

@@ -76,6 +76,18 @@ def test_fields_are_those_of_all_shapes(body, points, count):
     assert to_solve([], 5).all()
 
 
+@pytest.mark.parametrize(("medium", "effects"), [
+    (GLASS, (SkinFriction(forward=0.109, backward=0.137),)), (Scales(), ()), (GLASS, (EndCaps(radius=0.06, tail=3.0),)),
+])  # fmt: skip
+def test_fields_of_bodies_that_slide_more_easily_forwards(medium, effects):
+    """Their velocity does not turn round with the rates, so that a mirror tells nothing of the same directions."""
+    swimmer, axes = Swimmer(medium, Chain((1, 2, 1)), effects), connection.grid(2, 5, 1.5)
+    assert swimmer.mirror and swimmer.halved == (type(effects[0]) is EndCaps if effects else False)
+    whole, part = connection.fit(swimmer.velocity, axes, 5, trusted=True), swimmer.fitted(axes, 5, 3)
+    for name in ("A", "residual", "speed"):
+        np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
+
+
 def test_axes_and_directions_that_do_not_match():
     square, unit = connection.grid(2, 6, 1.0), connection.directions(2, 8)
     assert len(images(square, unit, True, True)) == 3

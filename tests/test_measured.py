@@ -492,6 +492,7 @@ BAD = {
     "noise": (changed(slice(1, 6), noise), "the joints (do not repeat|repeat 2.. times)"),
     "spike": (changed(3, lambda x: x + 1, 200), "line 202: x is .* off the rows before and after: mend that row"),
     "slip": (changed(3, lambda x: x + 1, slice(200, None)), "line 202: x jumps by .*: the tracking slipped"),
+    "t in another unit": (changed(0, lambda t: 1e-9 * t), "the joints repeat every .*e-09 where t is in s: give t in s"),
     "two rates": (faster, "(the joints repeat every .* two gaits are in it|the gait stands, slips or runs back)"),
     "two gaits": (changed(1, lambda x: 0.4 * x - 1, slice(200, None)), "line 202: alpha_1 jumps by .* two gaits"),
     "two sizes": (larger, "line 2..: (two gaits: . cycles are of one kind and . of another|alpha_. jumps)"),
@@ -545,6 +546,17 @@ def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
     np.testing.assert_allclose(third.known.A, one.known.A, rtol=1e-6, atol=1e-9)
     with pytest.warns(UnitWarning, match="drop --degrees"):
         measured.read(tmp_path / "a.csv", degrees=True)
+
+
+def test_a_table_as_r_writes_it(short, tmp_path):
+    """Words in quotes, row names before, a byte order mark."""
+    plain = written(tmp_path / "log.csv", short).read_text().splitlines()
+    quoted = [",".join(f'"{word}"' for word in ("", *plain[0].split(",")))]
+    quoted += [f'"{k}",{row}' for k, row in enumerate(plain[1:], 1)]
+    (tmp_path / "r.csv").write_text("\n".join(quoted), encoding="utf-8-sig")
+    one, other = (measured.read(tmp_path / name) for name in ("log.csv", "r.csv"))
+    np.testing.assert_array_equal(np.column_stack([one.t, one.alpha]), np.column_stack([other.t, other.alpha]))
+    np.testing.assert_array_equal(one.pose, other.pose)
 
 
 def test_rows_at_uneven_times_tell_the_same(viscous):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.gaits.base import FASTEST
 from geomech.measured import phase
 from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
@@ -36,6 +37,8 @@ def period(log: Log) -> float:
     if count < FEWEST + 1:
         said = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
         raise log.wrong(f"{said}: give at least {FEWEST + 1} cycles of one gait, some dozens are better")
+    if found * FASTEST < 1.0:
+        raise log.wrong(f"the joints repeat every {found:.3g} where t is in s: give t in s, or in any longer unit")
     if (rows := len(log.t) / count) < ROWS:
         raise log.wrong(f"{rows:.1f} rows a cycle are too few: give at least {ROWS}")
     gaps = np.diff(log.t)

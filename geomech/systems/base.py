@@ -97,18 +97,19 @@ class NoSolver:
 class Plain:
     """Base of systems: what holds of one whose velocity follows from shape alone, at one place at a time.
 
-    reversible: head and tail are alike, as `geomech.images` has it. starts: `run` takes velocities nearby, (..., N, 3), to
-    begin from. kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the phases only.
-    solver: its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are evaluated,
-    for one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers that
-    time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
-    displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles. near: of
-    which gait alone it is known, in words, empty where it is of all. carried: its displacements are those of another frame,
-    carried over. joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit.
-    closed: forces on an element have an exact form, which finer loads come near to. notes: lines on what its user may not
-    expect of how it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n), of
-    parameters of its own that are not known for certain, which `varied` changes; None where all are. power_degree: of its
-    power in alphadot, 2 in a fluid and 1 in sand; None where it has no power (`driven`), or one of no one degree. cost:
+    odd: the velocity turns round with the rates. halved: it is odd and mirrored, so that half of a symmetric grid tells the
+    other. reversible: head and tail are alike, as `geomech.images` has it. starts: `run` takes velocities nearby, (..., N,
+    3), to begin from. kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the
+    phases only. solver: its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are
+    evaluated, for one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held:
+    numbers that time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling:
+    change of displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
+    near: of which gait alone it is known, in words, empty where it is of all. carried: its displacements are those of
+    another frame, carried over. joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip
+    of unit. closed: forces on an element have an exact form, which finer loads come near to. notes: lines on what its user
+    may not expect of how it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n),
+    of parameters of its own that are not known for certain, which `varied` changes; None where all are. power_degree: of
+    its power in alphadot, 2 in a fluid and 1 in sand; None where it has no power (`driven`), or one of no one degree. cost:
     None, or a function of alpha and alphadot that gives alphadot^T M(alpha) alphadot where the metric M of `geomech.metric`
     is not one of drag but, say, of kinetic energy.
     """
@@ -118,6 +119,8 @@ class Plain:
     frequency = covariance = power_degree = None
     frame = "mean"
     mirror = reversible = linear = kinks = starts = False
+    odd = True
+    halved = property(lambda self: self.mirror and self.odd)
     lacks = NONE
     solver = None
     singularity = points = cost = None
@@ -202,7 +205,7 @@ class Plain:
     def fitted(self, axes, count: int, degree: int, progress: Callable | None = None) -> Connection:
         """The least-squares connection on a grid, from so many directions; other arguments as in `connection.fit`."""
         known = {"singularity": self.singularity, "trusted": True, "reversible": self.reversible}
-        return fit(self.velocity, axes, count, degree, progress, self.mirror, **known)
+        return fit(self.velocity, axes, count, degree, progress, self.halved, **known)
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""

@@ -60,7 +60,7 @@ class Framed:
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         keep = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
-        alike = {"mirror": self.inner.mirror, "reversible": self.inner.reversible}
+        alike = {"mirror": self.inner.halved, "reversible": self.inner.reversible}
         A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, **alike)
         nothing = np.zeros_like(A[:, 0])
         frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree))

@@ -83,6 +83,7 @@ class Swimmer(Plain):
     points = property(lambda self: getattr(self.body, "points", None))
     shape_labels = property(lambda self: getattr(self.body, "shape_labels", super().shape_labels))
     mirror = property(lambda self: is_mirror(self.medium))
+    odd = property(lambda self: is_central(self.medium) and all(e.odd for e in self.effects))
     reversible = property(lambda self: not self.effects and is_central(self.medium) and is_reversible(self.body))
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))

@@ -55,7 +55,7 @@ class Harmonic(Path):
         count, degree = self.directions(system, numerics), numerics.interpolation
         grid = self.axes(system, numerics)
         known = {"highest": self.highest(system, numerics), "reversible": system.reversible}
-        return harmonics.fit(system.velocity, grid, count, degree, progress, system.mirror, **known)
+        return harmonics.fit(system.velocity, grid, count, degree, progress, system.halved, **known)
 
     def size(self, system, numerics) -> int:
         return (self._terms(system, numerics) + 1) * 3 * numerics.grid**system.joints

@@ -62,7 +62,7 @@ def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None
         return looked_up(own, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
-    count, how = tier.directions(system, numerics), (system.mirror, system.singularity)
+    count, how = tier.directions(system, numerics), (system.halved, system.singularity)
     return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how)
 
 
@@ -72,9 +72,9 @@ def shapes(system, numerics, directions: int = 0) -> int:
         return 0
     size = numerics.grid**system.joints
     if not directions or size > LARGEST_GRID:
-        return size // (2 if system.mirror else 1)
+        return size // (2 if system.halved else 1)
     unit, grid = connection.directions(system.joints, directions), connection.grid(system.joints, numerics.grid)
-    return int(to_solve(images(grid, unit, system.mirror, True), size).sum())
+    return int(to_solve(images(grid, unit, system.halved, True), size).sum())
 
 
 def zeros(system, numerics, components: tuple[int, ...]) -> Field:

@@ -56,6 +56,7 @@ class Cluster:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of versions that differ: `_check` tells of what matters
+                distributed.comm.resolve_address(self.address)  # a client of what is none complains when it is gone
                 asked.set_result(distributed.Client(self.address, timeout=WAIT, set_as_default=False))
         except Exception as error:
             asked.set_exception(error)

@@ -57,7 +57,8 @@ class Effect(PerSample):
     batched: parameters that may be arrays (B,), one for each sample of a batch. settles: change of displacement from cycle
     to cycle, body lengths, below which cycles with this effect count as periodic. held: numbers that time stepping
     remembers for each sample, beside some for each element. varies: whether it differs along an element, of which it takes
-    means, so that longer elements are cut into pieces (`pieced`).
+    means, so that longer elements are cut into pieces (`pieced`). odd: what it adds or changes turns round with velocities, as
+    far as is known.
     """
 
     kind = "effect"
@@ -68,7 +69,7 @@ class Effect(PerSample):
     batched = ()
     settles = 1e-6
     held = 0
-    varies = False
+    varies = odd = False
 
     def apply(self, model: Model) -> Model:
         """The model with what always holds of this effect; ValueError for a medium it does not take."""

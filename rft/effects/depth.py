@@ -28,6 +28,7 @@ class DepthProfile(Process):
     towards: float = 0.0
 
     kind = "depth-profile"
+    odd = True
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
     batched = ("slope", "towards")

@@ -60,6 +60,7 @@ class EndCaps(Effect):
     tail: float = 1.0
 
     kind = "end-caps"
+    odd = True
     limit = "radius = 0"
     cost = "one point load an end"
 

@@ -35,6 +35,7 @@ class GrainInertia(Effect):
     k: float | None = None
 
     kind = "grain-inertia"
+    odd = True
     breaks = Premise.RATE_INDEPENDENT
     limit = "frequency = 0"
     order = 2  # of strength = 0 it is 1

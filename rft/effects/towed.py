@@ -28,6 +28,7 @@ class TowedSled(Effect):
     distance: float = 0.0
 
     kind = "towed-sled"
+    odd = True
     limit = "pull = 0"
     cost = "one point load"
     batched = ("pull",)
