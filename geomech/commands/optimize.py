@@ -31,7 +31,7 @@ def optimize(
     harmonics: Annotated[Optional[int], typer.Option(help="of the Fourier series; 5 if left out")] = None,
     within: Annotated[
         Optional[str],
-        typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, =-0.5:2, or 1,2 for each; else the field's"),
+        typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, -0.5:2, or 1,2 for each; else the field's"),
     ] = None,
     starts: Annotated[int, typer.Option(metavar="N", help="loops to begin with; the first is the scene's")] = 1,
     rate: Annotated[Optional[float], typer.Option(help="rad/s that no joint exceeds, for speed")] = None,
