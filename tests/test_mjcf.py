@@ -179,7 +179,7 @@ FILES = {
     "no actuator can follow the clock": CART.replace("<position", "<motor").replace(' kp="40" kv="0.4"', ""),
     "it has no joints": '<mujoco><worldbody><body><geom name="fl" size="1"/></body></worldbody></mujoco>',
     "gravity must be along -z": CART.replace("0 0 -9.81", "0 -9.81 0"),
-    "has a ctrlrange": CART.replace('kv="0.4"', 'kv="0.4" ctrlrange="-1 1"'),
+    "the actuator 'fl' has a ctrlrange": CART.replace('kv="0.4"', 'kv="0.4" ctrlrange="-1 1"'),
     "state of their own": CART.replace("</actuator>", '<general joint="fl" dyntype="filter" dynprm="0.1"/></actuator>'),
     "larger than 20 MB": " " * 20_000_001,
 }
@@ -190,6 +190,23 @@ def test_files_that_are_no_robot_are_refused_with_one_line(said, cart, geomech):
     (cart / "parts" / "cart.xml").write_text(FILES[said])
     code, out, err = geomech("walk", "cart.toml")
     assert (code, out) == (2, "") and err.count("\n") == 1 and said in err, err
+
+
+def test_a_machine_is_known_by_what_it_includes_too(cart):
+    whole, part = CART.replace('size="0.06 0.03 0.01"', 'size="{} 0.03 0.01"'), cart / "parts" / "whole.xml"
+    (cart / "parts" / "cart.xml").write_text('<mujoco><include file="whole.xml"/></mujoco>')
+    part.write_text(whole.format(0.06))
+    one, same = (Mjcf(str(cart / "parts" / "cart.xml"), NAMES) for _ in range(2))
+    part.write_text(whole.format(0.05))
+    assert one == same and dataclasses.replace(one) != one
+
+
+def test_machines_that_may_take_long_say_so_before_they_walk(cart, geomech):
+    (cart / "long.toml").write_text(
+        SCENE.replace("steps = 8", "steps = 32").replace("duration = 1.0", "duration = 100.0")
+    )
+    code, out, err = geomech("walk", "long.toml")
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "say --yes" in err, err
 
 
 def test_a_machine_written_is_the_machine_read(cart):

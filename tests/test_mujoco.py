@@ -190,6 +190,28 @@ def test_every_end_has_its_status_and_no_nan():
     assert found.status == "airborne" and found.limit is None and found.speed == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
+    """A way that is prescribed: each stride 0.1 m ahead, then to the left."""
+
+    def stride(self, count, rows, states):
+        yaw, qpos = count * turn, self.body.data.qpos
+        qpos[:2] += 0.1 * np.array([math.cos(yaw), math.sin(yaw)])
+        qpos[3:7] = [math.cos((yaw + turn) / 2), 0.0, 0.0, math.sin((yaw + turn) / 2)]
+        self.body.data.time, self.body.data.qvel[:] = (count + 1) / 2.0, 0.0
+        mujoco.mj_forward(self.body.model, self.body.data)
+        rows.append(self.row())
+        states.append(qpos.copy())
+        return ""
+
+    monkeypatch.setattr(Course, "stride", stride)
+    found = walk([Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)], dataclasses.replace(QUICK, duration=5.0))[0]
+    assert found.periodic and found.speed == pytest.approx(0.2) and (found.cycles == 10) == (turn > 0.0)
+    way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
+    np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
+    np.testing.assert_allclose(found.more["y"][1:], way.imag, atol=1e-9)
+
+
 def test_the_figure_compares_steps_and_engines(monkeypatch):
     from figures import walking_mujoco
 

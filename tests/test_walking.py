@@ -222,6 +222,11 @@ def test_absurd_robots_end_with_a_status_and_numbers(what):
         assert np.isfinite(values).all()
 
 
+def test_a_walk_may_be_over_before_its_first_step():
+    (found,) = walk([Walker(ROBOT, Tripod(2.0), SAND)], dataclasses.replace(QUICK, duration=1e-3))
+    assert found.t.tolist() == [0.0] and found.speed > 0.0 and found.unaccounted == 0.0
+
+
 def test_the_estimate_covers_the_error():
     scene = dataclasses.replace(XPLORER, numerics=QUICK)
     done: list = []

@@ -23,14 +23,16 @@ from geomech.study.cost import BASE, Cost
 from geomech.study.kept import Rows
 from geomech.study.sweep import LARGEST, Points, changed, listed
 from rft import SOLVER
-from rft.walking import Walk, engine
+from rft.walking import Mjcf, Walk, engine
+from rft.walking.stride import MOST_STRIDES
 
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = 2.2e-3  # s of computing, for a robot by itself,
 MORE = 5e-4  # and for each beside it, measured
-ALONE = 5e-3  # s, in three dimensions
+ALONE = 5e-3  # s, in three dimensions,
+OWN = 3e-2  # and of a machine of one's own, whose wheels stick and slip: 5e-3 to 5e-2 measured
 WALKING = 0.7  # of the time, before the errors are asked for
 LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
 KNOBS = {
@@ -85,8 +87,10 @@ class Steps(Cost):
 def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
     """Of ``count`` scenes like this one."""
     together = TOGETHER if (by or scene.engine) == "planar" else 1
-    per_step = PER_STEP if together > 1 else ALONE
-    cycles = SETTLING if settling else min(scene.numerics.duration * scene.gait.frequency, 2 * LIMIT)
+    own = isinstance(scene.robot, Mjcf)  # which may never come to a limit cycle
+    per_step = OWN if own else PER_STEP if together > 1 else ALONE
+    cycles = SETTLING if settling else scene.numerics.duration * scene.gait.frequency
+    cycles = cycles + MOST_STRIDES if own else min(cycles, 2 * LIMIT)
     steps = (cycles + 2 * LIMIT) * scene.numerics.steps
     batches = -(-count // together)
     seconds = steps * (batches * per_step + (count - batches) * MORE) * (0.5 + scene.numerics.elements / 32)

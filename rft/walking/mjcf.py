@@ -106,9 +106,10 @@ class Mjcf(Robot):
                 require(k >= 0, f"{self.mjcf} has no actuator {shown(name)}: {told}")
                 require(bool(able[k]), f"{self.mjcf}: the actuator {shown(name)} cannot follow the clock: {cure}")
             driven = np.array(ids, int)
-        limited = [k for k in driven if model.actuator_ctrllimited[k]]
-        told = f"{self.mjcf}: the actuator {limited[:1]} has a ctrlrange: a leg that turns round needs none; drop it"
-        require(not limited, told)
+        for k in driven:
+            name = shown(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
+            told = f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round needs none; drop it"
+            require(not model.actuator_ctrllimited[k], told)
         phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
         good = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
         require(good, f"phases must be {len(driven)} numbers, one for each actuator, got {shown(self.phases)}")
@@ -142,7 +143,7 @@ def _compiled(file: str):
     try:
         require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")
         require(path.stat().st_size <= LARGEST_FILE, f"{file} is larger than {LARGEST_FILE / 1e6:.0f} MB: no MJCF is")
-        data = path.read_bytes()
+        path.open("rb").close()
     except OSError as error:
         raise ValueError(f"cannot read MJCF {file}: {error.strerror}") from None
     try:
@@ -153,7 +154,9 @@ def _compiled(file: str):
     down = model.opt.gravity
     upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
     require(bool(upright), f"{file}: gravity must be along -z, the ground is at z = 0")
-    return model, hashlib.sha256(data).hexdigest()[:16]
+    whole = np.empty(mujoco.mj_sizeModel(model), np.uint8)  # with what its includes and meshes say
+    mujoco.mj_saveModel(model, None, whole)
+    return model, hashlib.sha256(whole).hexdigest()[:16]
 
 
 def _names(model, kind: str, count: int) -> str:

@@ -27,6 +27,7 @@ from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, 
 REPEATED = (
     1e-2  # of the speed of the legs' ends: what the start of a stride may differ from the last one's, to repeat it
 )
+STRAIGHT = 0.05  # rad, by which a robot may yet turn, for strides to be repeated along a line
 ROW = ("t", "x", "z", "pitch", "v_x", "v_z", "rate", "work", "loss", "energy", "y", "roll", "yaw")
 
 
@@ -120,7 +121,7 @@ class Course:
             here = self.section()
             change, last = np.abs(here - last).max(), here
             periodic = bool(drift <= SETTLED * self.reach and change < REPEATED)
-            if periodic:
+            if periodic and (duration is None or _straight(first, rows[-1], duration)):
                 break
         limit = None if ended else Start(self.unwound(stride + 1), body.data.qvel.copy())
         table, path = np.array(rows), np.array(states)
@@ -219,6 +220,13 @@ class Course:
             if turns and gear:
                 qpos[model.jnt_qposadr[joint]] -= 2 * np.pi * strides / gear
         return qpos
+
+
+def _straight(before, after, duration: float) -> bool:
+    """Whether a robot that does this between two rows, over and over, hardly turns till the duration is over."""
+    t, yaw = ROW.index("t"), ROW.index("yaw")
+    left = max(0.0, duration - after[t]) / (after[t] - before[t])
+    return bool(abs(math.remainder(after[yaw] - before[yaw], 2 * math.pi)) * left <= STRAIGHT)
 
 
 def _progress(before, after) -> float:

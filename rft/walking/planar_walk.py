@@ -69,7 +69,8 @@ def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None, t
     for k in range(len(walkers)):
         rows = _rows(blocks[k], strides.cycle if how[k] == "periodic" else 0, durations[k])
         states = State(rows[:, 1:4], rows[:, 4:7], rows[:, 7], rows[:, 8], *np.zeros((3, len(rows))))
-        energy, speed = strides.robots.energy(states, k), rows[-1, 1] / rows[-1, 0]
+        energy, time = strides.robots.energy(states, k), rows[-1, 0]
+        speed = rows[-1, 1] / time if time else 0.0
         own = float(speed), str(how[k]), 0.0, False, 0.0, None, int(state.unsolved[k]), float(state.residual[k])
         one = Walk(rows[:, 0], *states[:4], energy, *own)
         one = one._replace(**at_limit[k]) if k in at_limit else one
