@@ -14,6 +14,7 @@ from geomech import cli
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.output import walks
+from geomech.output.explain import explain
 from geomech.scene import WalkerScene
 from geomech.study import walking
 from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
@@ -455,6 +456,13 @@ def test_walks_as_they_are_built_in_are_solved_and_account_for_their_energy(name
     assert 0 < found.unaccounted < 0.03
     left = found.work[-1] - found.loss[-1] - np.diff(found.energy[[0, -1]])[0]
     assert found.unaccounted == pytest.approx(abs(left) / found.work[-1])
+
+
+def test_explain_tells_the_robot_its_engine_and_effects():
+    told = explain(scenes.load("sandbot"))
+    assert "sandbot: Rhex (mass = 2.3" in told and "engine: planar" in told
+    assert "on:  aeration (air_speed" in told and told.endswith("off, not evaluated: grain-inertia")
+    assert "engine: mujoco" in explain(scenes.load("screws"))
 
 
 def test_axes_of_a_sweep_have_units():

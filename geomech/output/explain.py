@@ -5,6 +5,7 @@ from __future__ import annotations
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.intruding import Intruding
 from geomech.scene.model import Scene, checked_scene
+from geomech.scene.walker import WalkerScene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
@@ -12,10 +13,10 @@ from geomech.tiers import TIERS
 MOST_JOINTS = 5  # of which all pairs are drawn side by side
 
 
-def explain(scene: Scene | Intruding) -> str:
+def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
-    intruder scene: its law, body and motion, and effects on and off."""
-    if isinstance(scene, Intruding):
+    intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
+    if isinstance(scene, Intruding | WalkerScene):
         return "\n".join(scene.told())
     system = checked_scene(scene).system
     first, *told = system.told()

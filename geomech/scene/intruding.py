@@ -74,15 +74,7 @@ class Intruding:
 
     def effects_told(self) -> list[str]:
         """A line for each effect, and one more for what it takes for granted."""
-        lines = []
-        for effect in self.effects:
-            lines.append(
-                f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
-                f"gone at {effect.limit}, order {effect.order}"
-            )
-            if effect.assumes:
-                lines.append(f"     assumes {effect.assumes}")
-        return lines
+        return of_effects(self.effects)
 
     def weighed(self, force: np.ndarray) -> np.ndarray:
         """Forces (T, k) along x, (y,) z with those that are not the grains'."""
@@ -106,6 +98,19 @@ def checked_tables(tables: Mapping, name: str) -> dict:
     made = tuple(_of_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
     with named(f"{name}: [[effects]]"):
         return {"numerics": dict(tables.get("numerics", {})), "effects": checked(made)}
+
+
+def of_effects(effects) -> list[str]:
+    """A line for each effect on the ground, and one more for what it takes for granted."""
+    lines = []
+    for effect in effects:
+        lines.append(
+            f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"gone at {effect.limit}, order {effect.order}"
+        )
+        if effect.assumes:
+            lines.append(f"     assumes {effect.assumes}")
+    return lines
 
 
 def located(table: Mapping, folder: Path, files: list[str]) -> dict:

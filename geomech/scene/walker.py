@@ -10,8 +10,9 @@ from pathlib import Path
 from geomech.errors import SceneError, choose, named, short
 from geomech.scene import solid
 from geomech.scene.intruder import _intruder, read_medium
-from geomech.scene.intruding import located
+from geomech.scene.intruding import located, of_effects
 from geomech.scene.read import _build, _kind
+from geomech.systems.said import said
 from rft.spatial import Screw, Solid, Spatial
 from rft.vertical import SHAPES, PlateStress, Shape, StressMap
 from rft.vertical.effects import KINDS as EFFECTS
@@ -58,6 +59,13 @@ class WalkerScene:
     @property
     def walker(self) -> Walker:
         return Walker(self.robot, self.gait, self.medium, self.effects)
+
+    def told(self) -> list[str]:
+        """Lines about the robot, its clock, the law and the engine, and which effects are on and off."""
+        robot, gait, medium = (said(type(x).__name__, x) for x in (self.robot, self.gait, self.medium))
+        lines = [f"{self.name}: {robot}", f"gait: {gait}", f"medium: {medium}", f"engine: {self.engine}"]
+        off = [kind for kind in sorted(KINDS) if kind not in [e.kind for e in self.effects]]
+        return [*lines, *of_effects(self.effects), "off, not evaluated: " + (", ".join(off) or "none")]
 
     def tables(self) -> dict:
         """Those of a scene file that reads the same; SceneError for measured drags, which are files of their own."""
