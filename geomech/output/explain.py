@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from geomech.gaits import KINDS as GAITS
-from geomech.scene.intruding import Intruding
 from geomech.scene.model import Scene, checked_scene
-from geomech.scene.walker import WalkerScene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
+
+if TYPE_CHECKING:
+    from geomech.scene.intruding import Intruding
+    from geomech.scene.walker import WalkerScene
 
 MOST_JOINTS = 5  # of which all pairs are drawn side by side
 
@@ -16,7 +20,7 @@ MOST_JOINTS = 5  # of which all pairs are drawn side by side
 def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
     intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
-    if isinstance(scene, Intruding | WalkerScene):
+    if hasattr(scene, "told"):  # of bodies in grains, whose modules a swimmer does without
         return "\n".join(scene.told())
     system = checked_scene(scene).system
     first, *told = system.told()
