@@ -1,6 +1,7 @@
 """Work shared by processes and clusters: the same digits whoever computes, nothing lost when a worker is ended."""
 
 import dataclasses
+import itertools
 import os
 import signal
 import subprocess
@@ -273,3 +274,32 @@ def test_processes_are_not_started_before_they_are_asked():
     with workers.using(3):
         crew = workers._crew.get()
         assert isinstance(crew, processes.Processes) and [w.process for w in crew.workers] == [None] * 3
+
+
+def test_a_signal_at_any_moment_leaves_no_lock_held(monkeypatch):
+    """One that arrives while parts are given out: threads that would wait for ever for a lock end with the crew."""
+    from geomech.workers import processes
+
+    class Rung(Exception):
+        pass
+
+    def ring(number, frame):
+        raise Rung
+
+    monkeypatch.setattr(processes.Processes, "_done", lambda crew, order, item: item)
+    monkeypatch.setattr(processes, "opened", lambda outcome, told: outcome)
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        for k in range(150):
+            crew = processes.Processes(2)
+            assert list(crew.each(None, range(3)))  # threads are there
+            try:
+                signal.setitimer(signal.ITIMER_REAL, 1e-4 * (1 + k % 40))
+                for _ in crew.each(None, itertools.count()):
+                    pass
+            except Rung:
+                crew.close()
+            assert not any(thread.is_alive() for thread in crew.threads)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

@@ -13,13 +13,13 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 
 from geomech.terminal import BELOW
 from geomech.workers.solving import at_hand
 from geomech.workers.task import Order, opened, perform
 
 TRIES = 3  # of a part whose process is ended from outside
+PATIENCE = 2.0  # s for a thread to see that its process is ended
 AHEAD = 4  # parts for each process, that are given out before the oldest is back
 SIZE = struct.Struct("<Q")
 
@@ -35,17 +35,32 @@ class Processes:
         self.idle: queue.SimpleQueue = queue.SimpleQueue()
         for worker in self.workers:
             self.idle.put(worker)
-        self.threads = ThreadPoolExecutor(count)  # each waits for a process
+        self.parts: queue.SimpleQueue = queue.SimpleQueue()
+        self.threads: list[threading.Thread] = []  # each asks a process
 
     def has(self) -> str:
         return at_hand()
 
     def each(self, order: Order, items: Iterable) -> Iterator:
         told: set = set()
-        submit = lambda item: self.threads.submit(self._done, order, pickle.dumps(item))
+        while len(self.threads) < self.count:
+            thread = threading.Thread(target=self._serve, daemon=True)
+            thread.start()
+            self.threads.append(thread)
+        submit = lambda item: self._submitted(order, pickle.dumps(item))
         with contextlib.closing(in_order(submit, items, lambda: AHEAD * self.count)) as outcomes:
             for outcome in outcomes:
                 yield opened(outcome, told)
+
+    def _submitted(self, order: Order, item: bytes) -> Part:
+        part = Part(order, item)
+        self.parts.put(part)
+        return part
+
+    def _serve(self) -> None:
+        while (part := self.parts.get()) is not None:
+            if not (part.cancelled or self.closed):
+                part.do(self._done)
 
     def _done(self, order: Order, item: bytes) -> bytes:
         worker = self.idle.get()
@@ -68,9 +83,36 @@ class Processes:
         for worker in self.workers:
             worker.closed = True
             worker.kill()
-        self.threads.shutdown(cancel_futures=True)
+        for _ in self.threads:
+            self.parts.put(None)
+        for thread in self.threads:
+            thread.join(PATIENCE)
         for worker in self.workers:
             worker.kill()  # of one that was being started
+
+
+class Part:
+    """One that is asked for, and its outcome. Only queues of the kind whose locks no signal leaves held, as one that arrives
+    inside of `concurrent.futures` may: its threads then wait for ever."""
+
+    def __init__(self, order: Order, item: bytes):
+        self.order, self.item, self.cancelled = order, item, False
+        self.outcome: queue.SimpleQueue = queue.SimpleQueue()
+
+    def do(self, done: Callable) -> None:
+        try:
+            self.outcome.put((done(self.order, self.item), None))
+        except BaseException as error:
+            self.outcome.put((None, error))
+
+    def result(self) -> bytes:
+        found, error = self.outcome.get()
+        if error is not None:
+            raise error
+        return found
+
+    def cancel(self) -> None:
+        self.cancelled = True
 
 
 def in_order(submit: Callable, items: Iterable, room: Callable[[], int]) -> Iterator:
