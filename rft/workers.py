@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import os
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
+from queue import SimpleQueue
 
 import numpy as np
 
@@ -54,13 +55,32 @@ def split(samples: np.ndarray, count: int) -> list[np.ndarray]:
 
 def each(f: Callable, shares: list) -> None:
     """f(share, stop) of each share, side by side: NumPy lets go of the interpreter inside its loops. What is raised here, by
-    a signal among others, sets ``stop``, so that no share goes on for more than a step."""
+    a signal among others, sets ``stop``, so that no share goes on for more than a step.
+
+    Threads by hand, and a queue whose lock no signal leaves held: one that arrives inside of `concurrent.futures` may leave
+    its threads to wait for ever."""
     if len(shares) == 1:
         return f(shares[0], NEVER)
-    stop = threading.Event()
-    with ThreadPoolExecutor(len(shares)) as pool:
-        try:
-            list(pool.map(lambda share: f(share, stop), shares))
-        except BaseException:
-            stop.set()
-            raise
+    stop, ended, left = threading.Event(), SimpleQueue(), 0
+    try:
+        for share in shares:
+            _thread.start_new_thread(_told, (f, share, stop, ended))
+            left += 1
+        while left:
+            error = ended.get()
+            left -= 1
+            if error is not None:
+                raise error
+    except BaseException:
+        stop.set()
+        for _ in range(left):
+            ended.get()
+        raise
+
+
+def _told(f: Callable, share, stop: threading.Event, ended: SimpleQueue) -> None:
+    try:
+        f(share, stop)
+        ended.put(None)
+    except BaseException as error:
+        ended.put(error)

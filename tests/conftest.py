@@ -2,6 +2,7 @@
 
 import math
 import os
+import sys
 
 import pytest
 
@@ -86,3 +87,20 @@ def solved_by(request, monkeypatch):
         request.getfixturevalue("compiled_code")
         monkeypatch.setattr(backend.AUTO, "is_ready", True)
     return request.param
+
+
+@pytest.fixture
+def geomech(tmp_path, monkeypatch, capsys):
+    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
+    from geomech import cli
+
+    monkeypatch.chdir(tmp_path)
+
+    def run(*args):
+        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        said = capsys.readouterr()
+        return left.value.code, said.out, said.err
+
+    return run

@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import json
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from registry import OUTLINES, STRESSES
 from test_fuzz import VALUES, mutated
 
 import geomech.scene as scenes
-from geomech import cli
 from geomech.errors import SceneError
 from geomech.output import plots
 from geomech.scene.intruder import IntruderScene, load_medium
@@ -37,21 +35,6 @@ samples = 7
 [numerics]
 elements = 40
 """
-
-
-@pytest.fixture
-def geomech(tmp_path, monkeypatch, capsys):
-    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
 
 
 def refused(ended, said):

@@ -11,7 +11,7 @@ import pytest
 from registry import GROUND_EFFECTS
 from scipy.spatial.transform import Rotation
 from test_fuzz import VALUES, mutated
-from test_intrude import geomech, outcome, refused  # noqa: F401
+from test_intrude import outcome, refused
 
 import geomech.scene as scenes
 from figures import meshes
@@ -81,7 +81,7 @@ def test_there_is_a_scene_of_every_body():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_scenes_of_meshes_run(name, geomech, tmp_path):  # noqa: F811
+def test_scenes_of_meshes_run(name, geomech, tmp_path):
     scene = scenes.load(name)
     code, out, err = geomech("intrude", name, "--json", "-o", "out.csv")
     assert (code, err) == (0, "")
@@ -104,7 +104,7 @@ def test_scenes_of_meshes_run(name, geomech, tmp_path):  # noqa: F811
     assert scenes.toml(scene) == scene.text and name in geomech("scenes")[1]
 
 
-def test_strength_is_matched_to_the_vertical_plane_and_that_is_told(geomech, tmp_path):  # noqa: F811
+def test_strength_is_matched_to_the_vertical_plane_and_that_is_told(geomech, tmp_path):
     scene = scenes.load("sphere")
     plate = Spatial(scene.medium.xi_n, 0.4).stress([0.0, 0, -1], [0.0, 0, -1])[2]
     assert plate == pytest.approx(0.254e6, rel=1e-12)
@@ -192,7 +192,7 @@ def test_motions_and_counts_that_make_no_sense_are_refused(make, said):
         make()
 
 
-def test_a_path_of_poses_gives_the_motion_it_was_taken_from(geomech, tmp_path):  # noqa: F811
+def test_a_path_of_poses_gives_the_motion_it_was_taken_from(geomech, tmp_path):
     """A steady rotation about an oblique axis, with the hub moving, from a CSV file."""
     made = MADE.replace("sphere", "c-leg").replace("radius", "width = 0.02\nthickness = 0.004\nradius")
     motion = Rotate(0.01, (1.0, 2.0, -1.0), 3.0, -1.0, 1.5, 0.1, 0.5, 0.2, 21)
@@ -221,7 +221,7 @@ def test_velocities_of_a_path_are_of_order_2():
     assert (np.log2(np.divide(errors[0], errors[-1])) / 2 > 1.8).all()
 
 
-def test_meshes_of_files(geomech, tmp_path):  # noqa: F811
+def test_meshes_of_files(geomech, tmp_path):
     pytest.importorskip("trimesh")
     mesh = shapes.leg(0.038, -1.0, 0.003, 0.025, 40, 6, 1)
     stl(tmp_path / "leg.STL", mesh, 1000)
@@ -249,7 +249,7 @@ def bad(mesh):
 @pytest.mark.parametrize(
     ("what", "mesh", "said"), bad(shapes.sphere(0.02, 1)), ids=lambda x: x if isinstance(x, str) else ""
 )
-def test_bad_mesh_files_get_one_line(what, mesh, said, geomech, tmp_path):  # noqa: F811
+def test_bad_mesh_files_get_one_line(what, mesh, said, geomech, tmp_path):
     pytest.importorskip("trimesh")
     stl(tmp_path / "a.stl", mesh)
     (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "a.stl"'))
@@ -277,7 +277,7 @@ def test_bad_mesh_files_get_one_line(what, mesh, said, geomech, tmp_path):  # no
         (".", None, "a mesh is an .stl"),
     ],
 )
-def test_files_that_are_no_mesh_get_one_line(name, data, said, geomech, tmp_path):  # noqa: F811
+def test_files_that_are_no_mesh_get_one_line(name, data, said, geomech, tmp_path):
     pytest.importorskip("trimesh")
     if data is not None:
         (tmp_path / name).write_bytes(data)
@@ -285,7 +285,7 @@ def test_files_that_are_no_mesh_get_one_line(name, data, said, geomech, tmp_path
     refused(geomech("intrude", "s.toml"), said)
 
 
-def test_without_trimesh_files_are_refused_and_shapes_go_on(geomech, tmp_path, monkeypatch):  # noqa: F811
+def test_without_trimesh_files_are_refused_and_shapes_go_on(geomech, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     stl(tmp_path / "a.stl", shapes.sphere(0.02, 1))
     (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', 'file = "a.stl"'))
@@ -346,7 +346,7 @@ def test_a_scene_made_in_python_says_what_is_wrong():
             dataclasses.replace(scene, **{part: VERTICAL["generic"].stress})
 
 
-def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):  # noqa: F811
+def test_accuracy_of_the_number_of_triangles(geomech, tmp_path, monkeypatch):
     monkeypatch.setattr(type(BODIES[0]), "ladder", (80, 320, 1280, 20480))
     (tmp_path / "s.toml").write_text(MADE)
     code, out, err = geomech("accuracy", "s.toml", "-o", "out", "--json")

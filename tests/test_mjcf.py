@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from matplotlib import image
 
-from geomech import cli
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.study import walking
@@ -49,20 +48,6 @@ steps = 8
 elements = 8
 duration = 1.0
 """
-
-
-@pytest.fixture
-def geomech(capsys, monkeypatch, tmp_path):
-    """(exit code, stdout, stderr) of a command run in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
-        with pytest.raises(SystemExit) as done:
-            cli.main()
-        return done.value.code or 0, *capsys.readouterr()
-
-    return run
 
 
 @pytest.fixture

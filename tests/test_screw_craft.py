@@ -2,14 +2,12 @@
 
 import dataclasses
 import json
-import sys
 import tomllib
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geomech import cli
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.output import walk_sweeps
@@ -72,22 +70,6 @@ def test_mujoco_goes_on_as_the_balance_says(pair):
         assert abs(aside) < 1e-6 * ahead and abs(after["yaw"]) < 1e-6
 
 
-@pytest.fixture
-def geomech(tmp_path, monkeypatch, capsys):
-    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.toml").write_text(SMALL)
-
-    def run(*args):
-        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
-
-
 def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
     """Few strides: of a walk that has not settled yet, whose speed is that of the last ones."""
     pytest.importorskip("mujoco")
@@ -95,6 +77,7 @@ def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
 
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
     monkeypatch.setattr(mujoco_walk, "FEW_STRIDES", 1)
+    (tmp_path / "small.toml").write_text(SMALL)
     code, out, err = geomech("walk", "small.toml", "--engine", "mujoco", "--json", "-o", "out")
     assert (code, err) == (0, "")
     found = json.loads(out)
@@ -107,7 +90,8 @@ def test_a_craft_walks_as_a_command(geomech, tmp_path, monkeypatch):
     assert (tmp_path / "out" / "walk.png").stat().st_size > 20_000
 
 
-def test_the_planar_engine_knows_no_screws(geomech):
+def test_the_planar_engine_knows_no_screws(geomech, tmp_path):
+    (tmp_path / "small.toml").write_text(SMALL)
     code, out, err = geomech("walk", "small.toml", "--engine", "planar")
     assert (code, out) == (
         2,

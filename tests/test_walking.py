@@ -3,14 +3,12 @@
 import dataclasses
 import json
 import math
-import sys
 import types
 
 import numpy as np
 import pytest
 from scipy.io import netcdf_file
 
-from geomech import cli
 from geomech import scene as scenes
 from geomech.errors import SceneError
 from geomech.output import walks
@@ -275,21 +273,6 @@ def test_a_wheel_bears_its_load_and_pulls_more_the_more_it_slips():
         rolling(stress, wheel, 15.0, 2.0, math.nan)
     with pytest.raises(ValueError, match="has no radius"):
         rolling(stress, scenes.load("square-rod").intruder, 15.0, 2.0, 0.1)
-
-
-@pytest.fixture
-def geomech(tmp_path, monkeypatch, capsys):
-    """Runs a command in an empty folder: (exit code, standard output, standard error)."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
 
 
 SMALL = XPLORER.text + "\n[numerics]\nsteps = 16\nelements = 8\nduration = 2.0\n"
