@@ -1,18 +1,23 @@
-"""Shapes of a grid whose velocities follow from those of others: where left and right, or head and tail, of a body are alike.
+"""Shapes of a grid, and phases of a gait, whose velocities follow from those of others: where left and right, or head and
+tail, of a body are alike.
 
 Seen in a mirror a body has the shape -alpha and moves with (xi_x, -xi_y, -xi_theta). With its head taken for its tail it has
 the shape -alpha backwards, alpha_k -> -alpha_(d + 1 - k), and moves with (-xi_x, -xi_y, xi_theta). Rates change as shapes do,
-and velocities turn round with rates.
+and velocities turn round with rates. So a gait whose second half is its first seen in a mirror takes half of the balances, and
+one that, head for tail, is itself run backwards, as a circle or a travelling wave is, half of these.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-SAME = 1e-12  # difference of two directions that are one
+SAME = (
+    1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
+)
 
 
 class Image(NamedTuple):
@@ -67,3 +72,62 @@ def to_solve(found: Sequence[Image], size: int) -> np.ndarray:
     for image in found:
         first &= own <= image.index
     return first
+
+
+class Around(NamedTuple):
+    """What of a cycle of N phases is solved. count: of phases. solved: which, none a later image of another. source: (N,), the
+    place among these of the one that each phase is an image of. factor: (N, 3), of its velocity."""
+
+    count: int
+    solved: np.ndarray | slice
+    source: np.ndarray | slice
+    factor: np.ndarray | float
+
+    def some(self, x: np.ndarray | None) -> np.ndarray | None:
+        """(..., n, k), of the phases that are solved, from (..., N, k)."""
+        return None if x is None else x[..., self.solved, :]
+
+    def whole(self, xi: np.ndarray) -> np.ndarray:
+        """Velocities (..., N, 3) at all phases from those (..., n, 3) at the phases that are solved."""
+        return self.factor * xi[..., self.source, :]
+
+
+def around(alpha: np.ndarray, alphadot: np.ndarray, mirror: bool, reversible: bool) -> Around:
+    """Of cycles (..., N, d) together, as far as all are images of themselves in one way, of a body whose velocity turns round
+    with the rates and whose left and right (mirror), head and tail (reversible) are alike."""
+    phases, joints = alpha.shape[-2:]
+    if not (mirror or reversible):
+        return _around(phases, False, ())
+    sizes = [np.abs(x).max((-2, -1), keepdims=True) for x in (alpha, alphadot)]
+    scaled = [x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)]
+    path = np.concatenate(scaled, -1).reshape(-1, phases, 2 * joints)
+    half, moving, turned = phases // 2, sizes[1].argmax() if len(path) else 0, ()
+    same = lambda x, y: bool(np.abs(x - y).max(initial=0.0) <= SAME)
+    shifted = mirror and phases % 2 == 0 and same(path[:, half:], -path[:, :half])
+    for sign in (-1.0, 1.0)[: (2 if mirror and not shifted else 1) if reversible and len(path) else 0]:
+        seen = sign * np.concatenate([path[..., joints - 1 :: -1], -path[..., : joints - 1 : -1]], -1)
+        first = int(np.abs(path[moving] - seen[moving, 0]).max(-1).argmin())
+        if same(path[:, (first - np.arange(phases)) % phases], seen):
+            turned = first, sign
+            break
+    return _around(phases, shifted, turned)
+
+
+@functools.lru_cache(maxsize=64)
+def _around(phases: int, shifted: bool, turned: tuple) -> Around:
+    """Of a cycle that is an image of itself half a cycle later in the mirror (shifted), and backwards, head for tail, by
+    (phase of the first one's image, sign of its shape: 1 in the mirror too), if that is not empty."""
+    if not (shifted or turned):
+        return Around(phases, slice(None), slice(None), 1.0)
+    own = np.arange(phases)
+    source, factor = own, np.ones((phases, 3))
+    moves = [((own + phases // 2) % phases, (1.0, -1.0, -1.0))] * shifted
+    if turned:
+        first, sign = turned
+        moves.append(((first - own) % phases, (1.0, -sign, sign)))
+    for index, signs in moves:  # each undoes itself; an image may be one of an image
+        earlier = source[index] < source
+        factor = np.where(earlier[:, None], np.array(signs) * factor[index], factor)
+        source = np.where(earlier, source[index], source)
+    solved, source = np.unique(source, return_inverse=True)
+    return Around(len(solved), solved, source, factor)

@@ -4,12 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from registry import BODIES
+from registry import BODIES, GAITS
 
 from geomech import connection, harmonics
-from geomech.images import images, to_solve
+from geomech.gaits import Butterfly, Circle, Fourier, Sine
+from geomech.images import around, images, to_solve
 from geomech.systems.swimmer import Swimmer
-from rft import CATALOGUE, Chain, EndCaps, SkinFriction
+from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
 from rft.media.base import TermLaw, is_central
 
@@ -119,3 +120,81 @@ def test_the_table_says_what_it_took():
                 seen.clear()
                 tier.table(swimmer, scene.numerics)
                 assert sum(seen) == tier.solves(swimmer, scene.numerics, 1, 8)
+
+
+ELLIPSE = Fourier(cos=((0.4,), (0.0,)), sin=((0.0,), (0.7,)))  # its second half is the first in a mirror, and no more
+
+
+def cycles():
+    """name: (body, effects, gait, amplitudes, phases, how many of these are solved)."""
+    uneven, three = Chain((1, 2, 0.5), 0.3, "link-2"), Chain()
+    skin, caps = (SkinFriction(forward=0.109, backward=0.137),), (EndCaps(radius=0.06, tail=3.0),)
+    return {
+        "circle": (three, (), Circle(), None, 64, 17),
+        "circle backwards": (three, (), Circle(amplitude=0.7, reverse=True), None, 48, 13),
+        "circles, one at rest": (three, (), Circle(), [0.0, -0.6, 1e-7, 1.4], 32, 9),
+        "circle off the centre": (three, (), Circle(centre=(0.3, 0.1)), None, 32, 32),
+        "circle along the diagonal": (three, (), Circle(centre=(0.3, -0.3)), None, 32, 17),
+        "circle across the diagonal": (three, (), Circle(centre=(0.4, 0.4)), None, 32, 17),
+        "circle of an odd number": (three, (), Circle(), None, 45, 45),
+        "circle of two halves": (three, (), Circle(), None, 42, 21),
+        "circle of a body of three links that differ": (uneven, (), Circle(), None, 32, 16),
+        "circle of a skin that drags less forwards": (three, skin, Circle(), None, 32, 32),
+        "circle of a body with a heavier tail": (three, caps, Circle(), None, 32, 16),
+        "butterfly": (three, (), Butterfly(), [0.5, 1.2], 32, 9),
+        "ellipse": (three, (), ELLIPSE, None, 32, 16),
+        "points": (three, (), GAITS["points"], None, 32, 32),
+        "travelling wave": (Chain((1,) * 6), (), Sine(elements=6, waves=1.0), [0.1, 0.3], 32, 9),
+    }
+
+
+@pytest.mark.parametrize("name", cycles())
+def test_gaits_are_those_of_all_phases(name):
+    body, effects, gait, amplitudes, phases, count = cycles()[name]
+    swimmer, (alpha, alphadot) = Swimmer(GLASS, body, effects), gait.cycle(phases, amplitudes)
+    assert swimmer.images(alpha, alphadot).count == count
+    run, xi = swimmer.run(alpha, alphadot, work=True), swimmer.velocity(alpha, alphadot)
+    size = np.abs(xi).max((-1, -2), keepdims=True) + 1e-300
+    np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
+    power = swimmer.work(alpha, alphadot, xi).power
+    np.testing.assert_allclose(run.work.power, power, rtol=1e-8, atol=1e-12)
+
+
+def test_what_is_nearly_an_image_is_none():
+    """Neither shapes nor rates, neither of a large gait nor of a small one beside it; nor gaits that differ in their images."""
+    count = lambda *cycle: around(*cycle, True, True).count
+    both = Circle().cycle(32, [1.0, 1e-6])
+    assert count(*both) == 9
+    for part in (0, 1):
+        for gait, off in ((0, 1e-9), (1, 1e-15)):
+            for where in ((gait, 20, 1), (gait, 3, 0)):
+                moved = [x.copy() for x in both]
+                moved[part][where] += off
+                assert count(*moved) == 32, (part, where)
+    circle, butterfly = Circle().cycle(32), Butterfly().cycle(32)
+    assert count(*map(np.stack, zip(circle, butterfly))) == 16
+    assert around(*circle, False, False).count == 32 and around(*circle, False, True).count == 17
+
+
+def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
+    """Of an effect with a parameter for each gait, of which some phases are solved; begun from what is known of all phases."""
+    frequencies, body = np.array([0.5, 3.0]), Chain((1, 2, 1))
+    effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
+    both = Swimmer(GLASS, body, (effect.having(frequency=frequencies),))
+    alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
+    assert both.images(alpha, alphadot).count == 16
+    run = both.run(alpha, alphadot)
+    for k in range(2):
+        own = Swimmer(GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),))
+        np.testing.assert_allclose(run.xi[k], own.velocity(alpha[k], alphadot[k]), rtol=0, atol=1e-10)
+    plain, solve, taken = Swimmer(GLASS, body), Swimmer.solve, []
+
+    def watched(self, *asked):
+        taken.append(solve(self, *asked))
+        return taken[-1]
+
+    xi = plain.velocity(alpha, alphadot)
+    monkeypatch.setattr(Swimmer, "solve", watched)
+    runs = [plain.run(alpha, alphadot, start=start) for start in (None, xi)]
+    np.testing.assert_allclose(runs[1].xi, xi, rtol=0, atol=1e-10)
+    assert taken[1].iterations.max() == 1 and taken[0].iterations.min() > 3

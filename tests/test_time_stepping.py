@@ -536,7 +536,7 @@ def test_time_stepping_that_fails_says_so(monkeypatch):
     """Starved descents: the status, and RuntimeError by `checked`."""
     import rft.newton
 
-    monkeypatch.setattr(rft.newton, "QUICK", rft.newton.QUICK._replace(budget=5))  # enough for a body at rest
+    monkeypatch.setattr(rft.newton, "QUICK", rft.newton.Descent(0.03, 0.03, 2e-2, 5.0, 5))  # enough at rest
     monkeypatch.setattr(rft.newton, "WARM", rft.newton.WARM._replace(budget=1))
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(rft.newton, name, ())

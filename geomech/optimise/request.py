@@ -122,7 +122,7 @@ class Request:
         else:
             climbs, steps = self.starts, RUNS if self.whole else NEAR
         gaits = int(climbs * steps * TRIES * each)
-        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False)
+        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, every=True)
         found = cost.price(jobs)
         return found._replace(seconds=found.seconds + CLIMB * (self.starts + 1))
 

@@ -139,30 +139,37 @@ def of_medium(scene: Scene, gait: Gait, count: int) -> list[Job]:
 
 
 def direct(
-    scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True
-) -> list[Job]:
+    scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True,
+    every: bool = False,
+) -> list[Job]:  # fmt: skip
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
-    (`estimate.direct`) or, if not ``checked``, without."""
+    (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
     system, stepping = scene.system, scene.system.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, system.at_once(phases))
-    solved, held = phases * (_refinements(scene, stepping) if checked else 1.0), 0
-    if stepping:
-        held = group * (60 * system.elements + system.held)
+    held = group * (60 * system.elements + system.held) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
+    solves = (lambda n: n) if stepping or every else (lambda n: _solved(system, gait, n))
+    solved = _refined(scene, solves, phases) if checked else solves(phases)
     if stepping:
         return [Job("steps", scene, gait, solved * count / group, group, memory=memory)]
     return [Job("balances", scene, gait, solved * count, memory=memory)]
 
 
-def _refinements(scene: Scene, stepping: bool) -> float:
-    """Balances that `estimate.direct` solves over those of the gait at its phases: time stepping again at a half, a quarter and
-    an eighth of them, and a quarter with a finer model where there is one. Pieces of body are doubled on the quarter, and
-    halved and quartered at all phases: as much as half and a half and a quarter."""
-    again = 0.5 + 0.25 + 0.125 if stepping else 0.0
-    again += 0.5 + 0.5 + 0.25 if scene.system.cut else 0.0
-    return 1.0 + again + (0.25 if scene.system.finer() else 0.0)
+def _solved(system, gait: Gait, phases: int) -> int:
+    """Phases of a gait that are no images of others."""
+    return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
+
+
+def _refined(scene: Scene, solves: Callable, phases: int) -> float:
+    """Balances that `estimate.direct` solves, of which a gait of n phases takes solves(n): time stepping again at a half, a
+    quarter and an eighth of the phases, and a quarter with a finer model where there is one. Pieces of body are doubled on the
+    quarter, and halved and quartered at all phases: as much as half and a quarter."""
+    full, quarter = solves(phases), solves(phases // 4)
+    again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.steps else 0
+    again += 2 * quarter + 0.75 * full if scene.system.cut else 0
+    return full + again + (quarter if scene.system.finer() else 0)
 
 
 def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:

@@ -11,6 +11,7 @@ import numpy as np
 from geomech import summary
 from geomech.connection import Connection, evaluate, fit
 from geomech.errors import check_angle, choose, real_array, short
+from geomech.images import Around, around
 from geomech.reconstruct import displacement, poses, repeated
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
@@ -206,6 +207,10 @@ class Plain:
         """The least-squares connection on a grid, from so many directions; other arguments as in `connection.fit`."""
         known = {"singularity": self.singularity, "trusted": True, "reversible": self.reversible}
         return fit(self.velocity, axes, count, degree, progress, self.halved, **known)
+
+    def images(self, alpha, alphadot) -> Around:
+        """Which phases of gaits, as in `run`, are solved, and how the others follow: all, unless a system says else."""
+        return around(alpha, alphadot, False, False)
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""

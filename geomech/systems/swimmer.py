@@ -11,6 +11,7 @@ import numpy as np
 
 import rft
 from geomech.errors import real_array, short
+from geomech.images import Around, around
 from geomech.reconstruct import displacement, poses, repeated
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
 from geomech.systems.said import name_in, told
@@ -218,15 +219,26 @@ class Swimmer(Plain):
         rates = alphadot.reshape(-1, self.joints).T
         speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.steps:
-            samples = np.repeat(np.arange(speed.size), alpha.shape[-2])  # of every phase
-            each = dataclasses.replace(self, effects=tuple(e.take(samples) for e in self.effects))
-            solution = each.solve(alpha, alphadot, start).checked()
-            done = each.work(alpha, alphadot, solution.xi) if work else None
-            return Cycle(solution.xi, displacement(solution.xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
+            images = self.images(alpha, alphadot)
+            asked = (images.some(x) for x in (alpha, alphadot, start))
+            solution = self._of_gaits(speed.size, images.count).solve(*asked).checked()
+            xi = images.whole(solution.xi)
+            done = self._of_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
+            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
         to_come = steps.drift if self.settles else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
+
+    def images(self, alpha, alphadot) -> Around:
+        """Which phases of gaits, as in `run`, are solved where balances are, and how the others follow."""
+        return around(alpha, alphadot, self.halved, self.reversible)
+
+    def _of_gaits(self, count: int, phases: int) -> Swimmer:
+        """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
+        effects = tuple(e.take(np.repeat(np.arange(count), phases)) for e in self.effects)
+        same = all(a is b for a, b in zip(effects, self.effects))
+        return self if same else dataclasses.replace(self, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
         """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series

@@ -29,7 +29,7 @@ def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarra
 
 
 class Direct(Tier):
-    """No table; a system of whose shapes alone no velocity follows runs the whole gait."""
+    """No table: the system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
 
     name, label = "direct", "force balance"
     style = {"color": "0.72", "linestyle": "-", "linewidth": 4.0, "zorder": 1}  # the others lie on it, or do not
@@ -41,7 +41,5 @@ class Direct(Tier):
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         phases = numerics.phases
-        if not (system.steps or system.carried):
-            return direct(system.velocity, gait, amplitudes, phases)
         run = lambda some: system.run(*gait.cycle(phases, some)).net
         return run(None) if amplitudes is None else in_groups(run, amplitudes, system.at_once(phases))

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rft.media.base import require, shown
+from rft.media.base import remembered, require, shown
 
 
 class Kinematics(NamedTuple):
@@ -132,6 +132,7 @@ def checked_body(body) -> Body:
     return body
 
 
+@remembered
 def is_reversible(body: Body) -> bool:
     """Whether a body with its head taken for its tail is the same one, its frame too: tried at a few shapes. Then the frame
     is turned by pi, and the joints of -alpha backwards are those of alpha."""

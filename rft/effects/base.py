@@ -13,7 +13,7 @@ import numpy as np
 from rft.bodies.base import Body, Kinematics, checked_body
 from rft.bodies.pieces import PIECES, subdivide
 from rft.contact import Model, PerSample, rows
-from rft.media.base import in_range, is_frozen, require, require_drag, shown
+from rft.media.base import in_range, remembered, require, require_drag, shown
 from rft.premise import NONE, SHAPE_ALONE, Premise
 
 MOST_PIECES = 10_000  # to a body length
@@ -113,18 +113,15 @@ class Prepared(NamedTuple):
     def of(cls, medium, body: Body, effects: Sequence[Effect], rule: str, pieces: int) -> Prepared:
         """Remembered, checks and all, for the last few that cannot change: small batches take no longer to solve than to
         prepare. ValueError for what is no body, and for a medium that pushes."""
-        lasting = isinstance(rule, str) and type(pieces) is int and all(map(is_frozen, (medium, body, *effects)))
-        return (_remembered if lasting else _prepared)(medium, body, tuple(effects), rule, pieces)
+        return _prepared(medium, body, tuple(effects), rule, pieces)
 
 
+@remembered
 def _prepared(medium, body, effects, rule, pieces) -> Prepared:
     require_drag(medium)
     body = pieced(checked_body(body), effects, pieces)
     model, zero = folded(effects, medium, body, rule), np.zeros((body.joints, 1))
     return Prepared(body, model, rows(model.motions(body.motion(zero, zero))))
-
-
-_remembered = functools.lru_cache(maxsize=32)(_prepared)
 
 
 def folded(effects: Sequence[Effect], medium, body: Body, rule: str = "exact") -> Model:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -81,10 +83,38 @@ def is_mirror(medium) -> bool:
     return bool(getattr(medium, "mirror", False))
 
 
+def is_frozen(thing) -> bool:
+    """Whether it stays what it is: a frozen dataclass of what can be a key, which an array of parameters cannot."""
+    parameters = getattr(type(thing), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
+        return False
+    try:
+        hash(thing)
+    except TypeError:
+        return False
+    return True
+
+
+def remembered(f: Callable) -> Callable:
+    """f, worked out once for the last few arguments of which none can change (`is_frozen`, text, whole numbers, tuples)."""
+    kept = functools.lru_cache(maxsize=32)(f)
+
+    @functools.wraps(f)
+    def of(*args):
+        return (kept if _lasts(args) else f)(*args)
+
+    return of
+
+
+def _lasts(x) -> bool:
+    return type(x) in (str, int) or (all(map(_lasts, x)) if type(x) is tuple else is_frozen(x))
+
+
 SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
 TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
+@remembered
 def is_central(medium: Medium) -> bool:
     """Whether drag only turns round with the velocity, so that no end of an element is its front: tried at many."""
     with np.errstate(all="ignore"):
@@ -166,18 +196,6 @@ def power_of(medium: Medium) -> float | None:
     form, growth = f / size[:, None], size[1:] / size[:-1]
     alike = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
     return round(float(np.log10(growth.mean())), 6) + 0.0 if alike else None
-
-
-def is_frozen(thing) -> bool:
-    """Whether it stays what it is: a frozen dataclass of what can be a key, which an array of parameters cannot."""
-    parameters = getattr(type(thing), "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen:
-        return False
-    try:
-        hash(thing)
-    except TypeError:
-        return False
-    return True
 
 
 def real_array(name: str, x) -> np.ndarray:
