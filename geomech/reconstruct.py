@@ -16,21 +16,43 @@ from geomech.errors import real_array, short
 from rft import se2
 
 
+class _Waves(NamedTuple):
+    """What n equally spaced samples tell apart. k: (M,), wave numbers -K .. K. place: (M,), where they are in a Fourier
+    transform, share: (M,), of what is there; the highest of an even n is shared by +-K. integral: (M,), factors of a
+    function's coefficients in those of its integral of zero mean."""
+
+    k: np.ndarray
+    place: np.ndarray
+    share: np.ndarray
+    integral: np.ndarray
+
+    def of(self, f: np.ndarray) -> np.ndarray:
+        """Fourier coefficients (..., M) of samples (..., n)."""
+        return np.fft.fft(f)[..., self.place] * self.share
+
+
+@functools.lru_cache(maxsize=32)
+def _waves(n: int) -> _Waves:
+    k = np.arange(-(n // 2), n // 2 + 1)
+    share = np.full(len(k), 1 / n)
+    if n % 2 == 0:
+        share[[0, -1]] /= 2
+    return _Waves(k, k % n, share, np.where(k == 0, 0.0, 1 / np.where(k == 0, 1, 1j * k)))
+
+
 def turning(xi) -> np.ndarray:
     """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3:
         raise ValueError(f"xi must be of shape (..., N, 3), got {xi.shape}")
-    k, turn = _coefficients(xi[..., 2] + 0j)
-    swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
-    return _values(swing, k, np.shape(xi)[-2]).real
+    n = xi.shape[-2]
+    return np.fft.irfft(np.fft.rfft(xi[..., 2]) * _waves(n).integral[n // 2 :], n)
 
 
 class _Spectrum(NamedTuple):
     mean_turn: np.ndarray  # (..., 1) mean of xi_theta
     k: np.ndarray  # (M,) wave numbers, symmetric about 0
     wave: np.ndarray  # (..., M) Fourier coefficients of e^(i (theta - mean)) (xi_x + i xi_y)
-    swing: np.ndarray  # (..., M) those of the periodic part of theta, up to a constant
 
 
 def displacement(xi) -> np.ndarray:
@@ -39,9 +61,7 @@ def displacement(xi) -> np.ndarray:
     xi: (..., N, 3), body velocity with respect to phase at t = 2 pi n / N, N >= 3.
     """
     s = _spectrum(xi)
-    turns = s.mean_turn + s.k
-    reach = 2 * np.pi * np.exp(1j * np.pi * turns) * np.sinc(turns)  # integral of e^(i turns t) over a cycle
-    z = (s.wave * reach).sum(-1)
+    z = (s.wave * _reach(s.mean_turn + s.k)).sum(-1)
     return np.stack([z.real, z.imag, 2 * np.pi * s.mean_turn[..., 0]], -1)
 
 
@@ -54,7 +74,9 @@ def trajectory(xi, phases) -> np.ndarray:
     span = t[:, None]
     reach = span * np.exp(0.5j * turns * span) * np.sinc(turns * span / (2 * np.pi))
     z = (s.wave[..., None, :] * reach).sum(-1)
-    swing = (s.swing[..., None, :] * np.expm1(1j * s.k * span)).sum(-1).real
+    waves = _waves(np.shape(xi)[-2])
+    swing = waves.integral * waves.of(np.asarray(xi, float)[..., 2])
+    swing = (swing[..., None, :] * np.expm1(1j * s.k * span)).sum(-1).real
     return np.stack([z.real, z.imag, s.mean_turn * t + swing], -1)
 
 
@@ -62,14 +84,15 @@ def poses(xi) -> np.ndarray:
     """Poses (..., N + 1, 3) at the phases of the samples and at the cycle's end: `trajectory` there, in time N log N."""
     s, n = _spectrum(xi), np.shape(xi)[-2]
     span = 2 * np.pi * np.arange(n + 1) / n
-    closed = lambda c: np.take(_values(c, s.k, n), np.arange(n + 1) % n, -1)
+    closed = lambda x: np.take(x, np.arange(n + 1) % n, -1)
     turns = s.mean_turn + s.k
     slow = np.abs(turns) < 0.5  # of one term or none the integral is no quotient
-    turning = closed(np.where(slow, 0.0, s.wave / np.where(slow, 1.0, 1j * turns))) * np.exp(1j * s.mean_turn * span)
-    z = turning - turning[..., :1]
+    carried = closed(_values(np.where(slow, 0.0, s.wave / np.where(slow, 1.0, 1j * turns)), s.k, n))
+    carried = carried * np.exp(1j * s.mean_turn * span)
+    z = carried - carried[..., :1]
     drift, turn = (np.where(slow, x, 0.0).sum(-1)[..., None] for x in (s.wave, turns))
     z = z + drift * span * np.exp(0.5j * turn * span) * np.sinc(turn * span / (2 * np.pi))
-    swing = closed(s.swing).real
+    swing = closed(turning(xi))
     return np.stack([z.real, z.imag, s.mean_turn * span + swing - swing[..., :1]], -1)
 
 
@@ -88,32 +111,16 @@ def _spectrum(xi) -> _Spectrum:
         raise ValueError(f"xi must have shape (..., N >= 3, 3), got {xi.shape}")
     if not np.isfinite(xi).all():
         raise ValueError("xi must be finite")
-    k, turn = _coefficients(xi[..., 2] + 0j)
-    mean = turn[..., k == 0].real
-    swing = np.where(k == 0, 0.0, turn / np.where(k == 0, 1, 1j * k))
-    n = xi.shape[-2]
-    periodic = _values(swing, k, n).real
-    periodic = periodic - periodic[..., :1]
-    _, wave = _coefficients(np.exp(1j * periodic) * (xi[..., 0] + 1j * xi[..., 1]))
-    return _Spectrum(mean, k, wave, swing)
+    waves, swing = _waves(xi.shape[-2]), turning(xi)
+    wave = waves.of(np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1]))
+    return _Spectrum(xi[..., 2].mean(-1, keepdims=True), waves.k, wave)
 
 
 def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
-    """sum_k c_k e^(i k t) at the n phases: the inverse of `_coefficients`."""
+    """sum_k c_k e^(i k t) at the n phases: the inverse of `_Waves.of`."""
     folded = np.zeros((*c.shape[:-1], n), complex)
     np.add.at(folded, (..., k % n), c)
     return np.fft.ifft(folded, axis=-1) * n
-
-
-def _coefficients(f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Wave numbers -K .. K and Fourier coefficients of samples (..., N); the highest of an even N is shared by +-K."""
-    n = f.shape[-1]
-    half = n // 2
-    k = np.arange(-half, half + 1)
-    c = np.fft.fft(f, axis=-1)[..., k % n] / n
-    if n % 2 == 0:
-        c[..., [0, -1]] *= 0.5
-    return k, c
 
 
 def slopes(xi) -> tuple[np.ndarray, np.ndarray]:

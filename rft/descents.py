@@ -15,6 +15,7 @@ LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body 
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
 LENGTHEN = 2.0  # the next part to try, after a success
 CROWDED = 0.65  # of samples that go on, below which those that have ended leave the arrays
+FEW = 512  # elements x samples, of which fewer take no less time
 
 
 class Descent(NamedTuple):
@@ -37,12 +38,14 @@ class Descending:
 
     def run(self, share: np.ndarray, stop, together: int) -> None:
         """Solve the samples ``share``, so many side by side: as some end, others come."""
-        queue, state = np.array_split(share, math.ceil(2 * share.size / together)), None
+        queue, state, ended = np.array_split(share, math.ceil(2 * share.size / together)), None, []
         while (queue or state is not None) and not stop.is_set():
             while queue and (state is None or state.of.size <= together // 2):
                 fresh = self._start(self.problem.samples(queue.pop()))
                 state = fresh if state is None else State.join([state, fresh], self.problem.model)
-            state = self._advance(state)
+            state = self._advance(state, ended)
+            if ended and (state is None or state.v[0].size > FEW):
+                self._write(ended)
 
     def _start(self, of: Samples) -> State:
         """The first step from rest: the guess, or the viscous solution, which is a dry law rounded off without end."""
@@ -52,23 +55,28 @@ class Descending:
         at_rest, worst, steps = np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int)
         return State(of, at_rest, dx, of.motion.v, eps, eps, np.ones(size), worst, steps, np.ones(size, bool))
 
-    def _advance(self, s: State) -> State | None:
-        """One step of all samples; those that end are written and leave. None when none are left."""
-        kept = self._step(s)
-        ended = (s.residual <= self.limit) & (s.eps <= self.last)
-        ended &= kept
-        ended |= s.iterations >= self.descent.budget
-        ended &= s.going
-        if np.count_nonzero(ended):
-            self._write(s, np.flatnonzero(ended))
-            s.going = s.going & ~ended
-            left = np.flatnonzero(s.going)
-            if left.size < CROWDED * s.of.size:
-                s = s.take(left)
-        return s if s.of.size else None
+    def _advance(self, s: State, ended: list) -> State | None:
+        """One step of all samples; those that end leave, for ``ended``. None when none are left."""
+        net, slope, kept = self._step(s)
+        done = (s.residual <= self.limit) & (s.eps <= self.last)
+        done &= kept
+        done |= s.iterations >= self.descent.budget
+        done &= s.going
+        left = s.going
+        if np.count_nonzero(done):
+            some = np.flatnonzero(done)
+            ended.append([x[..., some] for x in (s.of.index, s.xi, s.v, s.eps, s.residual, s.iterations)])
+            s.going = left = s.going & ~done
+            if not np.count_nonzero(left):
+                return None
+        dx = self._next_step(s, net, slope, kept)
+        s.dx = dx if np.count_nonzero(kept) == kept.size else np.where(kept, dx, 0.5 * s.dx)
+        crowded = s.v[0].size > FEW and np.count_nonzero(left) < CROWDED * s.of.size
+        return s.take(np.flatnonzero(left)) if crowded else s
 
-    def _step(self, s: State) -> np.ndarray:
-        """Try the step of every sample, keep it where it helps, choose the next. Returns the mask of samples kept."""
+    def _step(self, s: State) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+        """Try the step of every sample and keep it where it helps. What it came to (`rft.newton.Balance.net`), and the mask of
+        samples kept."""
         xi, v = s.xi + s.dx, s.of.motion.carried(s.dx)
         v += s.v
         net, slope = self.problem.net(s.of, v, xi, s.eps_next, with_slope=True)
@@ -84,9 +92,7 @@ class Descending:
             stride = np.where(kept, stride, 0.5 * s.stride)
             xi, v, residual = (np.where(kept, a, b) for a, b in ((xi, s.xi), (v, s.v), (residual, s.residual)))
         s.xi, s.v, s.residual, s.stride = xi, v, residual, stride
-        dx = self._next_step(s, net, slope, kept)
-        s.dx = dx if all_kept else np.where(kept, dx, 0.5 * s.dx)
-        return kept
+        return net, slope, kept
 
     def _next_step(self, s: State, net, slope, kept) -> np.ndarray:
         """Newton's step, and for samples that go on to the next level the change dx/d(eps) brings."""
@@ -111,10 +117,12 @@ class Descending:
         size2 = (x - s.of.centre[1] * turn) ** 2 + (y + s.of.centre[0] * turn) ** 2 + turn * turn
         return dx * (LARGEST_STEP / np.sqrt(np.maximum(size2, LARGEST_STEP**2)))
 
-    def _write(self, s: State, ended: np.ndarray) -> None:
-        # A balance with wider rounding is not the one that was asked for.
-        residual = np.where(s.eps[ended] <= self.last, s.residual[ended], np.inf)
-        self.wrote(s.of.index[ended], s.xi[:, ended], residual, s.iterations[ended], slowest(s.v[..., ended]))
+    def _write(self, ended: list) -> None:
+        """Tell of samples that have ended, and forget them."""
+        index, xi, v, eps, residual, iterations = (np.concatenate(x, -1) for x in zip(*ended))
+        ended.clear()
+        residual[eps > self.last] = np.inf  # a balance with wider rounding is not the one that was asked for
+        self.wrote(index, xi, residual, iterations, slowest(v))
 
 
 def slowest(v: np.ndarray) -> np.ndarray:

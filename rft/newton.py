@@ -183,7 +183,7 @@ class Balance:
 
     def residual(self, net: np.ndarray, of: Samples) -> np.ndarray:
         """(B,): the larger of force and moment about the mean place, from those on the frame (3, B)."""
-        force = np.sqrt(net[0] * net[0] + net[1] * net[1])
+        force = np.hypot(net[0], net[1])
         moment = net[2] - of.centre[0] * net[1] + of.centre[1] * net[0]
         return np.maximum(force, np.abs(moment)) / of.unit
 
