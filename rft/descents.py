@@ -15,7 +15,7 @@ LARGEST_STEP = 3.0  # of the body's mean place and heading, per radian: no body 
 SHORTEST = 2.0**-12  # part of a Newton step that is taken whether it helps or not
 LENGTHEN = 2.0  # the next part to try, after a success
 CROWDED = 0.65  # of samples that go on, below which those that have ended leave the arrays
-FEW = 512  # elements x samples, of which fewer take no less time
+FEW = 200  # elements x samples, of which fewer take no less time
 
 
 class Descent(NamedTuple):

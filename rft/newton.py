@@ -34,7 +34,7 @@ COMPILED_WORTH = 512  # samples from which on another thread pays
 keep_freed_memory()
 
 
-QUICK = Descent(0.01, 0.3, 0.1, 3.0, 48)
+QUICK = Descent(0.01, 0.4, 0.1, 4.0, 48)
 WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
 # Walks along a curve: size of a step's first correction, evaluations allowed. A force law alone needs no more than these;
 # the slow descents are for effects, and quadrature rules, with kinks of their own that no rounding takes away.

@@ -14,7 +14,7 @@ from geomech import connection
 from geomech.gaits import Butterfly, Circle, Sine
 from geomech.scene import load
 from geomech.study.bench import Study
-from geomech.systems.swimmer import Swimmer
+from geomech.systems import Solver, Swimmer
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Backbone, Chain, Transient, body_velocity, time_steps
 
@@ -39,7 +39,8 @@ def in_turn(asked: dict, rounds: int = 5) -> dict[str, float]:
 
 
 def test_against_a_loop_of_fsolve():
-    """The built-in field (a quarter of it solved, the rest by symmetry), all of it, a gait of 64 phases, a single velocity."""
+    """The built-in field (a quarter of it solved, the rest by symmetry), all of it, a gait of 64 phases by symmetry, with its
+    displacement, and all of its phases solved, a single velocity."""
     alpha, alphadot = (x.reshape(-1, 2) for x in field_samples())
     some = np.random.default_rng(0).choice(len(alpha), 100, replace=False)
     gait = Circle().cycle(64)
@@ -58,8 +59,13 @@ def test_against_a_loop_of_fsolve():
                 name = f"{what}, {NAMES[how]}, {threads} core{'s' * (threads > 1)}"
                 solve = lambda how=how, threads=threads, known=known: field(how, threads, **known)
                 asked[name], samples[name] = solve, len(alpha)
-        for name, (a, d) in {"gait of 64 phases": gait, "one velocity": (gait[0][3], gait[1][3])}.items():
-            solve = lambda a=a, d=d, how=how: [body_velocity(GLASS, MIDDLE, a, d, backend=how) for _ in range(CALLS)]
+        swimmer = Swimmer(GLASS, MIDDLE, solver=Solver(backend=how))
+        for name, f, (a, d) in (
+            ("gait of 64 phases, its displacement", swimmer.run, gait),
+            ("gait of 64 phases, all solved", swimmer.solve, gait),
+            ("one velocity", swimmer.solve, (gait[0][3], gait[1][3])),
+        ):
+            solve = lambda f=f, a=a, d=d: [f(a, d) for _ in range(CALLS)]
             asked[f"{name}, {NAMES[how]}"], samples[f"{name}, {NAMES[how]}"] = solve, CALLS * a[..., 0].size
     for f in asked.values():
         f()  # loads what is loaded once
