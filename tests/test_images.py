@@ -119,7 +119,7 @@ def test_the_table_says_what_it_took():
             for tier in (TIERS["path"], TIERS["harmonic"]):
                 seen.clear()
                 tier.table(swimmer, scene.numerics)
-                assert sum(seen) == tier.solves(swimmer, scene.numerics, 1, 8)
+                assert sum(seen) == tier.solves(swimmer, scene.numerics, scene.gait, 1, 8)
 
 
 ELLIPSE = Fourier(cos=((0.4,), (0.0,)), sin=((0.0,), (0.7,)))  # its second half is the first in a mirror, and no more

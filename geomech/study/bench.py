@@ -103,7 +103,7 @@ class Study:
         if progress:
             return how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
         s = self.scene
-        solves = how.solves(s.system, s.numerics, 1, s.numerics.phases)
+        solves = how.solves(s.system, s.numerics, s.gait, 1, s.numerics.phases)
         with shown(f"{how.looks_up} of {s.name}, {solves:,} force balances", bar=False) as bar:
             return how.table(s.system, s.numerics, *reach, progress=bar)
 

@@ -55,8 +55,11 @@ def cheapest(
         pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
         phases = settings["phases"]
     around = lambda m: TIERS[m].around(system, scene.numerics)
-    solves = lambda m: (TIERS[m].along if around(m) else TIERS[m].solves)(
-        system, scene.numerics, len(amplitudes), phases
+    asked = len(amplitudes), phases
+    solves = lambda m: (
+        TIERS[m].along(system, scene.numerics, *asked)
+        if around(m)
+        else TIERS[m].solves(system, scene.numerics, gait, *asked)
     )
     for method in sorted(study.lookups, key=solves):
         if solves(method) >= solves("direct"):

@@ -21,6 +21,7 @@ from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.tiers import TIERS
+from geomech.tiers.base import solved
 from geomech.tiers.path import axes
 
 LONGEST = 60.0  # s of computing that a command takes up without being told to
@@ -150,16 +151,11 @@ def direct(
     group = min(max(1, count), together, system.at_once(phases))
     held = group * (60 * system.elements + system.held) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
-    solves = (lambda n: n) if stepping or every else (lambda n: _solved(system, gait, n))
-    solved = _refined(scene, solves, phases) if checked else solves(phases)
+    solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
+    asked = _refined(scene, solves, phases) if checked else solves(phases)
     if stepping:
-        return [Job("steps", scene, gait, solved * count / group, group, memory=memory)]
-    return [Job("balances", scene, gait, solved * count, memory=memory)]
-
-
-def _solved(system, gait: Gait, phases: int) -> int:
-    """Phases of a gait that are no images of others."""
-    return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
+        return [Job("steps", scene, gait, asked * count / group, group, memory=memory)]
+    return [Job("balances", scene, gait, asked * count, memory=memory)]
 
 
 def _refined(scene: Scene, solves: Callable, phases: int) -> float:
@@ -179,7 +175,7 @@ def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
     if not family:
         how.axes(system, n)  # refuses a field that is too large
     memory = BASE + 8 * TABLES * how.size(system, n)
-    return Job("balances", scene, gait if family else None, how.solves(system, n, 1, n.phases), memory=memory)
+    return Job("balances", scene, gait if family else None, how.solves(system, n, gait, 1, n.phases), memory=memory)
 
 
 def of_planes(scene: Scene, count: int) -> list[Job]:

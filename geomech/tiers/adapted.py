@@ -9,7 +9,7 @@ import numpy as np
 from geomech import family
 from geomech.errors import real_array
 from geomech.systems.base import SHAPE_ALONE
-from geomech.tiers.base import Tier
+from geomech.tiers.base import Tier, solved
 
 
 class Adapted(Tier):
@@ -32,10 +32,11 @@ class Adapted(Tier):
         if least == largest:  # rest, and nothing else
             return family.Family(gait, np.zeros(1), np.zeros((1, numerics.phases // 2, 3)))
         count, phases = numerics.curves, numerics.phases // 2
-        return family.fit(system.velocity, gait, largest, count, phases, progress, least=least)
+        velocity = lambda alpha, alphadot: system.run(alpha, alphadot).xi
+        return family.fit(velocity, gait, largest, count, phases, progress, least=least)
 
-    def solves(self, system, numerics, count, phases) -> int:
-        return numerics.curves * (numerics.phases // 2)
+    def solves(self, system, numerics, gait, count, phases) -> int:
+        return numerics.curves * solved(system, gait, numerics.phases // 2)
 
     def size(self, system, numerics) -> int:
         return numerics.curves * (numerics.phases // 2) * 3

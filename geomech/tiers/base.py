@@ -112,8 +112,8 @@ class Tier:
     def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None) -> Any:
         """What is computed once for a system; None for nothing."""
 
-    def solves(self, system: System, numerics: Numerics, count: int, phases: int) -> int:
-        """Velocities that it asks for in all: its cost, look-ups being cheap beside it."""
+    def solves(self, system: System, numerics: Numerics, gait: Gait, count: int, phases: int) -> int:
+        """Velocities that it asks for in all, for ``count`` amplitudes of a gait: its cost, look-ups being cheap beside it."""
         raise NotImplementedError
 
     def size(self, system: System, numerics: Numerics) -> int:
@@ -131,6 +131,11 @@ class Tier:
     def choice(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray | None:
         """(B, 2), body lengths and rad: how far positions and headings at amplitudes (B,) hang on what is no part of the
         question, as a spanning surface; None where there is nothing to choose."""
+
+
+def solved(system: System, gait: Gait, phases: int) -> int:
+    """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
+    return phases if system.steps else system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

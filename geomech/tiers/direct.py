@@ -10,7 +10,7 @@ from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.reconstruct import displacement
 from geomech.systems.base import NONE
-from geomech.tiers.base import Tier, in_groups
+from geomech.tiers.base import Tier, in_groups, solved
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -36,8 +36,8 @@ class Direct(Tier):
     colour = "black"
     rests_on = NONE
 
-    def solves(self, system, numerics, count, phases) -> int:
-        return count * phases
+    def solves(self, system, numerics, gait, count, phases) -> int:
+        return count * solved(system, gait, phases)
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         phases = numerics.phases

@@ -121,7 +121,7 @@ class Path(Tier):
             axes(system, numerics), self.directions(system, numerics), numerics.interpolation, progress
         )
 
-    def solves(self, system, numerics, count, phases) -> int:
+    def solves(self, system, numerics, gait, count, phases) -> int:
         directions = self.directions(system, numerics)
         return shapes(system, numerics, directions if system.reversible else 0) * directions
 
