@@ -9,6 +9,7 @@ from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
 from geomech.systems.base import ALL
 from geomech.tiers import TIERS
+from geomech.tiers.base import solved
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -28,6 +29,9 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
     lines.append(f"engine: {system.engine} {system.because}")
+    phases = scene.numerics.phases
+    if (count := solved(system, scene.gait, phases)) < phases:
+        lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
     by_name = [name for name, tier in TIERS.items() if _by_name(tier, system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
     return "\n".join([*lines, *_lost(system)])
