@@ -165,10 +165,13 @@ def test_the_geometers_pipeline():
     assert a_loop > 10 * ours
 
 
-def test_a_sweep_of_ten_thousand_points_on_two_cores(tmp_path):
+@pytest.mark.parametrize("over", [
+    ["medium.C=1:3:100", "medium.gamma0=0.15:0.4:100"],
+    ["gait.amplitude=0.2:2:20", "medium.C=1:3:25", "medium.gamma0=0.15:0.4:20"],
+], ids=["media", "media at 20 amplitudes"])  # fmt: skip
+def test_a_sweep_of_ten_thousand_points_on_two_cores(over, tmp_path):
     """By processes against one: wall-clock time, which hangs on who else is at work, and by computing alone, of which two cores
-    could do no better than half."""
-    over = ["gait.amplitude=0.2:2:20", "medium.C=1:3:25", "medium.gamma0=0.15:0.4:20"]
+    could do no better than half. Amplitudes share a batch, and so little is left that a second process would not help."""
     args = [
         sys.executable,
         "-m",

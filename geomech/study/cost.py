@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech import workers
 from geomech.connection import SAMPLES_TOGETHER
 from geomech.errors import SceneError
 from geomech.gaits import Gait
@@ -27,7 +28,7 @@ from geomech.tiers.path import axes
 LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
-PILOT = 0.15  # s after which a pilot has seen enough
+PILOT = 0.1  # s after which a pilot has seen enough
 FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
 SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
 POWER = 0.15  # of a balance, that its power takes
@@ -241,17 +242,19 @@ def _per_step(job: Job, count: float) -> tuple[float, int]:
         found = system.time_steps(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    cycles = time_steps(1, system.solver.cycles and 1)[0]  # also loads what the first steps load
-    return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or cycles
+    with workers.one_way(workers.MANY):
+        cycles = time_steps(1, system.solver.cycles and 1)[0]  # also loads what the first steps load
+        return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or cycles
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:
-    """Seconds a sample that f(samples) takes, for as many as it takes to tell."""
-    f(samples)  # loads what the first call loads
-    while True:
-        start = time.process_time()
-        f(samples)
-        took = time.process_time() - start
-        if took > PILOT or samples >= most:
-            return took / samples
-        samples *= 2 if took > PILOT / 4 else 4
+    """Seconds a sample that f(samples) takes by the back end of large requests, for as many as it takes to tell."""
+    with workers.one_way(workers.MANY):
+        f(samples)  # loads what the first call loads
+        while True:
+            start = time.process_time()
+            f(samples)
+            took = time.process_time() - start
+            if took > PILOT or samples >= most:
+                return took / samples
+            samples *= 2 if took > PILOT / 4 else 4

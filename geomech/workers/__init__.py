@@ -23,7 +23,7 @@ from geomech.workers.solving import at_hand, cores, settled, settled_on
 
 __all__ = ["alone", "each", "far", "one_way", "settle", "shared", "using"]
 
-WORTH = 2.0  # s of computing, below which other processes are not worth their start: half a second of each
+WORTH = 3.0  # s of computing, below which other processes are not worth their start: a second of each
 MANY = 4  # parts of a request, from which on "auto" takes compiled code at once, where it lies ready
 MOST = 1024  # processes
 
