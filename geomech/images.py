@@ -104,7 +104,8 @@ def around(alpha: np.ndarray, alphadot: np.ndarray, mirror: bool, reversible: bo
     half, moving, turned = phases // 2, sizes[1].argmax() if len(path) else 0, ()
     same = lambda x, y: bool(np.abs(x - y).max(initial=0.0) <= SAME)
     shifted = mirror and phases % 2 == 0 and same(path[:, half:], -path[:, :half])
-    for sign in (-1.0, 1.0)[: (2 if mirror and not shifted else 1) if reversible and len(path) else 0]:
+    ways = (-1.0, 1.0) if mirror and not shifted else (-1.0,)  # where the halves are images each follows from the other
+    for sign in ways if reversible and len(path) else ():
         seen = sign * np.concatenate([path[..., joints - 1 :: -1], -path[..., : joints - 1 : -1]], -1)
         first = int(np.abs(path[moving] - seen[moving, 0]).max(-1).argmin())
         if same(path[:, (first - np.arange(phases)) % phases], seen):
