@@ -135,7 +135,9 @@ class Tier:
 
 def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
-    return phases if system.steps else system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
+    if system.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
+        return phases
+    return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
