@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).parents[1]
 KNOW_MECHANICS = {
     "__init__.py", "commands/scenes.py", "commands/stress.py", "kinds.py", "scene/intruder.py", "scene/intruding.py",
     "scene/solid.py", "scene/walker.py", "scene/write.py", "study/batch.py", "study/calibration.py",
-    "study/stress_calibration.py", "study/sweep.py", "study/walking.py", "workers/solving.py",
+    "study/stress_calibration.py", "study/walking.py", "workers/solving.py",
 }  # fmt: skip
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 from geomech import terminal
@@ -68,6 +70,35 @@ def loaded_walker(name: str):
     if not isinstance(scene, WalkerScene):
         raise SceneError(f"{name}: a scene without a [robot] does not walk: see 'geomech scenes' for those that do")
     return scene
+
+
+@contextlib.contextmanager
+def keeping(scene, output: Path | None, large: bool = True, **asked) -> Iterator[None]:
+    """In the body of the statement what is computed side by side is kept beside the output, a file or a folder, and is taken up
+    where it was stopped; at its end nothing is kept any more. asked: all that it is asked for, but for where the results go.
+    Of what is only printed, None, it is kept in the current folder if it is ``large``. SceneError while another computation
+    to the same output is under way."""
+    from geomech import workers
+    from geomech.files import refuse_inputs
+    from geomech.scene import inputs
+    from geomech.study import kept
+    from geomech.study.parts import Parts, asking
+
+    question = asking(scene, **asked)
+    place = kept.printed(question) if output is None else kept.stands_for(output)
+    with contextlib.ExitStack() as stack:
+        partial = None
+        if output is not None or large or kept.beside(place, question).exists():
+            with contextlib.nullcontext() if output else contextlib.suppress(SceneError):  # two may print the same
+                stack.enter_context(kept.alone(place, "computation"))
+                partial = kept.beside(place, question)
+                refuse_inputs([partial], inputs(scene))
+        if partial is None:
+            yield
+            return
+        with Parts(partial, question) as parts, workers.keeping(parts):
+            yield
+        partial.unlink(missing_ok=True)
 
 
 def field(

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field, loaded, planes
+from geomech.commands.asked import beside_field, field, keeping, loaded, planes
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -49,35 +49,44 @@ def ccf(
     if metric and style not in (None, "map"):
         raise SceneError(f"--metric draws on a map: drop --style {style}")
     scene = loaded(name, grid, extent)
-    if scene.system.joints > 2 or pair is not None or slice_ is not None:
-        if metric or stretch:
-            raise SceneError("--metric and --stretch are those of two joints: drop them for slices")
-        plots.save(_slices(scene, plot, style or "map", (pair, slice_), beside, yes), plot)
-        return
-    study = field(name, grid, extent, plot, plot, True, yes, with_gait=True, metric=metric or stretch)
+    sliced = scene.system.joints > 2 or pair is not None or slice_ is not None
+    if sliced and (metric or stretch):
+        raise SceneError("--metric and --stretch are those of two joints: drop them for slices")
+    check_outputs(scene, None, plot)
+    asked = {"metric": metric or stretch, "pair": pair, "slice": slice_, "beside": beside}
+    with keeping(scene, plot, command="ccf", **asked):
+        if sliced:
+            maps = _slices(scene, style or "map", (pair, slice_), beside, yes)
+        else:
+            study = field(name, grid, extent, plot, plot, True, yes, with_gait=True, metric=metric or stretch)
+            maps = _map(study, style, stretch, metric, beside, yes)
+        plots.save(maps, plot)
+
+
+def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | None, yes: bool):
+    """The figure of the CCF of two joints that a field has."""
+    from geomech.output import plots
+
     system, told = study.scene.system, {"gaits": [study.scene.gait], "unit": study.scene.system.unit}
     told |= {"error": study.curvature_error, "labels": system.shape_labels}
     if stretch:
         from geomech.stretch import stretch as redrawn
 
         plane, effort = redrawn(study.metric), "BL" if system.power_degree == 1 else "path length"
-        maps = plots.stretched_figure(study.curvature, plane, **told, effort=effort)
-    else:
-        told |= {"style": style or "map", "metric": study.metric if metric else None}
-        if beside is not None:
-            other = beside_field(study, beside, yes)
-            told |= {"beside": (other.curvature, other.curvature_error), "names": [study.scene.frame, beside]}
-        maps = plots.ccf_figure(study.curvature, **told)
-    plots.save(maps, plot)
+        return plots.stretched_figure(study.curvature, plane, **told, effort=effort)
+    told |= {"style": style or "map", "metric": study.metric if metric else None}
+    if beside is not None:
+        other = beside_field(study, beside, yes)
+        told |= {"beside": (other.curvature, other.curvature_error), "names": [study.scene.frame, beside]}
+    return plots.ccf_figure(study.curvature, **told)
 
 
-def _slices(scene, plot: Path, style: str, asked: tuple, beside: str | None, yes: bool):
+def _slices(scene, style: str, asked: tuple, beside: str | None, yes: bool):
     """The figure of `planes_figure` that a scene is asked for."""
     from geomech.output import plots
     from geomech.study.bench import Study
 
     study, system = Study(scene), scene.system
-    check_outputs(scene, None, plot)
     found, told = planes(study, *asked, yes), {"unit": system.unit, "labels": system.shape_labels, "style": style}
     if beside is not None:
         if len(found) > 1:

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field, loaded, planes
+from geomech.commands.asked import beside_field, field, keeping, loaded, planes
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -57,24 +57,26 @@ def connection(
         choose("--style", style, plots.CONNECTION_STYLES)
     scene = loaded(name, grid, extent)
     sliced = plot and (scene.system.joints > 2 or pair is not None or slice_ is not None)
-    if sliced:
-        if beside is not None:
-            raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
-        check_outputs(scene, out, plot)
-        found = planes(Study(scene), pair, slice_, yes)
-    study = field(name, grid, extent, out, plot, out.suffix == ".mat", yes, harmonics=out.suffix == ".nc")
-    if out.suffix == ".nc":
-        netcdf.save_connection(out, study)
-    else:
-        mat.save_connection(out, study, sign or "+", order or "ndgrid")
-        if not sign:
-            note(f"{out} has {SIGNS['+']}; --sign - gives the other")
-    if plot:
-        system = study.scene.system
-        told = {"labels": system.shape_labels, "style": style or "quiver"}
+    if sliced and beside is not None:
+        raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
+    check_outputs(scene, out, plot)
+    asked = {"file": out.suffix, "plot": plot is not None, "pair": pair, "slice": slice_, "beside": beside}
+    with keeping(scene, out, command="connection", **asked):
         if sliced:
-            plots.save(plots.plane_connection_figure(found, system.unit, **told), plot)
-            return
-        if beside is not None:
-            told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
-        plots.save(plots.connection_figure(study.fitted, system.unit, **told), plot)
+            found = planes(Study(scene), pair, slice_, yes)
+        study = field(name, grid, extent, out, plot, out.suffix == ".mat", yes, harmonics=out.suffix == ".nc")
+        if out.suffix == ".nc":
+            netcdf.save_connection(out, study)
+        else:
+            mat.save_connection(out, study, sign or "+", order or "ndgrid")
+            if not sign:
+                note(f"{out} has {SIGNS['+']}; --sign - gives the other")
+        if plot:
+            system = study.scene.system
+            told = {"labels": system.shape_labels, "style": style or "quiver"}
+            if sliced:
+                plots.save(plots.plane_connection_figure(found, system.unit, **told), plot)
+                return
+            if beside is not None:
+                told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
+            plots.save(plots.connection_figure(study.fitted, system.unit, **told), plot)

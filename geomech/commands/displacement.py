@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, keeping, loaded
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -54,8 +54,11 @@ def displacement(
         more = cost.of_effort(scene, len(values)) if effort else []
         if tol is None:
             study = Study(scene)
-            allow(scene, study.cost(values, chosen or study.methods, more=more), yes)
-            table = study.study(values, chosen or study.methods, progress=bar)
+            takes = study.cost(values, chosen or study.methods, more=more)
+            allow(scene, takes, yes)
+            asked = {"command": "displacement", "amplitudes": values, "methods": chosen}
+            with keeping(scene, plot, not takes.small, **asked):
+                table = study.study(values, chosen or study.methods, progress=bar)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
         else:

@@ -9,7 +9,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, keeping, loaded
 from geomech.commands.options import (
     JsonOption,
     PlotOption,
@@ -53,14 +53,17 @@ def optimize(
     if stretch:
         refuse_stretch(scene, plot)
     check_outputs(scene, out, plot)
-    allow(scene, request.cost(), yes)
-    with terminal.progress(f"{aim} of {scene.name}") as bar:
-        found = search(request, bar)
-    if plot:
-        plots.save(plots.optimum_figure(found, stretch), plot)
-    if out:
-        with whole_file(out) as part:
-            part.write_text(optima.scene_toml(found), encoding="utf-8")
+    cost = request.cost()
+    allow(scene, cost, yes)
+    asked = {"for": aim, "direction": direction, "harmonics": harmonics, "within": within, "starts": starts}
+    with keeping(scene, out or plot, not cost.small, command="optimize", **asked, rate=rate, power=power):
+        with terminal.progress(f"{aim} of {scene.name}") as bar:
+            found = search(request, bar)
+        if plot:
+            plots.save(plots.optimum_figure(found, stretch), plot)
+        if out:
+            with whole_file(out) as part:
+                part.write_text(optima.scene_toml(found), encoding="utf-8")
     print(json.dumps(found.numbers()) if as_json else optima.text(found))
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, keeping, loaded
 from geomech.commands.names import scene_names
 from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
 from geomech.files import whole_folder
@@ -34,7 +34,8 @@ def run(
 
     scene = loaded(name, medium=medium)
     report.refuse_folder(scene, out, inputs(scene))
-    with whole_folder(out, inputs(scene)) as folder, terminal.progress(f"field of {scene.name}") as bar:
+    told = terminal.progress(f"field of {scene.name}")
+    with keeping(scene, out, command="run"), whole_folder(out, inputs(scene)) as folder, told as bar:
         allow(scene, report.cost(scene), yes)
         tables = report.write(Study(scene), folder, bar)
     for title, table in tables.items():

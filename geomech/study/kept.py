@@ -1,8 +1,9 @@
-"""The rows of an unfinished sweep, in a file of its question's own that is believed only if it is whole, and the lock that
-keeps two sweeps from one output.
+"""What is done of an unfinished request, in a file of its question's own that is believed only if it is whole, and the lock
+that keeps two of them from one output.
 
 The file is a line of JSON, the question with its checksum, and behind it blocks of rows as they come: their number, a
-checksum, and the numbers themselves, eight bytes each. What a kill leaves of a last block is dropped.
+checksum, and the numbers themselves, eight bytes each. What a kill leaves of a last block is dropped. A sweep keeps its
+points (`Rows`), other requests what is computed side by side (`geomech.study.parts`).
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import os
 import struct
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -31,42 +32,58 @@ SAVE_EVERY = 2.0  # seconds between savings of what there is
 
 
 def beside(output: Path, question: dict) -> Path:
-    """The file that keeps what is done of the sweep to ``output`` that answers this question (JSON): ``.NAME.partial``,
-    or, where that keeps what is done of another sweep, a name of the question's own."""
-    first, key = hidden(_plain(output), ".partial"), hashlib.sha256(json.dumps(question).encode()).hexdigest()[:8]
-    own = hidden(_plain(output), f".{key}.partial")
+    """The file that keeps what is done for ``output`` of the request that answers this question (JSON): ``.NAME.partial``,
+    or, where that keeps what is done of another one, a name of the question's own."""
+    first, own = (hidden(_plain(output), ending) for ending in (".partial", f".{_key(question)}.partial"))
     return own if os.path.lexists(own) or _is_anothers(first, json.loads(json.dumps(question))) else first
 
 
+def stands_for(output: Path) -> Path:
+    """A file or, of a folder, a name in it, or where it will be, beside which is kept what is done."""
+    if output.is_dir():
+        return output / (output.resolve().name or "geomech")
+    there = next((p for p in output.parents if p.is_dir()), output.parent)
+    return there / "-".join(output.relative_to(there).parts)
+
+
+def printed(question: dict) -> Path:
+    """Likewise, for what goes into no file."""
+    return Path(f"geomech-{_key(question)}")
+
+
 def is_second(output: Path, partial: Path) -> bool:
-    """Whether another unfinished sweep to ``output`` has taken the usual name of what is kept."""
+    """Whether another unfinished request for ``output`` has taken the usual name of what is kept."""
     first = hidden(_plain(output), ".partial")
     return partial != first and os.path.lexists(first)
 
 
+def _key(question: dict) -> str:
+    return hashlib.sha256(json.dumps(question).encode()).hexdigest()[:8]
+
+
 def _is_anothers(path: Path, question: dict) -> bool:
-    """Whether a file keeps, undamaged, what is done of another sweep; that of another version is none."""
+    """Whether a file keeps, undamaged, what is done of another request; that of another version is none."""
     try:
         with _opened(path, "rb") as file:
             found = _head(file)["question"]
-        return any(found[key] != question[key] for key in {*question} - VERSIONS)
+        return any(found.get(key) != question[key] for key in {*question} - VERSIONS)
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError):
         return False
 
 
 @contextlib.contextmanager
-def alone(output: Path):
-    """Hold the lock of sweeps to ``output``: SceneError while another process has it. It is freed however its owner ends;
-    where the file system has no locks nothing is held."""
+def alone(output: Path, what: str = "sweep"):
+    """Hold the lock of what is computed for ``output``: SceneError while another process has it. It is freed however its
+    owner ends; where the file system has no locks nothing is held."""
     path = hidden(_plain(output), ".lock")
     with contextlib.ExitStack() as stack:
         try:
             held = stack.enter_context(locked(path))
         except OSError as error:
-            raise SceneError(f"cannot keep a sweep beside {output}: {why(error)}; choose another -o") from None
+            raise SceneError(f"cannot keep a {what} beside {output}: {why(error)}; choose another -o") from None
         if not held:
             raise SceneError(
-                f"another sweep to {output} is under way: wait for it, stop it, or choose another output with -o"
+                f"another {what} to {output} is under way: wait for it, stop it, or choose another output with -o"
             )
         yield
 
@@ -75,51 +92,72 @@ def _plain(output: Path) -> Path:
     return output.resolve() if ".." in output.parts else output
 
 
-class Rows:
-    """The rows done so far of a sweep, (total, width) when all are, saved to ``path`` every now and then, and when computing
-    ends for whatever reason. settled: the back end they are computed by, `geomech.workers.settle`; that of what is taken
-    up goes on."""
+class Kept:
+    """What is done so far of a request, saved to ``path`` every now and then. settled: the back end that computes it,
+    `geomech.workers.settle`; that of what is taken up goes on. count, saved: how much is done, and is in the file."""
+
+    what = "request"
+    count = saved = end = 0  # end: bytes of the file that are believed
+
+    def __init__(self, path: Path | None, question: dict, settled: str = ""):
+        self.path, self.question, self.settled, self.told = path, question, settled, False
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def unsaved(self) -> Sequence[np.ndarray]:
+        """What is done and not in the file, as blocks."""
+        raise NotImplementedError
+
+    def forget(self, end: int) -> None:
+        """All of it is in the file, which ends there. No signal comes between the two."""
+        self.end, self.saved = end, self.count
+
+    def save(self, always: bool = False) -> None:
+        """What there is, if it is time. A disk that is full now is no reason to lose what is computed."""
+        if not (always or time.monotonic() > self.due):
+            return
+        if self.path and (blocks := self.unsaved()):
+            try:
+                if not self.end:
+                    self.end = begin(self.path, self.question, self.settled)
+                self.forget(append(self.path, self.end, *blocks))
+            except (SceneError, OSError) as error:
+                if not self.told:
+                    note(f"what is done of the {self.what} is not kept: {error}")
+                self.told = True
+        self.due = time.monotonic() + SAVE_EVERY
+
+    def __enter__(self):
+        return self
+
+
+class Rows(Kept):
+    """The rows done so far of a sweep, (total, width) when all are, saved whenever computing ends, for whatever reason."""
+
+    what = "sweep"
 
     def __init__(self, path: Path | None, question: dict, total: int, settled: str = "", width: int = WIDTH):
-        self.path, self.total, self.told = path, total, False
-        self.question, self.settled, done = question, settled, np.zeros((0, width))
-        self.end = 0  # bytes of the file that are believed
+        super().__init__(path, question, settled)
+        self.total, done = total, np.zeros((0, width))
         if path is not None:
             self.settled, done, self.end = taken_up(path, question, total, width) or (settled, done, 0)
         self.values = np.empty((total, width))
         self.values[: len(done)] = done
         self.count = self.saved = len(done)
-        self.due = time.monotonic() + SAVE_EVERY
 
     def __len__(self) -> int:
         return self.count
+
+    def unsaved(self) -> list[np.ndarray]:
+        return [self.values[self.saved : self.count]] if self.count > self.saved else []
 
     def add(self, rows) -> None:
         rows = np.asarray(rows, float)
         self.values[self.count : self.count + len(rows)] = rows
         self.count += len(rows)
-        if time.monotonic() > self.due:
-            self._save()
-
-    def _save(self) -> None:
-        """A disk that is full now is no reason to lose what is computed."""
-        if self.path and self.count > self.saved:
-            try:
-                if not self.end:
-                    self.end = begin(self.path, self.question, self.settled)
-                self.end = append(self.path, self.end, self.values[self.saved : self.count])
-                self.saved = self.count
-            except (SceneError, OSError) as error:
-                if not self.told:
-                    note(f"what is done of the sweep is not kept: {error}")
-                self.told = True
-        self.due = time.monotonic() + SAVE_EVERY
-
-    def __enter__(self) -> Rows:
-        return self
+        self.save()
 
     def __exit__(self, kind, error, _) -> None:
-        self._save()
+        self.save(always=True)
         if error and self.path and self.saved:
             told = f"{self.saved} of {self.total} points are kept in {self.path}: the same command goes on from there"
             error.add_note(told)
@@ -134,19 +172,25 @@ def begin(path: Path, question: dict, settled: str = "") -> int:
     return len(line)
 
 
-def append(path: Path, end: int, rows: np.ndarray) -> int:
-    """Write rows behind the first ``end`` bytes; where they end."""
-    raw = np.ascontiguousarray(rows, "<f8").tobytes()
+def append(path: Path, end: int, *blocks: np.ndarray) -> int:
+    """Write blocks of rows behind the first ``end`` bytes; where they end."""
     with _opened(path, "r+b") as file:
         file.truncate(end)
         file.seek(end)
-        file.write(BLOCK.pack(len(rows), zlib.crc32(raw)) + raw)
-    return end + BLOCK.size + len(raw)
+        for rows in blocks:
+            raw = np.ascontiguousarray(rows, "<f8").tobytes()
+            file.write(BLOCK.pack(len(rows), zlib.crc32(raw)) + raw)
+        return file.tell()
 
 
 def taken_up(path: Path, question: dict, points: int, width: int = WIDTH) -> tuple[str, np.ndarray, int] | None:
-    """(back end, rows kept, bytes of the file that they take), of at most ``points``, for the same question; else None, and
-    what is there is set aside, with a note that says why. SceneError if it is no file, or cannot be set aside."""
+    """(back end, rows kept, bytes of the file that they take), of at most ``points``, as `read_from` has them."""
+    return read_from(path, lambda file: _believed(file, json.loads(json.dumps(question)), points, width))
+
+
+def read_from(path: Path, read: Callable[[BinaryIO], Any]) -> Any:
+    """What ``read`` makes of the file; None if there is none, or if read raises, for what is not to be believed: then it is
+    set aside, with a note that says why. SceneError if it is no file, or cannot be set aside."""
     try:
         sweep_strays(path.resolve())
         if not os.path.lexists(path):
@@ -156,11 +200,11 @@ def taken_up(path: Path, question: dict, points: int, width: int = WIDTH) -> tup
                 f"cannot keep what is done in {path}: it is no ordinary file; remove it, or choose another -o"
             )
         with _opened(path, "rb") as file:
-            return _believed(file, json.loads(json.dumps(question)), points, width)
+            return read(file)
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError) as error:
-        _set_aside(path, str(error) if type(error) is _Unbelievable else f"it is damaged ({type(error).__name__})")
+        _set_aside(path, str(error) if type(error) is Unbelievable else f"it is damaged ({type(error).__name__})")
     return None
 
 
@@ -171,7 +215,7 @@ def _opened(path: Path, mode: str) -> BinaryIO:
     return path.open(mode)
 
 
-class _Unbelievable(ValueError):
+class Unbelievable(ValueError):
     """Its text says what is wrong with a file that is kept."""
 
 
@@ -179,30 +223,36 @@ def _head(file: BinaryIO) -> dict:
     """What the first line says."""
     found = json.loads(file.readline(LARGEST))
     if found.pop("checksum") != _checksum(found):
-        raise _Unbelievable("it is damaged (checksum)")
+        raise Unbelievable("it is damaged (checksum)")
     return found
 
 
-def _believed(file: BinaryIO, question: dict, points: int, width: int) -> tuple[str, np.ndarray, int]:
+def settled_in(file: BinaryIO, question: dict) -> str:
+    """The back end of what a file keeps for this question; `Unbelievable` of another."""
     found = _head(file)
     if other := [key for key, value in question.items() if found["question"].get(key) != value]:
-        raise _Unbelievable(f"it is of another sweep ({', '.join(other)})")
+        raise Unbelievable(f"it is of another sweep ({', '.join(other)})")
     if found["settled"] not in ("", "numpy", "numba"):
-        raise _Unbelievable("its back end is unknown")
+        raise Unbelievable("its back end is unknown")
+    return found["settled"]
+
+
+def _believed(file: BinaryIO, question: dict, points: int, width: int) -> tuple[str, np.ndarray, int]:
+    settled = settled_in(file, question)
     rows, end = np.empty((points, width)), file.tell()
     done = 0
-    for count, raw in _blocks(file, width):
-        if done + count > points:
-            raise _Unbelievable("its rows are not those of this sweep")
-        rows[done : done + count] = np.frombuffer(raw, "<f8").reshape(count, width)
-        done, end = done + count, file.tell()
+    for found in blocks(file, width):
+        if done + len(found) > points:
+            raise Unbelievable("its rows are not those of this sweep")
+        rows[done : done + len(found)] = found
+        done, end = done + len(found), file.tell()
     if not np.isfinite(rows[:done]).all():
-        raise _Unbelievable("its rows are not those of this sweep")
-    return found["settled"], rows[:done], end
+        raise Unbelievable("its rows are not those of this sweep")
+    return settled, rows[:done], end
 
 
-def _blocks(file: BinaryIO, width: int) -> Iterator[tuple[int, bytes]]:
-    """(rows, their bytes) of each whole block."""
+def blocks(file: BinaryIO, width: int) -> Iterator[np.ndarray]:
+    """The rows (N, width) of each whole block, behind which the file then stands."""
     start = file.tell()
     left = file.seek(0, os.SEEK_END) - start
     file.seek(start)
@@ -213,8 +263,8 @@ def _blocks(file: BinaryIO, width: int) -> Iterator[tuple[int, bytes]]:
             return
         raw = file.read(8 * width * count)
         if zlib.crc32(raw) != checksum:
-            raise _Unbelievable("it is damaged (checksum)")
-        yield count, raw
+            raise Unbelievable("it is damaged (checksum)")
+        yield np.frombuffer(raw, "<f8").reshape(count, width)
 
 
 def _checksum(body: dict) -> str:

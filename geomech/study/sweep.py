@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -11,18 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import __version__, workers
+from geomech import workers
 from geomech.errors import SceneError, real_array, short
-from geomech.kinds import code
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.study import estimate, kept, uncertainty
 from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, of_medium, price
+from geomech.study.parts import asking
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
-from rft import SOLVER
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
@@ -189,13 +187,7 @@ def partial(scene: Scene, over: Mapping[str, list[float]], output: Path) -> Path
 
 def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
     """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
-    system = scene.system
-    of_system = {f.name: repr(getattr(system, f.name)) for f in dataclasses.fields(system) if f.name != "solver"}
-    numerics = f"{scene.numerics}, {system.solver}"
-    parts = {"system": system.kind, **of_system, "gait": repr(scene.gait), "numerics": numerics}
-    own = {"own code": code()} if code() else {}
-    over = [[name, list(x)] for name, x in values.items()]
-    return {"geomech": __version__, "solver": SOLVER, **own, "scene": scene.text, **parts, "over": over}
+    return asking(scene, over=[[name, list(x)] for name, x in values.items()])
 
 
 def _corners(outer: list[list[float]]):

@@ -21,7 +21,7 @@ from typing import Any, Protocol
 from geomech.errors import Note, SceneError, number
 from geomech.workers.solving import at_hand, cores, settled, settled_on
 
-__all__ = ["alone", "each", "far", "one_way", "settle", "shared", "using"]
+__all__ = ["alone", "each", "far", "keeping", "one_way", "settle", "shared", "using"]
 
 WORTH = 3.0  # s of computing, below which other processes are not worth their start: a second of each
 MANY = 4  # parts of a request, from which on "auto" takes compiled code at once, where it lies ready
@@ -41,7 +41,17 @@ class Crew(Protocol):
     def close(self) -> None: ...
 
 
+class Keeper(Protocol):
+    """One that keeps the results of parts. settled: the back end of those that were kept before, if any."""
+
+    settled: str
+
+    def each(self, call: tuple, back_end: str, items: Iterable, parts: int, computed: Callable) -> Iterator:
+        """Those that are kept, then computed(the other items)."""
+
+
 _crew: ContextVar[Crew | None] = ContextVar("crew", default=None)
+_keeper: ContextVar[Keeper | None] = ContextVar("keeper", default=None)
 
 
 @contextlib.contextmanager
@@ -78,6 +88,17 @@ def _called(count: int | None, scheduler: str | None) -> Crew | None:
     return Processes(int(count or cores()))
 
 
+@contextlib.contextmanager
+def keeping(keeper: Keeper | None) -> Iterator[None]:
+    """In the body of the statement results of parts are kept (`geomech.study.parts`), or none. What is asked for in it is the
+    same, in the same order, each time that the same is to be taken up."""
+    token = _keeper.set(keeper)
+    try:
+        yield
+    finally:
+        _keeper.reset(token)
+
+
 def far() -> bool:
     """Whether a cluster computes."""
     crew = _crew.get()
@@ -91,8 +112,8 @@ def settle(parts: int) -> str:
         return already
     if parts < MANY:
         return "numpy" if parts > 1 else ""
-    crew = _crew.get()
-    return crew.has() if crew else at_hand()
+    crew, keeper = _crew.get(), _keeper.get()
+    return (keeper and keeper.settled) or (crew.has() if crew else at_hand())
 
 
 @contextlib.contextmanager
@@ -109,10 +130,17 @@ def each(
     a function of a module; what cannot be sent is computed here. back_end: as `settle` gives it. seconds: what they take one
     after the other, if that is known; else the first ones tell. What is raised, a signal among others, ends all that is
     under way."""
+    keeper, items = _keeper.get(), iter(items)
+    back_end = settle(parts) if back_end is None else back_end
+    computed = lambda rest: _computed(f, common, iter(rest), parts, back_end, seconds)
+    yield from keeper.each((f, common), back_end, items, parts, computed) if keeper else computed(items)
+
+
+def _computed(f: Callable, common: Any, items: Iterator, parts: int, back_end: str, seconds: float | None) -> Iterator:
+    """As `each`."""
     from geomech.workers.task import here
 
-    crew, items = _crew.get(), iter(items)
-    back_end = settle(parts) if back_end is None else back_end
+    crew = _crew.get()
     at_home = lambda item: here(f, common, item, back_end, parts > 1)
     if crew is not None and not crew.remote:
         yield from _first(at_home, items, parts, seconds)
@@ -152,7 +180,7 @@ def _order(remote: bool, f: Callable, common: Any, back_end: str):
         if remote:
             raise SceneError(f"a cluster cannot know what is to be computed: {error}: {cure}") from None
         if error.told:
-            warnings.warn(f"computed by one process, others cannot know it: {error}: {cure}", Note, stacklevel=4)
+            warnings.warn(f"computed by one process, others cannot know it: {error}: {cure}", Note, stacklevel=5)
     return None
 
 
@@ -163,9 +191,10 @@ def shared() -> bool:
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """In the body of the statement nothing is given away: it is the work of a worker."""
+    """In the body of the statement nothing is given away, or kept by itself: it is the work of a worker."""
     token = _crew.set(None)
     try:
-        yield
+        with keeping(None):
+            yield
     finally:
         _crew.reset(token)

@@ -9,18 +9,24 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 
-from geomech.workers import shared
+from geomech.workers import keeping, shared
 
 COPIES = sys.platform == "linux"  # elsewhere frameworks of the system do not outlive a fork, or there is none
 
 
 @contextlib.contextmanager
 def aside() -> Iterator[Callable[[Callable[[], None]], None]]:
-    """A function that calls another in a copy of this process as it stands, or here and now where one process is to do all.
-    At the end of the statement all copies have done, and what one raised is raised; none outlives it."""
+    """A function that calls another in a copy of this process as it stands, or here and now where one process is to do all:
+    nothing that it computes is kept by itself. At the end of the statement all copies have done, and what one raised is
+    raised; none outlives it."""
     copies: dict[int, int] = {}  # where each tells how it ended, by its id
+
+    def beside(call: Callable[[], None]) -> None:
+        with keeping(None):
+            _copied(call, copies) if COPIES and shared() else call()
+
     try:
-        yield lambda call: _copied(call, copies) if COPIES and shared() else call()
+        yield beside
         for told in copies.values():
             _heard(told)
     finally:

@@ -204,7 +204,11 @@ def serve() -> None:
     while True:
         fresh, item = pickle.loads(inbox.get())
         order = fresh or order
-        _write(answers, perform(order, item))
+        done = perform(order, item)
+        try:
+            _write(answers, done)
+        except OSError:  # nobody is there any more
+            os._exit(0)
 
 
 def _listen(file, inbox: queue.SimpleQueue) -> None:

@@ -9,7 +9,7 @@ from geomech import __version__
 from rft import SOLVER, backend
 from rft.workers import cores, one_thread
 
-__all__ = ["VERSION", "at_hand", "cores", "modestly", "settled", "settled_on"]
+__all__ = ["SOLVER", "VERSION", "at_hand", "cores", "modestly", "settled", "settled_on"]
 
 VERSION = f"geomech {__version__}, solver {SOLVER}"
 at_hand, settled, settled_on = backend.at_hand, backend.settled, backend.settled_on
