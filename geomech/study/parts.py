@@ -13,7 +13,6 @@ import hashlib
 import itertools
 import json
 import math
-import numbers
 import os
 import re
 import zlib
@@ -29,7 +28,6 @@ from geomech.kinds import code
 from geomech.scene.model import Scene
 from geomech.scene.read import inputs
 from geomech.study import kept
-from geomech.workers import MANY
 from geomech.workers.solving import SOLVER
 
 LARGEST = 1_000_000_000  # bytes of a file; what is beyond is computed again
@@ -51,13 +49,14 @@ def asking(scene: Scene, **asked: Any) -> dict:
 
 
 class Part(NamedTuple):
-    """Which one. call: of `each`, in their order; number: among those of it, of ``parts``; by: the back end; of, at: `mark` of
-    what all of the call share, and of its own."""
+    """Which one. call: of `each`, in their order; number: among those of it, of ``parts``; by: the back end; settled:
+    that of many parts by then, if there is one; of, at: `mark` of what all of the call share, and of its own."""
 
     call: int
     number: int
     parts: int
     by: int
+    settled: int
     of: int
     at: int
 
@@ -66,12 +65,13 @@ class Parts(kept.Kept):
     """The parts of a request that are done, saved to ``path`` every now and then, and when it ends before its time. It is the
     caller's to remove, once the results are saved. settled: the back end of what is taken up."""
 
-    what = "computing"
+    what = "computation"
 
     def __init__(self, path: Path, question: dict):
         super().__init__(path, question)
         self.calls, self.begun = 0, 0  # begun: parts of all calls so far
-        self.fresh: list[np.ndarray] = []
+        self.fresh: list[np.ndarray] = []  # of so many bytes in the file:
+        self.fresh_size = 0
         self.places: dict[tuple[int, int], int] = {}  # where in the file the part (call, number) is
         if found := kept.read_from(path, lambda file: _index(file, json.loads(json.dumps(question)))):
             self.settled, self.places, self.end = found
@@ -80,7 +80,8 @@ class Parts(kept.Kept):
     def each(self, call: tuple, back_end: str, items: Iterable, parts: int, computed: Callable) -> Iterator:
         """The results of ``parts`` items, in their order: what is kept of them, then what computed(items) gives for the rest.
         call: all that they follow from."""
-        which = Part(self.calls, 0, parts, BACK_ENDS.index(back_end), mark(call), 0)
+        by, settled = map(BACK_ENDS.index, (back_end, self.settled))
+        which = Part(self.calls, 0, parts, by, settled, mark(call), 0)
         self.calls, self.begun, done, marks = self.calls + 1, self.begun + parts, 0, deque()
         for item in items:
             part = which._replace(number=done, at=mark(item))
@@ -101,21 +102,22 @@ class Parts(kept.Kept):
         with contextlib.suppress(OSError, ValueError, StopIteration), self.path.open("rb") as file:
             file.seek(self.places[part.call, part.number])
             said, found = _read(next(kept.blocks(file, 1)))
-            return (found,) if said == part else None
+            return (found,) if said._replace(settled=part.settled) == part else None
 
     def _add(self, part: Part, found: Any) -> None:
         with contextlib.suppress(TypeError):  # of what is no number nothing is kept
             block = np.concatenate([np.array(part, float), *_numbers(found)])
-            if self.end + sum(map(_size, self.fresh)) + _size(block) <= LARGEST:
+            size = self.fresh_size + block.nbytes + kept.BLOCK.size
+            if self.end + size <= LARGEST:
                 self.fresh.append(block)
-                self.count = self.saved + len(self.fresh)
+                self.count, self.fresh_size = self.saved + len(self.fresh), size
         self.save()
 
     def unsaved(self) -> list[np.ndarray]:
         return self.fresh
 
     def forget(self, end: int) -> None:
-        self.end, self.saved, self.fresh = end, self.count, []
+        self.end, self.saved, self.fresh, self.fresh_size = end, self.count, [], 0
 
     def __exit__(self, kind, error, _) -> None:
         if error and (self.saved or not isinstance(error, Exception)):  # what is refused soon leaves nothing
@@ -140,10 +142,6 @@ def _watched(items: Iterable, marks: deque) -> Iterator:
         yield item
 
 
-def _size(block: np.ndarray) -> int:
-    return block.nbytes + kept.BLOCK.size
-
-
 def _numbers(found: Any) -> Iterator[np.ndarray]:
     """A result as arrays of float, to be put one behind the other; TypeError for what is not made of numbers."""
     if isinstance(found, tuple):
@@ -153,9 +151,9 @@ def _numbers(found: Any) -> Iterator[np.ndarray]:
     elif isinstance(found, np.ndarray) and found.dtype == np.float64:
         yield np.array([ARRAY, found.ndim, *found.shape], float)
         yield found.ravel()
-    elif isinstance(found, numbers.Integral) and not isinstance(found, bool):
+    elif type(found) is int:
         yield np.array([WHOLE, found], float)
-    elif isinstance(found, float):
+    elif type(found) is float:
         yield np.array([FLOAT, found])
     else:
         raise TypeError(f"no number: {type(found).__name__}")
@@ -166,7 +164,7 @@ def _read(block: np.ndarray) -> tuple[Part, Any]:
     values, n = block.ravel(), len(Part._fields)
     part = Part(*map(_whole, _first(n, values)))
     found, left = _result(values[n:])
-    if len(left) or part.by >= len(BACK_ENDS):
+    if len(left) or max(part.by, part.settled) >= len(BACK_ENDS):
         raise _foreign()
     return part, found
 
@@ -210,13 +208,13 @@ def _foreign() -> Exception:
 
 def _index(file: BinaryIO, question: dict) -> tuple[str, dict, int]:
     """(back end, places of parts, bytes of them) of a file, every block of which is looked at."""
-    if os.fstat(file.fileno()).st_size > LARGEST + kept.LARGEST:
+    if file.seek(0, os.SEEK_END) > LARGEST + kept.LARGEST:
         raise kept.Unbelievable("it is too large")
+    file.seek(0)
     settled, places = kept.settled_in(file, question), {}
     place = file.tell()
     for block in kept.blocks(file, 1):
         part, _ = _read(block)
         places[part.call, part.number], place = place, file.tell()
-        if part.parts >= MANY:
-            settled = BACK_ENDS[part.by]
+        settled = BACK_ENDS[part.settled]
     return settled, places, place

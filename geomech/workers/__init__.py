@@ -42,7 +42,7 @@ class Crew(Protocol):
 
 
 class Keeper(Protocol):
-    """One that keeps the results of parts. settled: the back end of those that were kept before, if any."""
+    """One that keeps the results of parts. settled: what `settle` said of many parts, now or when they were kept."""
 
     settled: str
 
@@ -113,7 +113,10 @@ def settle(parts: int) -> str:
     if parts < MANY:
         return "numpy" if parts > 1 else ""
     crew, keeper = _crew.get(), _keeper.get()
-    return (keeper and keeper.settled) or (crew.has() if crew else at_hand())
+    found = (keeper and keeper.settled) or (crew.has() if crew else at_hand())
+    if keeper:
+        keeper.settled = found
+    return found
 
 
 @contextlib.contextmanager
