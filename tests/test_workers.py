@@ -210,10 +210,12 @@ def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, mo
     few = [dataclasses.replace(k, values=k.values[:2]) for k in accuracy.KNOBS if k.tier in ("direct", "path")]
     monkeypatch.setattr(accuracy, "KNOBS", few)
     monkeypatch.setattr(accuracy, "TRUTH_PHASES", 64)
-    scene = GLASS.with_numerics(grid=7)
-    here, shared = both(two, lambda: accuracy.study(scene, runs=1))
+    scene, told = GLASS.with_numerics(grid=7), []
+    here, shared = both(two, lambda: accuracy.study(scene, told.append, runs=1))
     assert [x["error"] for x in shared["lines"]] == [x["error"] for x in here["lines"]]
     assert len(here["lines"]) == 7 and all(t > 0 for x in shared["lines"] for t in x["seconds"])
+    parts = len(told) // 2  # each tells, whoever has done it
+    assert parts > 2 * len(few) and told == 2 * [(k + 1) / parts for k in range(parts)]
 
 
 @pytest.mark.parametrize(("name", "aim"), [("three-link-glass", "efficiency"), ("three-link-viscous", "displacement")])
@@ -223,7 +225,9 @@ def test_searches_have_the_same_digits_whoever_computes(name, aim, two, given_aw
     here, shared = both(two, lambda: search(request, told.append))
     assert here.numbers() | {"seconds": 0.0} == shared.numbers() | {"seconds": 0.0}
     assert here.best.gait == shared.best.gait and here.answers == shared.answers
-    assert all(0 < x < 1 for x in told)
+    assert all(0 < x < 1 for x in told) and len(set(told)) > 2
+    for some in (told[: len(told) // 2], told[len(told) // 2 :]):  # here, and by others
+        assert some == sorted(some) and some[-1] > 0.8
 
 
 POWER = """

@@ -63,8 +63,14 @@ class _Search:
     def __init__(self, request: Request, progress: Callable | None):
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
         self.done = 0
-        climbs = request.starts + min(FINISHED, request.starts) if request.looks_up else request.starts
-        self.expected = climbs * TRIES * (RUNS if request.whole else FINISH)
+        climbs = request.starts + (min(FINISHED, request.starts) if request.looks_up else 0) + self._rough
+        self.climb = TRIES * (RUNS if request.whole else FINISH)  # cycles of one, or so
+        self.expected = climbs * self.climb
+
+    @property
+    def _rough(self) -> bool:
+        """Many a loop is the best near by."""
+        return self.r.looks_up or self.r.system.singularity is not None
 
     def optimum(self) -> Optimum:
         r = self.r
@@ -105,11 +111,8 @@ class _Search:
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
 
     def _near(self, cycles, starts: list[np.ndarray], turn: float, looked_up, most: int) -> list[np.ndarray]:
-        """Where each start leads; the first twice, as it is and with another size, where many a
-        loop is the best near by."""
-        r = self.r
-        rough = r.looks_up or r.system.singularity is not None
-        twice = [self._larger(starts[0])] if rough else []
+        """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near by."""
+        twice = [self._larger(starts[0])] if self._rough else []
         near = self._each([*starts, *twice], turn, looked_up, most, NEAR_TOLERANCE)
         if twice:
             near[0] = max(near[0], near.pop(), key=lambda p: self._worth(cycles, p, turn))
@@ -126,12 +129,11 @@ class _Search:
         """Where each start leads, by the direct tier or what is ``looked_up``. Who computes: `geomech.workers`."""
         at_hand = len(starts) == 1 and not workers.far()
         how = Way(self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None)
-        ends, seconds = [], len(starts) * (CLIMB if looked_up else FINISHING)
+        ends, before, seconds = [], self.done, len(starts) * (CLIMB if looked_up else FINISHING)
         for p, count in workers.each(_up_from, how, starts, len(starts), seconds=seconds):
             ends.append(p)
             self.count += count
-            if how.told is None:
-                self._tell(max(1, count))
+            self._tell(max(0, before + len(ends) * self.climb - self.done))  # whoever did it, and however soon
         return ends
 
     def _worth(self, tier, p, turn: float) -> float:
