@@ -5,6 +5,7 @@ import signal
 import time
 
 import pytest
+from parts import doubled
 
 from geomech import workers
 from geomech.errors import SceneError
@@ -39,6 +40,21 @@ def test_without_others_it_is_done_here_and_now(tmp_path):
     with aside() as beside:
         beside(mine(tmp_path / "a"))
         assert int((tmp_path / "a").read_text()) == os.getpid()
+
+
+@pytest.mark.usefixtures("crew")
+def test_a_copy_computes_what_is_large_by_itself(tmp_path, monkeypatch):
+    """It has none of the threads that ask the workers, and would wait for them for ever."""
+    large = lambda: list(workers.each(doubled, 2, range(4), 4, seconds=1e9))
+
+    def call():
+        signal.alarm(20)
+        (tmp_path / "a").write_text(str(large()))
+
+    with monkeypatch.context() as patch, aside() as beside:
+        patch.setattr(workers._crew.get(), "threads", [None, None])
+        beside(call)
+    assert (tmp_path / "a").read_text() == "[0, 2, 4, 6]"
 
 
 @pytest.mark.usefixtures("crew")

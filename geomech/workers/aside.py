@@ -9,21 +9,24 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 
-from geomech.workers import keeping, shared
+from geomech.workers import alone, keeping, shared
 
 COPIES = sys.platform == "linux"  # elsewhere frameworks of the system do not outlive a fork, or there is none
 
 
 @contextlib.contextmanager
 def aside() -> Iterator[Callable[[Callable[[], None]], None]]:
-    """A function that calls another in a copy of this process as it stands, or here and now where one process is to do all:
-    nothing that it computes is kept by itself. At the end of the statement all copies have done, and what one raised is
-    raised; none outlives it."""
+    """A function that calls another in a copy of this process as it stands, or here and now where one process is to do all.
+    A copy has no workers, and nothing that it computes is kept by itself. At the end of the statement all copies have done,
+    and what one raised is raised; none outlives it."""
     copies: dict[int, int] = {}  # where each tells how it ended, by its id
 
     def beside(call: Callable[[], None]) -> None:
-        with keeping(None):
-            _copied(call, copies) if COPIES and shared() else call()
+        if COPIES and shared():
+            _copied(call, copies)
+        else:
+            with keeping(None):
+                call()
 
     try:
         yield beside
@@ -48,7 +51,8 @@ def _copied(call: Callable[[], None], copies: dict[int, int]) -> None:
     try:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):  # which the one it is a copy of hears, and ends it
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-        os.write(tell, _end_of(call))
+        with alone():  # those who ask the workers are threads, of which a copy has none
+            os.write(tell, _end_of(call))
     finally:
         os._exit(0)
 
