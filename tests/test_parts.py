@@ -218,6 +218,19 @@ def test_what_a_file_takes_is_bounded(every, tmp_path, monkeypatch, capsys):
     assert "it is too large: set aside" in capsys.readouterr().err
 
 
+def test_a_full_disk_fills_no_memory(tmp_path, monkeypatch, capsys):
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(kept, "SAVE_EVERY", 0.0)
+    with Parts(tmp_path / "p", ASKED) as some, workers.keeping(some):
+        first = calls()
+        monkeypatch.setattr(kept, "append", full)
+        assert same(calls(), first) and some.fresh == []
+    assert capsys.readouterr().err.count("note: what is done of the computation is not kept: ") == 1
+    assert asked(tmp_path / "p")[1] == 0
+
+
 def test_studies_go_on_to_the_last_digit(tmp_path, monkeypatch):
     """Error studies, searches from several starts, fields with what moving costs; seconds are those of the first time."""
     few = [dataclasses.replace(k, values=k.values[:2]) for k in accuracy.KNOBS if k.tier == "direct"]

@@ -105,6 +105,9 @@ class Parts(kept.Kept):
             return (found,) if said._replace(settled=part.settled) == part else None
 
     def _add(self, part: Part, found: Any) -> None:
+        if self.told:  # the disk is full: so need not be the memory
+            self.fresh = []
+            return
         with contextlib.suppress(TypeError):  # of what is no number nothing is kept
             block = np.concatenate([np.array(part, float), *_numbers(found)])
             size = self.fresh_size + block.nbytes + kept.BLOCK.size
