@@ -238,7 +238,7 @@ def test_studies_go_on_to_the_last_digit(tmp_path, monkeypatch):
     monkeypatch.setattr(accuracy, "TRUTH_PHASES", 64)
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 100)
     scene = GLASS.with_numerics(grid=7, phases=32, harmonics=5)
-    request = checked(VISCOUS.with_numerics(phases=32), "efficiency", harmonics=1, starts=3)
+    request = checked(VISCOUS.with_numerics(phases=32), "efficiency", harmonics=1, starts=2)
 
     def field():
         study = Study(scene)
@@ -246,7 +246,7 @@ def test_studies_go_on_to_the_last_digit(tmp_path, monkeypatch):
 
     numbers = lambda: [json.dumps({**search(request).numbers(), "seconds": 0.0})]
     errors = lambda: [np.array(x["error"]) for x in accuracy.study(scene, runs=1)["lines"]]
-    for ask, after, left in ((errors, 5, 7), (field, 4, 5), (numbers, 2, 1)):
+    for ask, after, left in ((errors, 5, 7), (field, 4, 5), (numbers, 1, 1)):
         whole = ask()
         path = tmp_path / f"{after}"
         stopped(path, after, ask)
