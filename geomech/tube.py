@@ -109,6 +109,15 @@ class Loop:
         return t
 
 
+def _between(values: np.ndarray, t) -> np.ndarray:
+    """(..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
+    count = values.shape[-1]
+    places = 2 * np.pi * np.arange(count + 1) / count
+    closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
+    at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
+    return at.reshape(*np.shape(t), *values.shape[:-1])
+
+
 def _complement(unit: np.ndarray) -> np.ndarray:
     """(d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
     first = np.zeros_like(unit)
@@ -125,6 +134,7 @@ class Known:
     independent: the squares of what each does to a result add up to its variance. spread: (d, d, P), at equally spaced
     phases: the data reach a shape where delta . spread^-1 delta <= 1. beyond: (3,), of a net pose: what the variation of the
     cycles changes in it beyond the first order; where links begin and cease to stick, a Taylor series may be off by as much.
+    off: (3, 2, P), at equally spaced phases: standard errors of A along the gait, and across it, for what is left of xi.
     factor: an error is this many standard deviations. level: share of cases in which it is meant to cover the truth."""
 
     loop: Loop
@@ -133,6 +143,7 @@ class Known:
     errors: np.ndarray
     spread: np.ndarray
     beyond: np.ndarray
+    off: np.ndarray
     factor: float
     level: float
 
@@ -143,11 +154,18 @@ class Known:
 
     def spread_at(self, t) -> np.ndarray:
         """(..., d, d) at phases t (...)."""
-        count = self.spread.shape[-1]
-        places = 2 * np.pi * np.arange(count + 1) / count
-        closed = np.concatenate([self.spread, self.spread[..., :1]], -1).reshape(-1, count + 1)
-        at = np.stack([np.interp(np.asarray(t) % (2 * np.pi), places, row) for row in closed], -1)
-        return at.reshape(*np.shape(t), *self.spread.shape[:2])
+        return _between(self.spread, t)
+
+    def off_at(self, t) -> np.ndarray:
+        """(..., 3, d): standard errors of A at phases t (...), for what is left of xi."""
+        rate = self.loop.shape(t, 1)
+        along = rate**2 / (rate**2).sum(-1, keepdims=True)
+        return np.sqrt(_between(self.off**2, t) @ np.stack([along, 1 - along], -2))
+
+    def error_at(self, t) -> np.ndarray:
+        """(..., 3, d): of A at phases t (...) of the gait."""
+        squares = (series(self.errors[:, :, :, 0], t) ** 2).sum(-3)
+        return self.factor * np.sqrt(squares + self.off_at(t) ** 2)
 
     def reach(self, alpha) -> np.ndarray:
         """(...,): how far shapes (..., d) are from the gait, 1 where the data end."""
@@ -173,7 +191,9 @@ class Known:
         """With the components of xi times ``by`` (3,)."""
         rows = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
         errors = np.moveaxis(rows(np.moveaxis(self.errors, 1, 0)), 0, 1)
-        return replace(self, A=rows(self.A), slope=rows(self.slope), errors=errors, beyond=rows(self.beyond))
+        return replace(
+            self, A=rows(self.A), slope=rows(self.slope), errors=errors, beyond=rows(self.beyond), off=rows(self.off)
+        )
 
     def of(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes (..., d), wherever these are."""
@@ -182,9 +202,10 @@ class Known:
 
     def of_error(self, alpha) -> np.ndarray:
         """(..., 3, d): of `of`."""
-        w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
+        t = self.loop.nearest(alpha)
+        w, terms = self.terms_at(t, alpha, np.ones(np.shape(alpha)))
         squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
-        return self.factor * np.sqrt(sum(squares))
+        return self.factor * np.sqrt(sum(squares) + self.off_at(t) ** 2)
 
     def ccf(self, alpha, whole: np.ndarray | None = None) -> np.ndarray:
         """(..., 3): the CCF of two joints at shapes (..., 2), of this connection or another ``whole`` along the same gait.

@@ -17,6 +17,7 @@ APART = 1.25  # ratio of the periods of the first and the last quarter of a log 
 TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
 AFTER = 0.8  # the same where all cycles of one come before those of the other
 LEAST_APART = 0.05  # of the gait's size, between the means of two gaits
+THIN = 1e-3  # of its length, the width of a gait that encloses nothing
 REFINED = 3  # times the phase is that of the nearest point of the mean gait
 
 
@@ -51,6 +52,19 @@ def period(log: Log) -> float:
         )
     check_rows(log)
     return found
+
+
+def check_a_loop(log: Log, joints: Smoothed) -> None:
+    """SceneError if all joints are one, to noise: what goes to and fro on a line is no loop."""
+    off = joints.values - joints.values.mean(0)
+    _, size, ways = np.linalg.svd(off, full_matrices=False)
+    if size[1] > max(THIN * size[0], np.sqrt(len(off)) * joints.noise.max()):
+        return
+    first, last, slope = log.joints[0], log.joints[-1], ways[0, -1] / ways[0, 0]
+    raise log.wrong(
+        f"{last} is {slope:.3g} times {first}, but for a constant and noise: one shape variable recorded "
+        f"{len(log.joints)} times goes to and fro, and is no loop; name the columns of joints that move apart, by --columns"
+    )
 
 
 def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[np.ndarray, Loop]:

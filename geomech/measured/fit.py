@@ -12,6 +12,7 @@ import numpy as np
 from geomech.errors import number
 from geomech.gaits import Fourier
 from geomech.measured import cycles, regression, smooth
+from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
 from geomech.reconstruct import displacement
@@ -22,7 +23,6 @@ HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
 PHASES = 128  # of the mean gait, at which it is integrated
 SHOWN = 24  # phases at which numbers are told
 SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
-PLACES = 64  # phases at which what the splines and the harmonics leave is averaged
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
 
@@ -32,10 +32,8 @@ class Fitted:
     net pose of each cycle, in the body frame at its start, as logged and by the connection along the cycle's own shapes.
     frequency: cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual:
     (3,), rms of what the fit leaves of xi, over that of the joint rates; explained: (3,), share of the squares of xi
-    that it does not leave. misfit: (3,), rms over the phase of what as many harmonics, and the splines through the rows,
-    leave of xi in the mean over all cycles, beyond noise, per rad. noise: (d + 3,), of the rows' joint angles, x, y and
-    heading. across: whether the cycles vary enough to tell A across the gait. length: of the body in m; 1 for a log in
-    body lengths."""
+    that it does not leave. noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary
+    enough to tell A across the gait. length: of the body in m; 1 for a log in body lengths."""
 
     log: Log
     known: Known
@@ -46,7 +44,6 @@ class Fitted:
     irregular: float
     residual: np.ndarray
     explained: np.ndarray
-    misfit: np.ndarray
     noise: np.ndarray
     across: bool
     length: float
@@ -83,20 +80,13 @@ class Fitted:
         return tube(self.known, grid_of(self.known, points), self.residual)
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
-        """(A (T, 3, d) at phases t of the mean gait, half widths of its interval), with what the harmonics cannot follow."""
-        A, errors = series(self.known.A, t), series(self.known.errors[:, :, :, 0], t)
-        tangent = self.known.loop.shape(t, 1)
-        tangent = np.abs(tangent) / np.linalg.norm(tangent, axis=-1, keepdims=True)
-        off = self.misfit[:, None] * tangent[:, None, :]
-        return A, self.known.factor * np.sqrt((errors**2).sum(1) + self.cut_off**2 + off**2)
+        """(A (T, 3, d) at phases t of the mean gait, half widths of its interval)."""
+        return series(self.known.A, t), self.known.error_at(t)
 
-    @cached_property
-    def cut_off(self) -> np.ndarray:
-        """(3, d), rms of what more harmonics would add to A, as the last two tell beyond their errors: those of a function with
-        corners, which A has where links begin and cease to stick, fall with the square of their order."""
-        last, errors = self.known.A[..., -4:], self.known.errors[:, :, :, 0, -4:]
-        square = ((last**2).sum(-1) - (errors**2).sum((0, -1))) / 2
-        return np.sqrt(np.maximum(square, 0.0) * self.known.A.shape[-1] / 12)
+    @property
+    def misfit(self) -> np.ndarray:
+        """(3,), rms over the phase of what A may be off by along the gait, for what is left of xi beyond noise."""
+        return np.sqrt((self.known.off[:, 0] ** 2).mean(-1))
 
 
 def fit_log(
@@ -118,6 +108,7 @@ def fit_log(
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
+    cycles.check_a_loop(log, joints)
     rows = len(log.t) * period / (log.t[-1] - log.t[0])
     most = max(1, int(min(HARMONICS, joints.knots / 2, rows / 4)))
     phase, loop = cycles.phased(log, joints, period, most)
@@ -130,12 +121,12 @@ def fit_log(
 
 def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, within, length) -> Fitted:
     kept = count >= 0
-    heading, (vx, vy, turn) = pose.values[:, 2], pose.rates.T
-    cos, sin = np.cos(heading), np.sin(heading)
-    xi = np.stack([cos * vx + sin * vy, cos * vy - sin * vx, turn], -1)  # R(-heading) of the velocity in the world
+    xi, *xi_halves = (_in_the_body(*x)[kept] for x in ((pose.values, pose.rates), *pose.halves))
     halves = tuple((a[kept], u[kept]) for a, u in joints.halves)
     nearest = loop.projected(joints.values, phase)
-    samples = regression.Samples(nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi[kept], halves)
+    samples = regression.Samples(
+        nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi, halves, tuple(xi_halves)
+    )
     varies = regression.varied(loop, samples)
     across = varies == regression.RATES
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
@@ -152,23 +143,25 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
     known = Known(
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
-        regression.factor(len(held.square), level), level,
+        np.zeros((3, 2, 1)), regression.factor(len(held.square), level), level,
     )  # fmt: skip
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
     mean, mean_off = mean_of(measured, level)
-    beyond = SAFETY * np.sqrt(
-        np.maximum((_net(known)[0] - mean) ** 2 - mean_off**2, 0.0)
-    )  # less what the mean leaves open
-    known = replace(known, beyond=beyond)
-    rough = log.pose - pose.values
-    rough = np.column_stack([*se2.rotated(-heading, *rough[:, :2].T), rough[:, 2]])[kept]
-    residual, explained, misfit = _left(known, samples, rough)
+    square = (_net(known)[0] - mean) ** 2 - mean_off**2  # less what the mean leaves open
+    beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
+    over = left(known, samples, varies)
+    known = replace(known, beyond=beyond, off=over.off)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
-        log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[kept])), residual, explained,
-        misfit, np.concatenate([joints.noise, pose.noise]), across, length, samples,
+        log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[kept])),
+        over.residual, over.explained, np.concatenate([joints.noise, pose.noise]), across, length, samples,
     )  # fmt: skip
+
+
+def _in_the_body(pose: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """xi (N, 3) of poses and their rates in the world."""
+    return np.column_stack([*se2.rotated(-pose[:, 2], *rate[:, :2].T), rate[:, 2]])
 
 
 def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
@@ -182,31 +175,6 @@ def _net(known: Known) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
     return displacement(np.einsum("nij,nj->ni", known.of(alpha), alphadot)), alpha, alphadot
-
-
-def _left(known: Known, samples: regression.Samples, rough: np.ndarray):
-    """(residual, explained, misfit), (3,) each, of `Fitted`. rough: (N, 3), what the splines leave of the poses, in the body's
-    axes."""
-    w, terms = known.terms_at(samples.phase, samples.alpha, samples.rate)
-    left = samples.xi - np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
-    size = np.sqrt((samples.rate**2).sum(-1).mean())
-    explained = 1 - (left**2).mean(0) / samples.xi.var(0).clip(1e-300)
-    mean, noise = _by_phase(samples.phase, left)
-    unfollowed = np.maximum(mean**2 - noise, 0.0).mean(0) / size**2
-    mean, noise = _by_phase(samples.phase, rough)
-    k = np.arange(PLACES // 4 + 1)[:, None]
-    waves = np.abs(np.fft.rfft(mean, axis=0)[: len(k)] / PLACES) ** 2 - noise.mean(0) / PLACES
-    rates = (2 * k**2 * waves).sum(0).clip(0.0)  # squares of xi per rad of phase
-    pace = (known.loop.shape(samples.phase, 1) ** 2).sum(-1).mean()
-    return np.sqrt((left**2).mean(0)) / size, explained, np.sqrt(unfollowed + rates / pace)
-
-
-def _by_phase(phase, values) -> tuple[np.ndarray, np.ndarray]:
-    """(means of values (N, 3) at PLACES phases, and the variance of these by the scatter of the values)."""
-    bins = (phase % (2 * np.pi) / (2 * np.pi) * PLACES).astype(int) % PLACES
-    n = np.maximum(np.bincount(bins, minlength=PLACES), 2)[:, None]
-    mean, square = (np.stack([np.bincount(bins, x, PLACES) for x in y.T], -1) / n for y in (values, values**2))
-    return mean, (square - mean**2) / (n - 1)
 
 
 def _cycles(log: Log, known: Known, phase, count, joints, pose):

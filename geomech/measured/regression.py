@@ -32,7 +32,7 @@ NOTHING, SHAPES, RATES = range(
 
 class Samples(NamedTuple):
     """Of whole cycles. phase: (N,), of the nearest point of the mean gait. cycle: (N,), whole numbers from 0. alpha, rate:
-    (N, d). xi: (N, 3). halves: (alpha, rate) twice, with independent noise."""
+    (N, d). xi: (N, 3). halves: (alpha, rate) twice, and xi_halves: xi twice, with independent noise."""
 
     phase: np.ndarray
     cycle: np.ndarray
@@ -40,6 +40,7 @@ class Samples(NamedTuple):
     rate: np.ndarray
     xi: np.ndarray
     halves: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+    xi_halves: tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)

@@ -144,6 +144,10 @@ def of_known(known: Known, unit: str) -> list[Variable]:
             "gait_beyond", ("component",), known.beyond, f"{UNITS[unit]} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
+        Variable(
+            "gait_off", ("component", "along_and_across", "place"), known.off, units,
+            "at equally spaced phases: standard errors of A along the mean gait, and across it, for what is left of xi",
+        ),
     ]  # fmt: skip
 
 

@@ -109,12 +109,16 @@ def _known(found: dict, told: dict, turn: float) -> Known:
     if missing := [name for name in sized if name not in found or found[name][1].ndim != sized[name]]:
         raise ValueError(f"has a gait, but no {missing[0]} that fits it: {FITTED}")
     gait, A, slope, errors, spread, beyond = (numbers(name, found[name][1]) for name in sized)
+    off = numbers("gait_off", found["gait_off"][1]) if "gait_off" in found else np.zeros((3, 2, 1))  # of an older file
     d, wide = len(gait), A.shape[-1]
     right = (A.shape == (3, d, wide), slope.shape == (3, d, d - 1, wide), errors.shape[1:] == (3, d, d, wide))
     level, factor = (told.get(name, np.nan) for name in ("level", "error_factor"))
     good = (
         spread.shape[:2] == (d, d)
         and beyond.shape == (3,)
+        and off.ndim == 3
+        and off.shape[:2] == (3, 2)
+        and off.size > 0
         and (np.linalg.eigvalsh(np.moveaxis(spread, -1, 0)) > 0).all()
     )
     number = all(np.ndim(x) == 0 and np.asarray(x).dtype.kind in "iuf" for x in (level, factor))
@@ -122,7 +126,8 @@ def _known(found: dict, told: dict, turn: float) -> Known:
         raise ValueError(f"has a gait whose parts do not fit each other: {FITTED}")
     if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
         raise ValueError(f"has a gait that does not move: {FITTED}")
-    return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, np.abs(beyond), float(factor), float(level))
+    beyond, off = np.abs(beyond), np.abs(off)
+    return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, beyond, off, float(factor), float(level))
 
 
 def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:
