@@ -16,7 +16,7 @@ from geomech.optimise.cycles import Phases, Runs, brought
 from geomech.optimise.keeping import Keeping
 from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
-from geomech.output import optima
+from geomech.output import netcdf, optima
 from geomech.reconstruct import displacement, slopes
 from geomech.scene import Scene, parse
 from geomech.study.bench import Study
@@ -24,6 +24,7 @@ from geomech.systems import Plain, Swimmer, Table
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
+from rft.effects import SkinFriction
 
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))
 ODD = Chain((0.7, 1.4, 0.9), length=0.3, frame="link-1")
@@ -251,6 +252,9 @@ def test_loops_that_are_one():
     assert not series.same(p, -p, mirror=False)
     assert not series.same(p, other)
     assert not series.same(p, 1.1 * p)
+    assert series.same(p, -series.shifted(p, 4.0), odd=False)
+    assert not series.same(p, series.reversed_(series.shifted(p, 4.0)), odd=False)
+    assert not series.same(p, -series.reversed_(p), odd=False)
     flat = loops.of(Ellipse(semi_axes=(1.0, 0.0)))
     assert not series.same(flat, 0.5 * flat)  # a part of a curve is not the curve, either way
     assert not series.same(0.5 * flat, flat)
@@ -345,12 +349,37 @@ def test_singular_shapes_are_kept_away_from():
         ("three-link-viscous", {"within": [1.0]}, "one for each of 2 joints"),
         ("three-link-viscous", {"within": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),
         ("sandfish-loose", {"aim": "turning"}, "does not turn"),
+        (
+            "differential-drive",
+            {"aim": "turning"},
+            "no gait turns it: the differential-drive's heading follows from its",
+        ),
     ],
 )
 def test_requests_that_make_no_sense(name, asked, said):
     with pytest.raises(SceneError, match=said) as caught:
         checked(geomech.load(name), **{"aim": "displacement", **asked})
     assert "\n" not in str(caught.value)
+
+
+def test_a_table_that_never_turns_is_refused_too(tmp_path):
+    drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
+    netcdf.save_connection(tmp_path / "drive.nc", Study(drive))
+    with pytest.raises(SceneError, match="no gait turns it: the table's file tells a body whose heading"):
+        checked(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
+    for name in ("three-link-viscous", "three-link-floating", "no-slip-snake"):
+        assert checked(geomech.load(name), "turning")
+
+
+def test_where_one_sense_brings_more_it_is_the_one_found():
+    """A skin that slides forwards more easily: its table, which is odd, leads to either sense alike."""
+    skin = SkinFriction(forward=0.05, backward=0.3, reference=0.2)
+    scene = Scene(Swimmer(SAND, Chain((1, 1, 1)), effects=(skin,)), Circle(amplitude=1.0), numerics=Numerics(grid=9))
+    assert not scene.system.odd
+    found = optimise(scene, harmonics=1, within=1.2)
+    back = found.request.loops.gait(series.reversed_(found.request.loops.of(found.gait)))
+    assert found.value > 0.48 > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
+    assert len(found.answers) == 2
 
 
 def test_a_cycle_without_slopes_is_that_with():

@@ -165,13 +165,17 @@ def reversed_(p: np.ndarray) -> np.ndarray:
     return np.concatenate([p[:1], (p[1:].reshape(-1, 2, p.shape[1]) * [[1.0], [-1.0]]).reshape(p[1:].shape)])
 
 
-def same(p: np.ndarray, q: np.ndarray, mirror: bool = True, tolerance: float = SAME) -> bool:
-    """Whether two loops are one, whatever their start, their pacing and their sense, or, with ``mirror``, their left and right
-    changed (alpha -> -alpha): no point of either is further from the other curve than ``tolerance`` of its size."""
-    seen = waves(DENSE // 4, (len(p) - 1) // 2)
+def same(p: np.ndarray, q: np.ndarray, mirror: bool = True, odd: bool = True, tolerance: float = SAME) -> bool:
+    """Whether two loops are one, whatever their start, their pacing and, with ``odd``, their sense, or, with ``mirror``, their
+    left and right changed (alpha -> -alpha): no point of either is further from the other curve than ``tolerance`` of its
+    size."""
+    seen, ahead = waves(DENSE // 4, (len(p) - 1) // 2), shifted(p, np.pi / DENSE)
     first, size = seen @ p, np.ptp(seen @ p, axis=0).max()
-    for other in (q, -q) if mirror else (q,):
-        apart = np.linalg.norm(first[:, None] - (seen @ other)[None], axis=-1)
-        if max(apart.min(0).max(), apart.min(1).max()) <= tolerance * size + np.pi * size / len(seen) / 2:
+    forwards = seen @ ahead - first
+    for other in (seen @ q, -seen @ q) if mirror else (seen @ q,):
+        apart = np.linalg.norm(first[:, None] - other[None], axis=-1)
+        near = max(apart.min(0).max(), apart.min(1).max()) <= tolerance * size + np.pi * size / len(seen) / 2
+        along = (np.roll(other, -1, 0) - np.roll(other, 1, 0))[apart.argmin(1)]
+        if near and (odd or (forwards * along).sum() > 0):
             return True
     return False

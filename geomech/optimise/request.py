@@ -27,6 +27,7 @@ ROOM = 1.02  # of the field that is looked up, over the limit: on its way the se
 NEAR, FINISH, RUNS = 100, 16, 12  # steps of the search in tables, by the direct tier, and of gaits run as a whole
 CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
 STILL = 1e-12  # of the velocity: what is rounding
+LOOPS = 4  # of which one at least turns, if any does
 DEGREES = 1e-3  # by which the degree of the power may scatter
 
 
@@ -163,6 +164,11 @@ def checked(
             request.degree  # noqa: B018 - refuses what has none
         if wanted.straight and _stays(system):
             raise SceneError(f"the {system.kind} goes nowhere: its mean frame stays where it is; optimize for turning")
+        if wanted.name == "turning" and _never_turns(request):
+            whose = f"{told_by(system)} tells a body whose" if system.stored("connection") else f"the {system.kind}'s"
+            raise SceneError(
+                f"no gait turns it: {whose} heading follows from its shape and comes back with it; optimize for displacement"
+            )
         return request
 
 
@@ -180,6 +186,16 @@ def _stays(system: System) -> bool:
     rng = np.random.default_rng(0)
     xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
     return bool(np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi)))
+
+
+def _never_turns(request: Request) -> bool:
+    """Whether the heading of a system is a function of its shape, dA_theta = 0, by a few loops that stand for all."""
+    system, loops = request.system, request.loops
+    if system.steps or not system.linear or system.singularity is not None:
+        return False
+    some = np.array(loops.starts(loops.of(request.gait), LOOPS))
+    turning = evaluate(system.velocity, *loops.cycle(some))[..., 2]
+    return bool(np.abs(turning.mean(-1)).max() <= STILL * np.abs(turning).max())
 
 
 def _own_rate(scene: Scene) -> float:

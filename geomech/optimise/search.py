@@ -105,7 +105,10 @@ class _Search:
             return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR))
         looked_up = ways.looked_up(r)
         near = self._near(ways.table(r, *looked_up), starts, turn, looked_up, NEAR)
-        ranked = sorted(self._different(near), key=lambda found: -self._worth(tier, found[0], turn))[:FINISHED]
+        if not r.system.odd:  # where the table, which is, takes either sense for as good
+            near += [series.reversed_(p) for p in near]
+        worth = lambda found: [self._worth(tier, found[0], x) for x in (turn, np.inf)]  # what turns is straightened yet
+        ranked = sorted(self._different(near), key=worth, reverse=True)[:FINISHED]
         further = self._each([p for p, _ in ranked], turn, None, FINISH, TOLERANCE)
         finished = [max(q, p, key=lambda q: self._worth(tier, q, turn)) for q, (p, _) in zip(further, ranked)]
         return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
@@ -190,8 +193,8 @@ class _Search:
         return [tuple(one) for one in kept]
 
     def _same(self, p, q) -> bool:
-        loops = self.r.loops
-        return series.same(p, q, self.r.system.mirror) if isinstance(loops, Loops) else loops.same(p, q)
+        loops, system = self.r.loops, self.r.system
+        return series.same(p, q, system.mirror, system.odd) if isinstance(loops, Loops) else loops.same(p, q)
 
     def _start(self) -> Gait:
         """The gait to begin with; a note where that is not the scene's."""
