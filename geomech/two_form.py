@@ -24,6 +24,7 @@ import numpy as np
 
 from geomech.connection import SAMPLES_TOGETHER, Connection
 from geomech.curvature import ccf
+from geomech.curvature import error as ccf_error
 from geomech.errors import number, real_array
 from geomech.field import Field
 from geomech.gaits import Gait
@@ -76,10 +77,19 @@ class TwoForm:
 
 def two_form(connection: Connection) -> TwoForm:
     """The CCF of all pairs of joints, of order `Connection.degree` in the spacing."""
+    return _of_pairs(ccf, connection)
+
+
+def error(connection: Connection) -> TwoForm:
+    """Its estimated error, that of each pair (`geomech.curvature.error`)."""
+    return _of_pairs(ccf_error, connection)
+
+
+def _of_pairs(made: Callable, connection: Connection) -> TwoForm:
     pairs = tuple(combinations(range(len(connection.axes)), 2))
     if not pairs:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
-    values = np.stack([ccf(connection, i, j).values for i, j in pairs])
+    values = np.stack([made(connection, i, j).values for i, j in pairs])
     return TwoForm(Field(connection.axes, values, connection.degree), pairs)
 
 

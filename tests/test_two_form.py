@@ -2,10 +2,15 @@
 
 import numpy as np
 import pytest
+import xarray
 
+import geomech
 from geomech import connection, curvature
+from geomech.connection import Connection
+from geomech.errors import SceneError
 from geomech.gaits import Circle, Fourier
-from geomech.systems import Swimmer
+from geomech.output import netcdf
+from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.two_form import spanned, two_form
@@ -95,10 +100,6 @@ def test_pairs_are_drawn(form):
 
 
 def test_the_file_has_all_pairs(form, tmp_path):
-    import geomech
-    from geomech.connection import Connection
-    from geomech.output import netcdf
-
     study = geomech.Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=7, extent=1.2)))
     netcdf.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
@@ -106,3 +107,26 @@ def test_the_file_has_all_pairs(form, tmp_path):
     assert saved.dims[:2] == ("pair", "component") and "1 2, 1 3, 2 3" in saved.long_name
     assert np.array_equal(saved[1], study.two_form.pair(0, 2).values)
     assert "metric" in study.to_xarray()
+    apart = study.to_xarray()["ccf_pairs_error"]
+    assert np.array_equal(apart[2], curvature.error(study.fitted, 1, 2).values) and apart.dims == saved.dims
+    assert study.to_xarray()["pair_joints"].values.tolist() == [[1, 2], [1, 3], [2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("name", "spoilt", "said"),
+    [
+        ("pair_joints", lambda x: x[::-1], r"pair_joints other than \[\[1, 2\], \[1, 3\], \[2, 3\]\]"),
+        ("ccf_pairs", lambda x: x[:2], r"ccf_pairs of shape \(2, 3, 5, 5, 5\) where it must be \(3, 3, ...\)"),
+        ("ccf_pairs", lambda x: x.transpose("component", "pair", ...), "ccf_pairs over .component, pair, "),
+        ("ccf_pairs_error", lambda x: x.where(x < x.max()), "ccf_pairs_error that is not finite"),
+    ],
+)
+def test_a_file_with_pairs_that_are_none_is_refused(name, spoilt, said, tmp_path):
+    study = geomech.Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=5, extent=1.2)))
+    netcdf.save_connection(tmp_path / "a.nc", study)
+    assert Table(tmp_path / "a.nc").joints == 3
+    with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as file:
+        rest = file.drop_vars(["ccf_pairs", "ccf_pairs_error", "pair_joints"]).assign({name: spoilt(file[name])})
+        rest.to_netcdf(tmp_path / "b.nc", engine="scipy", format="NETCDF3_64BIT")
+    with pytest.raises(SceneError, match=said):
+        Table(tmp_path / "b.nc")

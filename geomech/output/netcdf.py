@@ -22,6 +22,7 @@ from geomech.tube import Known, Tube
 from geomech.two_form import TwoForm
 
 COMPONENTS = ("x", "y", "theta")
+ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 UNITS = {"BL": "body length", "m": "m"}
 
 
@@ -36,10 +37,10 @@ class Variable(NamedTuple):
 
 
 def save_connection(path: str | Path, study: Study) -> None:
-    """Write A (component, joint, alpha_1, ...), its fit residual, the rms of xi and, for two joints, the CCF with its
-    estimated error and, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where something
-    says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it.
-    The file appears whole or not at all."""
+    """Write A (component, joint, alpha_1, ...), its fit residual, the rms of xi, the CCF with its estimated error, of each
+    pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
+    something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
+    read it. The file appears whole or not at all."""
     write(path, attributes(study), study.fitted.axes, study.scene.system.shape_labels, variables(study))
 
 
@@ -86,10 +87,9 @@ def variables(study: Study) -> list[Variable]:
         found += of_known(study.fitted.known, unit)
     if len(study.fitted.axes) == 2:
         found.append(of_ccf(study.curvature, unit))
-        name = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
-        found.append(of_ccf(study.curvature_error, unit, "ccf_error", name))
+        found.append(of_ccf(study.curvature_error, unit, "ccf_error", ERROR_OF_CCF))
     elif len(study.fitted.axes) > 2:
-        found.append(of_pairs(study.two_form, unit))
+        found += of_pairs(study.two_form, study.two_form_error, unit)
     if study.scene.system.carried:
         found.append(of_frame(study.scene.system.field.field, unit))
     if not effort.why_none(study.scene.system):
@@ -158,12 +158,17 @@ def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variab
     return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
 
 
-def of_pairs(form: TwoForm, unit: str) -> Variable:
-    """The CCF of all pairs of joints."""
+def of_pairs(form: TwoForm, error: TwoForm, unit: str) -> list[Variable]:
+    """The CCF of all pairs of joints, its error, and the pairs."""
     units = f"{UNITS[unit]} rad-2 (x, y), rad rad-2 (theta)"
-    pairs = ", ".join(f"{i + 1} {j + 1}" for i, j in form.pairs)
-    said = f"curvature constraint function of joints {pairs}, in this order"
-    return Variable("ccf_pairs", ("pair", "component", *angles_of(form.field.axes)), form.field.values, units, said)
+    pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
+    told = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
+    said = f"curvature constraint function of joints {told}, in this order"
+    return [
+        Variable("pair_joints", ("pair", "first_and_second"), pairs, "1", "joints i < j of each pair"),
+        Variable("ccf_pairs", over, form.field.values, units, said),
+        Variable("ccf_pairs_error", over, error.field.values, units, ERROR_OF_CCF.replace("ccf", "ccf_pairs", 1)),
+    ]
 
 
 def of_frame(pose: Field, unit: str) -> Variable:

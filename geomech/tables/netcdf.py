@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -97,6 +98,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
     if even is not None and even.shape[0] != 3:
         raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
+    _check_pairs(found, axes, masked)
     metric, power = _metric(found, told, axes, degree)
     return Stored(
         connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power
@@ -154,6 +156,20 @@ def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsle
         else 0 * rows[0]
     )
     return Finsler(axes, rows, left, degree), float(power)
+
+
+def _check_pairs(found: dict, axes, masked: np.ndarray) -> None:
+    """ValueError for a CCF of pairs of joints that fits neither grid nor pairs; what is looked up is made anew from A."""
+    pairs = np.array([*combinations(range(1, len(axes) + 1), 2)], float)
+    if "pair_joints" in found and not np.array_equal(found["pair_joints"][1], pairs):
+        raise ValueError(f"has pair_joints other than {pairs.astype(int).tolist()}: {SOURCE}")
+    dimensions = ("pair", "component", *(f"alpha_{k + 1}" for k in range(len(axes))))
+    for name in {"ccf_pairs", "ccf_pairs_error"} & found.keys():
+        values = _array(found, name, dimensions, axes)
+        if values.shape[:2] != (len(pairs), 3):
+            raise ValueError(f"has {name} of shape {values.shape} where it must be ({len(pairs)}, 3, ...): {SOURCE}")
+        if not masked.any():
+            numbers(name, values)
 
 
 def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:
