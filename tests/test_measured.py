@@ -233,6 +233,14 @@ def test_errors_of_neighbours_add_up_as_bartlett_has_it():
     assert len(regression.lagged(np.tile(x, (5, 1)))) == 200 + regression.LAGS - 1
 
 
+def test_sums_that_noise_makes_negative_are_solved_all_the_same():
+    """Products of two halves have any sign where a regressor is but noise."""
+    matrix = np.array([[[2e-8, 1e-9, 3e-9], [1e-9, -4e-9, 1e-9], [3e-9, 1e-9, 5e-9]]])
+    right = np.arange(9.0).reshape(1, 3, 3)
+    found = regression.Sums(matrix, right, np.ones((1, 3)), (1, 1), 1).solved(np.ones(1))
+    np.testing.assert_allclose(found, np.linalg.solve(matrix[0], right[0]), rtol=1e-12)
+
+
 def test_half_of_what_the_second_order_changes_is_an_error(usual):
     held = regression.sums(usual.known.loop, usual.samples, 3)
     found, errors = regression.solution(held)
@@ -508,6 +516,16 @@ def scaled(rows):
     return rows
 
 
+def idle(rows):
+    rows[:, 2] = 0.2 + 1e-3 * noise(rows[:, 1])
+    return rows
+
+
+def drifting(rows):
+    rows[:, 2] = np.linspace(0, 1, len(rows)) + 1e-3 * noise(rows[:, 1])
+    return rows
+
+
 def larger(rows):
     """From one cycle to the next, where the gait passes its centre."""
     rows[205:, 1:3] = GAIT.middle + 1.25 * (rows[205:, 1:3] - GAIT.middle)
@@ -524,6 +542,9 @@ BAD = {
     ),
     "one joint twice": (twice, "alpha_2 is 1 times alpha_1, .*: one shape variable recorded 2 times .*, by --columns"),
     "one joint scaled": (scaled, "alpha_2 is -0.5 times alpha_1, but for a constant and noise"),
+    "idle": (idle, "alpha_2 does not move beyond its noise: leave it out with --columns"),
+    "drift": (drifting, "alpha_2 drifts from 0.1.* to 0.8.* over the log and swings by .*: .*; leave it out"),
+    "kilometres": (changed(slice(3, 5), lambda x: 1e12 * x), "entries of A come out as large as .*: give x and y in body"),
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
     "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),

@@ -17,6 +17,8 @@ APART = 1.25  # ratio of the periods of the first and the last quarter of a log 
 TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
 AFTER = 0.8  # the same where all cycles of one come before those of the other
 LEAST_APART = 0.05  # of the gait's size, between the means of two gaits
+STEADY = 4  # times the scatter of a joint's cycles about it, that a drift is at least
+SURELY = 1.5  # standard deviations of noise that may look like a motion
 THIN = 1e-3  # of its length, the width of a gait that encloses nothing
 REFINED = 3  # times the phase is that of the nearest point of the mean gait
 
@@ -54,11 +56,16 @@ def period(log: Log) -> float:
     return found
 
 
-def check_a_loop(log: Log, joints: Smoothed) -> None:
-    """SceneError if all joints are one, to noise: what goes to and fro on a line is no loop."""
+def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
+    """SceneError if a joint does nothing but noise, or if all joints are one: what goes to and fro on a line is no loop. rows:
+    a cycle."""
     off = joints.values - joints.values.mean(0)
+    left = SURELY * joints.noise * np.sqrt(joints.knots / rows)  # of noise in a spline
+    for name, size, noise in zip(log.joints, off.std(0), left):
+        if size <= noise:
+            raise log.wrong(f"{name} does not move beyond its noise: leave it out with --columns")
     _, size, ways = np.linalg.svd(off, full_matrices=False)
-    if size[1] > max(THIN * size[0], np.sqrt(len(off)) * joints.noise.max()):
+    if size[1] > max(THIN * size[0], np.sqrt(len(off)) * left.max()):
         return
     first, last, slope = log.joints[0], log.joints[-1], ways[0, -1] / ways[0, 0]
     raise log.wrong(
@@ -111,6 +118,20 @@ def whole(log: Log, at: np.ndarray, period: float) -> np.ndarray:
     first, last = np.ceil(turns[kept].min()), np.floor(turns[kept].max())
     number = np.floor(turns - first).astype(int)
     return np.where(kept & (turns >= first) & (turns < last), number, -1)
+
+
+def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
+    """SceneError for a joint that runs on from cycle to cycle, by more than it swings in one."""
+    c = np.arange(number.max() + 1)
+    for name, x in zip(log.joints, alpha.T):
+        each = [x[number == k] for k in c]
+        means, swing = np.array([a.mean() for a in each]), float(np.median([np.ptp(a) for a in each]))
+        slope, start = np.polyfit(c, means, 1)
+        if abs(slope) * c[-1] > max(swing, STEADY * (means - start - slope * c).std()):
+            raise log.wrong(
+                f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log and swings by {swing:.2g} in a cycle: "
+                "what drifts is no part of a gait; leave it out with --columns"
+            )
 
 
 def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray) -> None:

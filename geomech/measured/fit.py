@@ -16,6 +16,7 @@ from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
 from geomech.reconstruct import displacement
+from geomech.tables.base import LARGEST_ENTRY
 from geomech.tube import Known, Loop, Tube, grid_of, series, tube
 from rft import se2
 
@@ -108,13 +109,14 @@ def fit_log(
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
-    cycles.check_a_loop(log, joints)
     rows = len(log.t) * period / (log.t[-1] - log.t[0])
+    cycles.check_a_loop(log, joints, rows)
     most = max(1, int(min(HARMONICS, joints.knots / 2, rows / 4)))
     phase, loop = cycles.phased(log, joints, period, most)
     count = cycles.whole(log, phase, period)
     if count.max() + 1 < cycles.FEWEST:
         raise log.wrong(f"{count.max() + 1} whole cycles are too few: give at least {cycles.FEWEST}")
+    cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
     return _regressed(log, loop, phase, count, joints, pose, level, harmonics, within, body_length)
 
@@ -145,6 +147,10 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
         np.zeros((3, 2, 1)), regression.factor(len(held.square), level), level,
     )  # fmt: skip
+    if (largest := max(np.abs(known.whole).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
+        raise log.wrong(
+            f"entries of A come out as large as {largest:.1g}: give x and y in body lengths or m, and joints that move"
+        )
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
     mean, mean_off = mean_of(measured, level)
     square = (_net(known)[0] - mean) ** 2 - mean_off**2  # less what the mean leaves open

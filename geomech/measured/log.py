@@ -12,6 +12,7 @@ import numpy as np
 
 from geomech.errors import SceneError, UnitWarning, short
 from geomech.rows import read as read_rows
+from geomech.tables.base import LARGEST_ANGLE
 
 LARGEST_FILE = 100_000_000  # bytes
 MOST_ROWS, FEWEST_ROWS = 500_000, 100
@@ -134,6 +135,8 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
         if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
             said = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
             raise log.wrong(f"{said}: say --degrees if these are degrees", row)
+        if abs(log.alpha[row, k]) > LARGEST_ANGLE:
+            raise log.wrong(f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees: no joint turns so far", row)
     if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
         said = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
         warnings.warn(f"{log.name}: {said}", UnitWarning, stacklevel=3)

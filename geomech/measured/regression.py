@@ -68,7 +68,7 @@ class Sums:
     def solved(self, weights: np.ndarray) -> np.ndarray:
         """(..., P, 3) for weights (..., B) of the blocks."""
         matrix, right = np.tensordot(weights, self.matrix, 1), np.tensordot(weights, self.right, 1)
-        size = np.sqrt(np.maximum(np.einsum("...pp->...p", matrix), 1e-300))
+        size = np.sqrt(np.maximum(np.abs(np.einsum("...pp->...p", matrix)), 1e-300))
         scaled = matrix / size[..., :, None] / size[..., None, :]
         return np.linalg.solve(scaled, right / size[..., None]) / size[..., None]
 
