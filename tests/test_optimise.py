@@ -327,6 +327,18 @@ def test_singular_shapes_are_kept_away_from():
     assert np.abs(d).min() > 0.45 * np.abs(snake.system.singularity(snake.gait.cycle(500)[0])).min()
 
 
+def test_a_gait_drawn_together_is_kept_clear_of_them_too():
+    found = optimise(geomech.load("no-slip-snake"), within=(1.0, 0.5), harmonics=1)
+    assert found.value >= found.start.value > 0
+
+
+def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
+    with pytest.raises(
+        SceneError, match="three-link-viscous: its limits let a gait repeat more than 10000 times a second"
+    ):
+        optimise(viscous(), "speed", rate=1e6)
+
+
 @pytest.mark.parametrize(
     ("name", "asked", "said"),
     [

@@ -11,21 +11,21 @@ import numpy as np
 
 from geomech import workers
 from geomech.connection import check_knobs
-from geomech.errors import named
+from geomech.errors import SceneError, named
 from geomech.files import note
 from geomech.gaits import Gait
+from geomech.gaits.base import FASTEST
 from geomech.optimise import loops as series
 from geomech.optimise import ways
 from geomech.optimise.climb import TRIES, climb
-from geomech.optimise.cycles import Brought, brought
 from geomech.optimise.keeping import NEARLY, Keeping
 from geomech.optimise.limits import Asked
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
 from geomech.optimise.request import CLIMB, FINISH, NEAR, RUNS, Request, checked
+from geomech.optimise.telling import told
 from geomech.reconstruct import turning
 from geomech.scene.model import Scene
-from geomech.study import estimate
 
 NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
 FINISHED = 2  # answers of the table that the direct tier goes on from
@@ -75,20 +75,21 @@ class _Search:
     def optimum(self) -> Optimum:
         r = self.r
         own = r.loops.of(r.scene.gait)
-        start = self._told(self._start())
-        turn = abs(float(start.displacement[2]))
         self.origin, *others = r.loops.starts(own, r.starts)
         self.keeping = Keeping(r.loops, r.system.singularity, self.origin)
+        start = self._told(self._start())
+        self._timed(start)  # refuses what no gait can be
+        turn = abs(float(start.displacement[2]))
         found = self._climbed([self.keeping.first, *map(self.keeping.start, others)], turn)
         best, answers, p = start, [], None
         for q, times in found:
             if self.keeping.meets(q, NEARLY):
                 continue
-            told, q = self._forwards(self._told(self._turned_to(q)), q)
-            straight = not r.aim.straight or abs(told.displacement[2]) <= turn + TURNED + told.heading
-            answers.append((told.value, times))
-            if straight and told.value > best.value:
-                best, p = told, q
+            this, q = self._forwards(self._told(self._turned_to(q)), q)
+            straight = not r.aim.straight or abs(this.displacement[2]) <= turn + TURNED + this.heading
+            answers.append((this.value, times))
+            if straight and this.value > best.value:
+                best, p = this, q
         if p is None:
             best, p = dataclasses.replace(start, gait=self._as_series(start.gait)), r.loops.fitted(own)
         active = [*r.loops.active(p), *["singular shapes"] * self.keeping.meets(p, 1 / NEARLY), *best.limits]
@@ -202,6 +203,7 @@ class _Search:
         if r.gait is not r.scene.gait:
             limit = f"{r.loops.within:g} rad" if np.ndim(r.loops.within) == 0 else "its limits"
             note(f"{r.scene.name}: its gait reaches beyond {limit}: the search starts from a smaller one")
+            return r.loops.gait(self.keeping.first)
         return r.gait
 
     def _turned_to(self, p: np.ndarray) -> Gait:
@@ -218,19 +220,23 @@ class _Search:
             p = series.shifted(p, 2 * np.pi / n * (k + share))
         return r.loops.gait(p)
 
-    def _forwards(self, told: Told, p: np.ndarray) -> tuple[Told, np.ndarray]:
+    def _forwards(self, this: Told, p: np.ndarray) -> tuple[Told, np.ndarray]:
         """Run backwards where a direction is asked for and the gait goes the other way, if that brings as much."""
         k = "xy".find(self.r.aim.direction or "-")
-        if k < 0 or told.displacement[k] >= 0 or not isinstance(self.r.loops, Loops):
-            return told, p
+        if k < 0 or this.displacement[k] >= 0 or not isinstance(self.r.loops, Loops):
+            return this, p
         back = series.reversed_(p)
         other = self._told(self._turned_to(back))
-        return (other, back) if other.value >= told.value * (1 - AS_MUCH) else (told, p)
+        return (other, back) if other.value >= this.value * (1 - AS_MUCH) else (this, p)
 
-    def _timed(self, told: Told) -> Gait:
-        gait = told.gait
-        frequency = 1 / (2 * np.pi * told.time) if self.r.aim.timed and told.time else self.r.scene.gait.frequency
-        return dataclasses.replace(gait, frequency=frequency)
+    def _timed(self, this: Told) -> Gait:
+        """With the frequency that its limits allow."""
+        if self.r.aim.timed and 0 < this.time < 1 / (2 * np.pi * FASTEST):
+            raise SceneError(
+                f"its limits let a gait repeat more than {FASTEST:g} times a second: lower --rate, or --power"
+            )
+        frequency = 1 / (2 * np.pi * this.time) if self.r.aim.timed and this.time else self.r.scene.gait.frequency
+        return dataclasses.replace(this.gait, frequency=frequency)
 
     def _as_series(self, gait: Gait) -> Gait:
         """The start itself, at amplitude 1."""
@@ -244,41 +250,8 @@ class _Search:
         return gait
 
     def _told(self, gait: Gait) -> Told:
-        r, system, aim = self.r, self.r.scene.system, self.r.aim
-        phases = max(r.scene.numerics.phases, r.loops.phases, 4 * gait.harmonics)
-        (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
         self.count += 1
-        alpha, alphadot = gait.cycle(phases)
-        degree = r.degree if r.power else 1.0
-        full = system.run(alpha, alphadot, r.power is not None)
-        P = self._power(full, alpha, alphadot)
-        b = self._brought(full, net, P, degree)
-        period, limits = 1.0, []
-        if aim.timed:
-            period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
-        value = aim.value(b, period)[0]
-        error = errors[1] if aim.name == "turning" else errors[0]
-        length = b.length and b.length[0]
-        if aim.name == "efficiency":
-            coarse = 2 * np.pi * (P[::2] ** (1 / degree)).mean()
-            error = (error + value * abs(length - coarse)) / (length or 1.0)
-        if aim.timed:
-            error = error / (2 * np.pi * (period or 1.0))
-        work = 2 * np.pi * b.power[0] if b.power and system.cost is None else None
-        return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
-
-    def _power(self, run, alpha, alphadot) -> np.ndarray | None:
-        """(N,) of a gait that was run, body drag x body length / time; None where nothing tells it."""
-        r = self.r
-        if run.work is not None:
-            return np.maximum(run.work.power / r.system.length, 0.0)
-        return None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
-
-    @staticmethod
-    def _brought(run, net, power, degree: float) -> Brought:
-        """Numbers of a gait without slopes."""
-        flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
-        return Brought(*map(flat, (net, *brought(run, power, degree)[1:])))
+        return told(self.r, gait)
 
 
 class Way(NamedTuple):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech import two_form
 from geomech.connection import Connection
 from geomech.field import Field
 from geomech.files import whole_file
@@ -89,7 +90,7 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature, unit))
         found.append(of_ccf(study.curvature_error, unit, "ccf_error", ERROR_OF_CCF))
     elif len(study.fitted.axes) > 2:
-        found += of_pairs(study.two_form, study.two_form_error, unit)
+        found += of_pairs(study.two_form, two_form.error(study.fitted), unit)
     if study.scene.system.carried:
         found.append(of_frame(study.scene.system.field.field, unit))
     if not effort.why_none(study.scene.system):

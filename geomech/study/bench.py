@@ -28,7 +28,6 @@ from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import axes, plane
 from geomech.two_form import TwoForm, two_form
-from geomech.two_form import error as two_form_error
 
 
 class Study:
@@ -137,12 +136,6 @@ class Study:
     def two_form(self) -> TwoForm:
         """The CCF of all pairs of joints, of any number (`geomech.two_form`)."""
         return self._kept("two-form", TIERS["path"].depends_on, (), lambda: two_form(self.fitted))[0]
-
-    @property
-    def two_form_error(self) -> TwoForm:
-        """The estimated error of `two_form`."""
-        make = lambda: two_form_error(self.fitted)
-        return self._kept("error of the two-form", TIERS["path"].depends_on, (), make)[0]
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
         """`metric`, telling ``progress`` the fraction done. Where it takes the velocities of the harmonic table, that is

@@ -1,0 +1,49 @@
+"""What a gait brings and costs, by the direct tier, with its error."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.gaits import Gait
+from geomech.optimise import loops as series
+from geomech.optimise.cycles import Brought, brought
+from geomech.optimise.optimum import Told
+from geomech.optimise.request import Request
+from geomech.study import estimate
+
+
+def told(r: Request, gait: Gait) -> Told:
+    """A gait at its own amplitude."""
+    system, aim = r.scene.system, r.aim
+    phases = max(r.scene.numerics.phases, r.loops.phases, 4 * gait.harmonics)
+    (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
+    alpha, alphadot = gait.cycle(phases)
+    degree = r.degree if r.power else 1.0
+    run = system.run(alpha, alphadot, r.power is not None)
+    P = _power(r, run, alpha, alphadot)
+    b = _without_slopes(net, *brought(run, P, degree)[1:])
+    period, limits = 1.0, []
+    if aim.timed:
+        period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
+    value = aim.value(b, period)[0]
+    error = errors[1] if aim.name == "turning" else errors[0]
+    length = b.length and b.length[0]
+    if aim.name == "efficiency":
+        coarse = 2 * np.pi * (P[::2] ** (1 / degree)).mean()
+        error = (error + value * abs(length - coarse)) / (length or 1.0)
+    if aim.timed:
+        error = error / (2 * np.pi * (period or 1.0))
+    work = 2 * np.pi * b.power[0] if b.power and system.cost is None else None
+    return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
+
+
+def _power(r: Request, run, alpha, alphadot) -> np.ndarray | None:
+    """(N,) of a gait that was run, body drag x body length / time; None where nothing tells it."""
+    if run.work is not None:
+        return np.maximum(run.work.power / r.system.length, 0.0)
+    return None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
+
+
+def _without_slopes(*numbers) -> Brought:
+    flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
+    return Brought(*map(flat, numbers))
