@@ -361,6 +361,7 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
         ("three-link-viscous", {"within": [1.0]}, "one for each of 2 joints"),
         ("three-link-viscous", {"within": [(1.0, 0.0), (-1.0, 1.0)]}, "or as many from low to high"),
         ("sandfish-loose", {"aim": "turning"}, "does not turn"),
+        ("sandfish-loose", {"direction": "y"}, "brings nothing across it"),
         (
             "differential-drive",
             {"aim": "turning"},

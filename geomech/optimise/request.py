@@ -157,6 +157,8 @@ def checked(
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not wanted.straight:
             raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
+        if isinstance(loops, Undulations) and wanted.direction == "y" and system.mirror:
+            raise SceneError("a sine along a straight axis brings nothing across it: drop --direction, or say x")
         if isinstance(loops, Undulations) and wanted.rate is not None:
             raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
         request = Request(scene, wanted, loops, int(starts))
