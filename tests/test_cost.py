@@ -97,7 +97,7 @@ def test_accuracy_and_sweep_say_what_they_cost(solved):
 
 
 LARGE = {
-    "amplitudes": ["displacement", "three-link-glass", "--amplitudes", "0.1:2:99999"],
+    "amplitudes": ["displacement", "sandfish-loose", "--amplitudes", "0.1:0.4:99999"],
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
