@@ -19,7 +19,7 @@ STEPS = {"implicit": (12, 16, 24, 32, 48, 64, 96, 128), "held": (128, 256, 512, 
 FINEST, FREQUENCY = 768, 2.0
 SETTLED = 6  # strides, at most, to the limit cycle
 HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: without, none of these steps stays finite
-FREQUENCIES = {"xplorer": (1.0, 2.0, 3.0, 4.0), "sandbot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
+FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
 
 
 def _course(steps: int):
@@ -61,7 +61,7 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
     study = {how: (n, np.array([abs(way(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
     speeds = {}
     for name, some in frequencies.items():
-        scene = load(name)
+        scene = load(name.lower())
         walkers = [
             dataclasses.replace(scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))) for f in some
         ]
@@ -86,7 +86,7 @@ def draw(numbers: dict):
         ax.plot(frequency, planar, "-", color="0.3", lw=1.2, label="planar")
         ax.plot(frequency, full, "o", color="C0", ms=5, label="MuJoCo")
         ax.set(xlabel="frequency (Hz)", ylabel="speed (m/s)", ylim=(0, None))
-        ax.set_title(f"{name.capitalize()}: within {100 * np.abs(full / planar - 1).max():.1f} %")
+        ax.set_title(f"{name}: within {100 * np.abs(full / planar - 1).max():.1f} %")
         ax.legend(loc="best")
     return fig
 

@@ -130,10 +130,11 @@ WRONG = {
     '["fl", "fr", "rl", "rr", "trunk"]': ("[]", "a robot without legs"),
     '"trunk"]': ('"floor"]', "fixed to the world"),
     '"rr", "trunk"]': ('"rr", "rr"]', "names one twice"),
+    '"rr", "trunk"': ('"rr", "trunc"', "has no geom 'trunc': did you mean 'trunk'?"),
     "[gait]": ('actuators = ["zz"]\n[gait]', "has no actuator 'zz': it has fl, fr"),
     "frequency = 1.0": ("frequency = 0", "frequency must be"),
     "\n[gait]": ("phases = [0.5]\n[gait]", "phases must be 4 numbers"),
-    "geoms": ("goems", "a robot without legs"),
+    "geoms": ("goems", "'goems' is unknown; did you mean 'geoms'"),
     "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file: drop one"),
     "mjcf": ("legs = 3\nmjcf", "key: 'legs' is unknown"),
     "steps = 8": ('engine = "planar"', "use --engine mujoco"),
@@ -166,6 +167,9 @@ FILES = {
     "gravity must be along -z": CART.replace("0 0 -9.81", "0 -9.81 0"),
     "the actuator 'fl' has a ctrlrange": CART.replace('kv="0.4"', 'kv="0.4" ctrlrange="-1 1"'),
     "state of their own": CART.replace("</actuator>", '<general joint="fl" dyntype="filter" dynprm="0.1"/></actuator>'),
+    "nan or inf in body_pos, keyframe qpos": CART.replace('pos="0 0 0.4"', 'pos="0 0 nan"').replace(
+        "</mujoco>", '<keyframe><key qpos="0 0 nan 1 0 0 0 0 0 0 0"/></keyframe></mujoco>'
+    ),
     "larger than 20 MB": " " * 20_000_001,
 }
 

@@ -218,8 +218,10 @@ def test_the_figure_compares_steps_and_engines(monkeypatch):
     coarse = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, elements=4))
     monkeypatch.setattr(walking_mujoco, "load", lambda name: coarse)
     monkeypatch.setattr(walking_mujoco, "SETTLED", 1)
-    numbers = walking_mujoco.compute({"implicit": (12,), "held": (12,)}, 24, {"xplorer": ()})
+    numbers = walking_mujoco.compute({"implicit": (12,), "held": (12,)}, 24, {"SandBot": ()})
     (_, implicit), (_, held) = numbers["steps"].values()
     assert implicit.max() < 0.2 < held[0]
-    numbers["speeds"]["xplorer"] = (1.0, 2.0), np.array([0.1, 0.2]), np.array([0.1, 0.202])
-    assert walking_mujoco.draw(numbers).axes[0].get_ylabel() == "error of the way"
+    numbers["speeds"]["SandBot"] = (1.0, 2.0), np.array([0.1, 0.2]), np.array([0.1, 0.202])
+    ways, speeds = walking_mujoco.draw(numbers).axes
+    assert (ways.get_ylabel(), speeds.get_title()) == ("error of the way", "SandBot: within 1.0 %")
+    assert {name.lower() for name in walking_mujoco.FREQUENCIES} <= {*scenes.walker_names()}

@@ -221,6 +221,16 @@ def test_absurd_robots_end_with_a_status_and_numbers(what):
         assert np.isfinite(values).all()
 
 
+def test_slow_robots_walk_as_their_clock_says():
+    """The law is rate-independent: so is the way of a cycle, where nothing has momentum, however slow the clock."""
+    slow = (1e-3, 2e-2, 5e-2)
+    found = walk([xplorer(1.0, f) for f in slow], Fineness(steps=16, elements=6), 3)
+    ways = np.array([w.speed / f for w, f in zip(found, slow)])
+    assert all(w.periodic and w.unsolved == 0 for w in found)
+    np.testing.assert_allclose(ways[:2], ways[2], rtol=0.01)
+    assert 0.1 < ways[2] < 2 * np.pi * 0.041
+
+
 def test_a_walk_may_be_over_before_its_first_step():
     (found,) = walk([Walker(ROBOT, Tripod(2.0), SAND)], dataclasses.replace(QUICK, duration=1e-3))
     assert found.t.tolist() == [0.0] and found.speed > 0.0 and found.unaccounted == 0.0
@@ -326,6 +336,7 @@ WRONG = {
     "height = 0.03 ": ("heigth = 0.03 ", "did you mean 'height'"),
     "radius = 0.0205 ": ("radius = 20.5 ", "radius must be a number from 1e-06 to 10 m"),
     "[gait]": ("[gate]", "did you mean 'gait'"),
+    "[robot.legs]": ("[robot.legz]", "key: 'legz' is unknown; did you mean 'legs'"),
     "sweep_deg = 180": ("sweep_deg = 400", "sweep must be a number"),
     "width = 0.01 ": ("", "width"),
 }  # fmt: skip

@@ -133,12 +133,11 @@ def _robot(name: str, table: Mapping, at) -> Robot:
         return _machine(place, rest, at)
     kind = ROBOTS[_kind(place, rest, "kind", ROBOTS)]
     del rest["kind"]
-    part = kind.part
-    if not rest.get(part) or not isinstance(rest[part], Mapping):
-        raise SceneError(f"{place} is a robot without {kind.parts}: add the table [robot.{part}], {CURE}")
-    names = [f.name for f in dataclasses.fields(kind)]
+    part, names = kind.part, [f.name for f in dataclasses.fields(kind)]
     for key in rest:
         choose(f"{place} key", key, names)
+    if not rest.get(part) or not isinstance(rest[part], Mapping):
+        raise SceneError(f"{place} is a robot without {kind.parts}: add the table [robot.{part}], {CURE}")
     made = _part(f"{name}: [robot.{part}]", at(rest.pop(part)), kind)
     needed = {f.name for f in dataclasses.fields(kind) if f.default is dataclasses.MISSING} - {part}
     if lacking := sorted(needed - {*rest}):
@@ -158,13 +157,13 @@ def _part(place: str, table: dict, robot: type[Robot]) -> Shape | Solid:
 
 def _machine(place: str, table: dict, at) -> Mjcf:
     """A robot of an MJCF file."""
-    if not table.get("geoms"):
-        raise SceneError(f"{place} is a robot without legs: give geoms, a list of those that touch the ground")
     if (kind := table.pop("kind", "mjcf")) != "mjcf":
         raise SceneError(f"{place}: kind = {short(kind)} has sizes, mjcf a file: drop one")
     names = [f.name for f in dataclasses.fields(Mjcf) if f.init]
     for key in table:
         choose(f"{place} key", key, names)
+    if not table.get("geoms"):
+        raise SceneError(f"{place} is a robot without legs: give geoms, a list of those that touch the ground")
     if isinstance(table["mjcf"], str):
         table["mjcf"] = at({"file": table["mjcf"]})["file"]
     with named(place):

@@ -11,7 +11,7 @@ from rft.media.base import check_ranges, in_range, require, shown
 from rft.spatial.law import Spatial
 from rft.vertical.effects import Aeration, GrainInertia, GroundEffect, checked, pressure, strength
 from rft.vertical.stress import PlateStress
-from rft.walking.robot import Robot, Tripod
+from rft.walking.robot import SMALLEST, Robot, Tripod
 from rft.walking.stride import Walk
 
 
@@ -48,8 +48,9 @@ class Walker:
 @dataclass(frozen=True)
 class Fineness:
     """steps (-): of a cycle. elements (-): of a leg's outline; the belly has as many. rounding (m/s): below which drag
-    falls off in proportion to speed. duration (s): of walking from rest, at most. engine (-): planar or mujoco; if left out
-    the planar one, but for robots and ground of three dimensions."""
+    falls off in proportion to speed; of slow legs it is no more than 5 % of the speed of their ends. duration (s): of
+    walking from rest, at most. engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three
+    dimensions."""
 
     steps: int = 32
     elements: int = 12
@@ -63,7 +64,7 @@ class Fineness:
         for name, low, high in (("steps", 8, 10_000), ("elements", 4, 1000)):
             in_range(name, getattr(self, name), low, high, whole=True)
             object.__setattr__(self, name, int(getattr(self, name)))
-        check_ranges(self, rounding=(1e-7, 0.1), duration=(1e-3, 1e4))
+        check_ranges(self, rounding=(SMALLEST, 0.1), duration=(1e-3, 1e4))
 
 
 class Engine(Protocol):

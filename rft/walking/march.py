@@ -27,6 +27,7 @@ ITERATIONS, HALVINGS = 14, 3  # of Newton's method, and of a step that it does n
 WIDTHS = np.array(
     [1.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0]
 )  # times the rounding, one after another until one is solved as it is
+FARTHEST = 0.2  # of a leg's reach, that a step of Newton's method moves a body by
 LEAST = 0.05  # of a step of Newton's method, below which it is given up
 ENOUGH = 0.1  # of the fall of the residual that Newton's method foretells
 
@@ -50,7 +51,8 @@ class _March:
     """Where each of B robots is. At a step: ``level`` times halved and ``done`` of it, in 1 / 2^HALVINGS. At the first
     or second ``stage`` of that: v = from_ + k a(base + k v, v), with legs at ``angle``. At a ``width``, after
     ``tries``: ``found``, of all v tried the one that is least ``off``, and ``trial``, the next, a ``share`` of Newton's
-    step ``newton`` away. now: packed state at the start of the part of the step; states: after each step."""
+    step ``newton`` away, at first ``most`` of it. now: packed state at the start of the part of the step; states:
+    after each step."""
 
     def __init__(self, robots: Robots, which, state: State, phases, of, stop):
         self.robots, self.which, self.stop = robots, which, stop
@@ -62,7 +64,7 @@ class _March:
         self.now = state.packed()
         self.states = np.empty((steps, *self.now.shape))
         self.step, self.level, self.done, self.stage, self.width, self.tries = np.zeros((6, count), int)
-        self.k, self.off, self.share = np.zeros((3, count))
+        self.k, self.off, self.share, self.most = np.zeros((4, count))
         self.power, self.first = (
             np.zeros((2, count)),
             np.zeros((3, count)),
@@ -83,11 +85,13 @@ class _March:
         self.found[took], self.off[took] = self.trial[took], size[better]
         self.power[:, took] = np.array(power)[:, better]
         self.newton[took] = -solved(slopes[better], residual[better])
-        self.share[r] = np.where(better, 1.0, self.share[r] / 2)
+        whole = np.abs(self.k[took, None] * self.newton[took] * self.size[took]).max(-1)
+        self.most[took] = 1.0 / np.maximum(1.0, whole / (FARTHEST * self.robots.reach[self.which[took]]))
+        self.share[r] = np.where(better, self.most[r], self.share[r] / 2)
         self.trial[r] = self.found[r] + self.share[r, None] * self.newton[r]
         self.tries[r] += 1
         good = better & (size <= WIDTHS[self.width[r]] * self.solved[r])
-        self._go_on(r[good], r[~good & ((self.share[r] <= LEAST) | (self.tries[r] == ITERATIONS))])
+        self._go_on(r[good], r[~good & ((self.share[r] <= LEAST * self.most[r]) | (self.tries[r] == ITERATIONS))])
 
     def _go_on(self, good, given_up):
         """From rounding to rounding, stage to stage, step to step."""
@@ -109,7 +113,7 @@ class _March:
 
     def _begin_newton(self, r, guess):
         self.trial[r] = self.found[r] = guess
-        self.off[r], self.share[r], self.tries[r], self.newton[r] = np.inf, 1.0, 0, 0.0
+        self.off[r], self.share[r], self.most[r], self.tries[r], self.newton[r] = np.inf, 1.0, 1.0, 0, 0.0
 
     def _begin_stage(self, r, stage: int, base, from_, guess, share: float):
         """At a share of the present part of a step."""

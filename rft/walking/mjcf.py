@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -68,19 +69,31 @@ class Mjcf(Robot):
         return float(self.model.body_mass.sum())
 
     def _find_geoms(self) -> None:
-        import mujoco
 
         model = self.model
         require(model.nv > 0, f"{self.mjcf}: nothing can move: it has no joints")
         found = []
         for name in self.geoms:
-            geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-            require(geom >= 0, f"{self.mjcf} has no geom {shown(name)}: it has {_names(model, 'GEOM', model.ngeom)}")
+            geom = self._number("geom", name, model.ngeom)
             still = model.body_weldid[model.geom_bodyid[geom]] == 0
             require(not still, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
             found.append(geom)
         model.geom_contype[found] = model.geom_conaffinity[found] = 0  # the grains bear them, and no floor
         object.__setattr__(self, "found", np.array(found))
+
+    def _number(self, kind: str, name: str, count: int) -> int:
+        """Of the model's geom or actuator of that name; ValueError that names the nearest, or the first few, if it has none."""
+        import mujoco
+
+        kinds = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        number = mujoco.mj_name2id(self.model, kinds, name)
+        if number < 0:
+            names = [x for x in (mujoco.mj_id2name(self.model, kinds, k) for k in range(count)) if x]
+            near = difflib.get_close_matches(name, names, 1, 0.5)
+            few = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
+            told = f"did you mean {shown(near[0])}?" if near else f"it has {few}"
+            raise ValueError(f"{self.mjcf} has no {kind} {shown(name)}: {told}")
+        return number
 
     def _find_driven(self) -> None:
         import mujoco
@@ -100,10 +113,8 @@ class Mjcf(Robot):
             told = f"{self.mjcf}: no actuator can follow the clock: {cure}, or actuators = [] for the first keyframe's controls"
             require(len(driven) > 0, told)
         else:
-            ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in self.actuators]
+            ids = [self._number("actuator", name, model.nu) for name in self.actuators]
             for name, k in zip(self.actuators, ids):
-                told = f"it has {_names(model, 'ACTUATOR', model.nu)}"
-                require(k >= 0, f"{self.mjcf} has no actuator {shown(name)}: {told}")
                 require(bool(able[k]), f"{self.mjcf}: the actuator {shown(name)} cannot follow the clock: {cure}")
             driven = np.array(ids, int)
         for k in driven:
@@ -139,6 +150,9 @@ def _compiled(file: str):
         import mujoco
     except ImportError:
         raise ValueError(MISSING) from None
+    mujoco.set_mju_user_warning(
+        lambda _: None
+    )  # it writes them to the screen and a file; what matters is refused below
     path = Path(file)
     try:
         require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")
@@ -151,6 +165,8 @@ def _compiled(file: str):
     except Exception as error:  # whatever the parser makes of a file that is none
         told = " ".join(str(error).split())
         raise ValueError(f"{file} is no MJCF that MuJoCo reads: {told[:300]}") from None
+    if wrong := _not_finite(model):
+        raise ValueError(f"{file}: nan or inf in {wrong}: every number of an MJCF must be finite")
     down = model.opt.gravity
     upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
     require(bool(upright), f"{file}: gravity must be along -z, the ground is at z = 0")
@@ -159,10 +175,8 @@ def _compiled(file: str):
     return model, hashlib.sha256(whole).hexdigest()[:16]
 
 
-def _names(model, kind: str, count: int) -> str:
-    """Of the first few."""
-    import mujoco
-
-    names = [mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), k) for k in range(count)]
-    names = [x for x in names if x]
-    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
+def _not_finite(model) -> str:
+    """Names of arrays that are not all numbers, as "keyframe qpos, body_pos", but for those that MuJoCo makes of others."""
+    arrays = {name: getattr(model, name) for name in dir(model) if not name.endswith(("0", "_spring"))}
+    floats = {name: x for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind == "f"}
+    return ", ".join(name.replace("key_", "keyframe ") for name, x in floats.items() if not np.isfinite(x).all())

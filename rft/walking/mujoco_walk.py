@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from rft.walking.engines import Fineness, Walker
 from rft.walking.facets import Grains
 from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
+from rft.walking.robot import rounded
 from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk
 
 REPEATED = (
@@ -93,6 +95,9 @@ class Course:
         legs = facets.bodies != root
         self.reach = float(facets.reach[legs].max() if legs.any() else facets.reach.max())
         self.far = float((away + facets.reach).max() + facets.reach.max())
+        if len(self.machine.driven):
+            rounding = float(rounded(numerics.rounding, walker.gait.frequency, self.reach))
+            self.body.grains = replace(self.body.grains, rounding=rounding)
         self.own = np.flatnonzero(np.isin(facets.of, np.flatnonzero(~legs)))
 
     def walk(
@@ -107,10 +112,10 @@ class Course:
         if start is not None:
             body.data.qpos[:], body.data.qvel[:] = start
             mujoco.mj_forward(body.model, body.data)
-        approach, moves, periodic, drift = Approach(1), [], False, np.inf
+        approach, moves, periodic, drift, before = Approach(1), [], False, np.inf, 0.0
         rows, states, last, ended = [self.row()], [body.data.qpos.copy()], self.section(), self.ended()
         for stride in range(most):
-            first, begun = rows[-1], len(rows) - 1
+            first, begun, before = rows[-1], len(rows) - 1, body.defect
             ended = ended or self.stride(stride, rows, states)
             if progress:
                 progress((stride + 1) / most)
@@ -125,6 +130,7 @@ class Course:
                 break
         limit = None if ended else Start(self.unwound(stride + 1), body.data.qvel.copy())
         table, path = np.array(rows), np.array(states)
+        off = body.defect - before if periodic else body.defect / max(1, len(moves))
         speed, drift, status = self.told(table, moves, periodic, drift, ended)
         if periodic and duration is not None:
             table, path = _repeated(table, path, len(table) - 1 - begun, duration)
@@ -136,7 +142,7 @@ class Course:
         more = {name: named[name] for name in ("y", "roll", "yaw")} | {"states": path}
         return Walk(
             named["t"], pose, twist, named["work"], named["loss"], named["energy"], speed, status,
-            float(len(moves)), periodic, drift, limit, body.unsolved, body.residual, body.defect / max(1, len(moves)), more,
+            float(len(moves)), periodic, drift, limit, body.unsolved, body.residual, off, more,
         )  # fmt: skip
 
     def told(self, rows, moves, periodic: bool, drift: float, ended: str) -> tuple[float, float, str]:

@@ -24,6 +24,7 @@ GAMMA = 1.0 - math.sqrt(0.5)  # of SDIRK2
 SOLVED = 1e-3  # m/s, times the rounding: what a stage may be off by
 ITERATIONS, HALVINGS = 12, 3  # of Newton's method, and of a step that it does not solve
 WIDER = (30.0, 8.0, 3.0, 1.5, 1.0)  # times the rounding, where Newton's method fails at once
+FARTHEST = 0.2  # of the farthest reach of a body, that a step of Newton's method moves anything by
 LEAST = 0.05  # of a step of Newton's method, below which it is given up
 ENOUGH = 0.1  # of the fall of the correction that Newton's method foretells
 NUDGE = 1e-6  # of a velocity, for differences of MuJoCo's forces
@@ -143,21 +144,24 @@ class Multibody:
 
     def _newton(self, q, v, guess, k) -> tuple[np.ndarray, float]:
         """(velocities from a guess, m/s that they are off by); the data are those of what is returned."""
-        limit, share, last = SOLVED * self.grains.rounding, 1.0, True
-        here = guess
+        limit, last, here = SOLVED * self.grains.rounding, True, guess
+        far = FARTHEST * self.facets.reach.max() / k
+        whole = lambda size: far / max(far, size)  # share of a step that goes so far
         residual, slope = self._residual(q, v, here, k)
         step = _solved(slope, -residual)
         size = np.abs(step * self.size).max()
+        share = whole(size)
         for _ in range(ITERATIONS):
-            if size <= limit or share < LEAST or not np.isfinite(size):
+            if size <= limit or share < LEAST * whole(size) or not np.isfinite(size):
                 break
             there = here + share * step
             residual, fresh = self._residual(q, v, there, k)
             ahead = np.abs(_solved(slope, -residual) * self.size).max()
             if ahead <= (1.0 - ENOUGH * share) * size:
-                here, slope, share, last = there, fresh, 1.0, True
+                here, slope, last = there, fresh, True
                 step = _solved(slope, -residual)
                 size = np.abs(step * self.size).max()
+                share = whole(size)
             else:
                 share, last = share / 2, False
         if not last:

@@ -6,6 +6,7 @@ The state is the body's pose (x, z, pitch) and its rates; the legs have no mass 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from rft.media.catalogue import GRAVITY
 from rft.walking.elements import Elements
 from rft.walking.ground import Ground, Outlines
-from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate
+from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate, rounded
 
 NUDGE = 1e-3  # of the rates, times the rounding, for differences
 
@@ -60,7 +61,6 @@ class Robots:
     """B robots of equally many legs and elements on the same kind of ground; ``at``: (K,) phases of the legs."""
 
     def __init__(self, robots: list[Robot], gaits: list[Tripod], ground: Ground, elements: int):
-        self.ground = ground
         column = lambda of, names: np.array([[getattr(x, name) for name in names] for x in of], float)
         self.weighed = column(robots, ("mass", "mass", "inertia"))
         self.frequency, *self.clock = column(gaits, ("frequency", "duty", "sweep", "middle")).T[..., None]
@@ -72,6 +72,7 @@ class Robots:
         self.belly = None if belly[0] is None else Outlines.of(belly)
         self.elements = Elements(self.legs, self.belly, self.hips, ground.stress.tension)
         self.reach = np.abs(self.legs.points).max((1, 2)) + np.zeros(len(robots))
+        self.ground = replace(ground, rounding=rounded(ground.rounding, self.frequency[:, 0], self.reach))
         self.size = np.stack([np.ones_like(self.reach)] * 2 + [self.reach], 1)  # what a rate moves at the hips
 
     def __len__(self) -> int:

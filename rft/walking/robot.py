@@ -20,6 +20,8 @@ MOST_HIPS = 20
 MASSES = (1e-6, 1e4)  # kg
 INERTIAS = (1e-12, 1e5)  # kg m^2
 FREQUENCIES = (1e-3, 200.0)  # Hz
+SMALLEST = 1e-7  # m/s, that a rounding may be
+CREEP = 0.05  # of the speed of the legs' ends, that it may be: above it legs sink as they stand, the more the slower
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,11 @@ def leg_rate(of, duty, sweep) -> np.ndarray:
 def _fast(duty, sweep):
     """rad a cycle, while a leg recovers."""
     return (2 * math.pi - sweep) / (1.0 - duty)
+
+
+def rounded(rounding: float, frequency, reach):
+    """m/s: the rounding of the ground's law at rest that does for legs of a reach, m, that turn at a frequency, Hz."""
+    return np.clip(CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding)
 
 
 class Robot:
