@@ -22,7 +22,7 @@ from rft.walking.limit import Limit, limit_cycle
 from rft.walking.march import step
 from rft.walking.planar import GRAVITY, State
 from rft.walking.planar_walk import _strides, again, walk
-from rft.walking.stride import from_rest
+from rft.walking.stride import from_rest, still_to_come
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 ROBOT = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.06), hip_height=-0.004, axle=0.002)
@@ -231,9 +231,40 @@ def test_slow_robots_walk_as_their_clock_says():
     assert 0.1 < ways[2] < 2 * np.pi * 0.041
 
 
+def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
+    """At 200 Hz a cycle adds a thousandth of the legs' speed, and a fall turns round between two that are much alike."""
+    (found,) = walk([xplorer(1.0, 200.0)], Fineness(steps=8, elements=4, duration=0.2))
+    half = np.searchsorted(found.t, 0.1)
+    assert 3 * found.twist[half, 0] < found.twist[-1, 0]
+    change = np.array([[1e-4, 3e-4, 3e-4, 0.0]])
+    np.testing.assert_allclose(
+        still_to_come(change, [[2e-4, 3e-4, 1e-4, 0.0]], 50), [2e-4, 1.5e-2, 1.5e-2, 0.0], rtol=1e-12
+    )
+
+
+def test_what_a_walk_takes_is_told_from_its_first_steps(geomech, tmp_path):
+    """Of a body so light that it bounces, of one whose legs are so fast that it takes many cycles to come to their speed."""
+    numerics = dataclasses.replace(QUICK, duration=10.0)
+    usual, light, fast = (
+        walking.price(dataclasses.replace(XPLORER, numerics=numerics, **changes)).balances
+        for changes in ({}, {"robot": dataclasses.replace(XPLORER.robot, mass=1e-6)}, {"gait": Tripod(200.0)})
+    )
+    assert light > 4 * usual and fast > 100 * usual
+    (tmp_path / "light.toml").write_text(SMALL.replace("mass = 0.15", "mass = 1e-6").replace("= 2.0\n", "= 2000.0\n"))
+    code, out, err = geomech("walk", "light.toml")
+    assert (code, out) == (2, "") and "say --yes" in err and err.count("\n") == 1, err
+    with pytest.raises(SceneError, match=r"xplorer: after 0 s of computing \d+% is done, and no cycle repeats itself"):
+        walking.run(dataclasses.replace(XPLORER, numerics=QUICK), longest=0.0)
+
+
 def test_a_walk_may_be_over_before_its_first_step():
     (found,) = walk([Walker(ROBOT, Tripod(2.0), SAND)], dataclasses.replace(QUICK, duration=1e-3))
     assert found.t.tolist() == [0.0] and found.speed > 0.0 and found.unaccounted == 0.0
+    scene, one = (
+        dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=1e-3)),
+        walking.Walked(found, 0.01),
+    )
+    assert "times weight" not in walks.told(scene, one) and walks.draw(scene, one).axes[0].get_xlim() == (0.0, 1e-3)
 
 
 def test_the_estimate_covers_the_error():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -32,6 +33,7 @@ def walk(
     from geomech.output import walks
     from geomech.scene import inputs
     from geomech.study import walking
+    from geomech.study.cost import LONGEST
 
     scene = loaded_walker(name)
     walking.refuse_engine(scene, engine)
@@ -40,7 +42,7 @@ def walk(
     check_outputs(scene, animate, None)
     allow(scene, walking.price(scene, by=engine), yes)
     with terminal.progress(f"walk of {scene.name}") as bar:
-        found = walking.run(scene, engine, bar)
+        found = walking.run(scene, engine, bar, math.inf if yes else LONGEST)
     if animate:
         walks.film(animate, scene, found)
     if out:

@@ -40,7 +40,9 @@ def told(scene: WalkerScene, found: Walked) -> str:
     w, f = found.walk, scene.gait.frequency
     turned = scene.robot.mass * 9.81 * w.speed
     regular = "limit cycle" if w.periodic else "no limit cycle found: mean of what there is"
-    share = f", {(w.work[-1] / w.t[-1]) / turned:.3g} times weight times speed" if w.status == "walking" else ""
+    share = (
+        f", {(w.work[-1] / w.t[-1]) / turned:.3g} times weight times speed" if w.status == "walking" and w.t[-1] else ""
+    )
     return "\n".join([
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s ({regular}, {w.cycles:g} cycles at {f:g} Hz)",
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
@@ -90,7 +92,7 @@ def draw(scene: WalkerScene, found: Walked):
     )
     for ax, (label, values) in zip(axes.ravel(), lines):
         ax.plot(w.t, values, color="black", lw=0.8)
-        ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1]))
+        ax.set(xlabel="$t$ (s)", ylabel=label, xlim=(0, w.t[-1] or scene.numerics.duration))
     axes[0, 0].axhline(w.speed, color="C3", lw=1.0, ls="--")
     axes[0, 0].set_title(f"mean {w.speed:.3g} m/s, {w.status}", color="C3")
     _stage(axes[1, 1], scene, found, np.array([len(w.t) - 1]))(len(w.t) - 1)

@@ -19,20 +19,23 @@ from geomech.errors import SceneError, named
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
 from geomech.study import kept
-from geomech.study.cost import BASE, Cost
+from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.kept import Rows
 from geomech.study.sweep import LARGEST, Points, changed, listed
 from rft import SOLVER
-from rft.walking import Mjcf, Walk, engine
+from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = 2.2e-3  # s of computing, for a robot by itself,
-MORE = 5e-4  # and for each beside it, measured
+MORE = 0.23  # of that for each beside it, measured
 ALONE = 5e-3  # s, in three dimensions,
 OWN = 3e-2  # and of a machine of one's own, whose wheels stick and slip: 5e-3 to 5e-2 measured
+HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
+PUSHED = 0.2  # of gravity, by which legs that are much faster than the body speed it up, measured
+IN_VAIN = 40  # cycles that a search for a limit cycle and its errors take where there is none, many at once
 WALKING = 0.7  # of the time, before the errors are asked for
 LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
 KNOBS = {
@@ -71,10 +74,24 @@ def walked(
     return [Walked(w, float(e)) for w, e in zip(walks, error)]
 
 
-def run(scene: WalkerScene, by: str | None = None, progress: Callable | None = None) -> Walked:
-    """One scene."""
+def run(
+    scene: WalkerScene, by: str | None = None, progress: Callable | None = None, longest: float = math.inf
+) -> Walked:
+    """One scene. longest: s of computing, after which SceneError where the way from rest is not yet done: how long that takes
+    hangs on whether a cycle repeats itself, which nobody knows before."""
+    begin = time.process_time()
+
+    def told(done: float) -> None:
+        if time.process_time() - begin > longest and done < WALKING:
+            cure = "lower [numerics] duration, or say --yes"
+            raise SceneError(
+                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself: {cure}"
+            )
+        if progress:
+            progress(done)
+
     with named(scene.name):
-        return walked([scene], by, progress=progress)[0]
+        return walked([scene], by, progress=told)[0]
 
 
 class Steps(Cost):
@@ -85,16 +102,31 @@ class Steps(Cost):
 
 
 def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
-    """Of ``count`` scenes like this one."""
-    together = TOGETHER if (by or scene.engine) == "planar" else 1
+    """Of ``count`` scenes like this one, from its first time steps. Where these are many times as hard as others, of robots
+    that are so light that they bounce or stick at every step, the search for a limit cycle is taken to be in vain."""
+    numerics, how = scene.numerics, by or scene.engine
+    together = TOGETHER if how == "planar" else 1
     own = isinstance(scene.robot, Mjcf)  # which may never come to a limit cycle
-    per_step = OWN if own else PER_STEP if together > 1 else ALONE
-    cycles = SETTLING if settling else scene.numerics.duration * scene.gait.frequency
-    cycles = cycles + MOST_STRIDES if own else min(cycles, 2 * LIMIT)
-    steps = (cycles + 2 * LIMIT) * scene.numerics.steps
-    batches = -(-count // together)
-    seconds = steps * (batches * per_step + (count - batches) * MORE) * (0.5 + scene.numerics.elements / 32)
+    usual = (OWN if own else PER_STEP if together > 1 else ALONE) * (0.5 + numerics.elements / 32)
+    with named(scene.name):
+        pace, tries = engine(how).pace(scene.walker, numerics, PILOT)
+    cycles = SETTLING if settling else numerics.duration * scene.gait.frequency
+    if tries > HARD:
+        cycles += IN_VAIN
+    else:
+        cycles = cycles + MOST_STRIDES if own else min(cycles, 2 * LIMIT + _speeding_up(scene))
+    steps, batches = (cycles + 2 * LIMIT) * numerics.steps, -(-count // together)
+    each = usual if together > 1 and tries <= HARD else max(pace, usual)
+    seconds = each * steps * (batches + (count - batches) * MORE)
     return Steps(round(steps * count), seconds, BASE)
+
+
+def _speeding_up(scene: WalkerScene) -> float:
+    """Cycles till legs have brought a body to their speed, at a fraction of gravity: many where they are quick."""
+    if not isinstance(scene.robot, Rhex | Roller):
+        return 0.0
+    reach, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
+    return float(2 * np.pi * reach * f**2 / (PUSHED * 9.81))
 
 
 def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progress: Callable | None = None) -> dict:

@@ -68,7 +68,7 @@ class Fineness:
 
 
 class Engine(Protocol):
-    """A module with these three."""
+    """A module with these four."""
 
     def refuse(self, walker: Walker) -> None:
         """ValueError for a walker that this engine does not take."""
@@ -89,6 +89,11 @@ class Engine(Protocol):
         self, walkers: Sequence[Walker], numerics: Fineness, walks: Sequence[Walk], settling: int | None = None
     ) -> list[Walk]:
         """The speeds with other numerics, of walks that are known."""
+        ...
+
+    def pace(self, walker: Walker, numerics: Fineness, enough: float) -> tuple[float, float]:
+        """(s of computing, times that forces are evaluated) of a time step: of the first ones from rest, till ``enough`` s
+        are over or a stride is."""
         ...
 
 

@@ -35,7 +35,7 @@ ENOUGH = 0.1  # of the fall of the residual that Newton's method foretells
 def march(robots: Robots, which, state: State, phases, of, stop: Callable) -> State:
     """From a state of these robots, the states after every step (S, B): from phase to phase (S + 1,), while the legs
     turn at the rates that hold at the phases ``of`` (S,). stop: of a state and which of these it is, who goes no further."""
-    one = _March(robots, np.asarray(which), state, np.asarray(phases), np.asarray(of), stop)
+    one = March(robots, np.asarray(which), state, np.asarray(phases), np.asarray(of), stop)
     while (going := np.flatnonzero(one.step < len(of))).size:
         one.iterate(going)
     return State.unpacked(one.states)
@@ -47,7 +47,7 @@ def step(robots: Robots, state: State, phase: float, of: float, dt: float) -> St
     return march(robots, range(len(robots)), state, phases, [of], lambda s, which: np.zeros(len(which), bool)).take(0)
 
 
-class _March:
+class March:
     """Where each of B robots is. At a step: ``level`` times halved and ``done`` of it, in 1 / 2^HALVINGS. At the first
     or second ``stage`` of that: v = from_ + k a(base + k v, v), with legs at ``angle``. At a ``width``, after
     ``tries``: ``found``, of all v tried the one that is least ``off``, and ``trial``, the next, a ``share`` of Newton's

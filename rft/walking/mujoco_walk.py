@@ -7,6 +7,7 @@ an MJCF of one's own is taken as it is. Strides are those of the planar engine, 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -66,6 +67,17 @@ def again(
         here = Course(walker, numerics).walk(FEW_STRIDES, start=known.limit)
         found.append(here._replace(**{name: getattr(known, name) for name in Walk._fields[:6]}))
     return found
+
+
+def pace(walker: Walker, numerics: Fineness, enough: float) -> tuple[float, float]:
+    """(s of computing, times that forces are evaluated) of a time step: of the first ones from rest, till ``enough`` s are
+    over or a stride is."""
+    body, h = Course(walker, numerics).body, 1 / (walker.gait.frequency * numerics.steps)
+    begin, took, steps = time.process_time(), 0.0, 0
+    while steps < numerics.steps and took < enough:
+        body.step(h)
+        took, steps = time.process_time() - begin, steps + 1
+    return took / steps, body.tries / steps
 
 
 class Start(NamedTuple):

@@ -46,7 +46,7 @@ class Multibody:
     energy(): J, of motion, height and springs; work = loss + change of energy to the order of the steps. wrenches: (B, 6), N
     and N m, of the grains on `Facets.bodies` about their origins at the end of the last step. unsolved: steps so far that
     Newton's method left unsolved, however short; defect: m/s, what these are off by, in all; residual: m/s, the most that any
-    step is off by.
+    step is off by. tries: times that the grains' forces were asked for.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Multibody:
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
         self.work = self.loss = 0.0
-        self.unsolved, self.residual, self.defect, self._off = 0, 0.0, 0.0, 0.0
+        self.unsolved, self.residual, self.defect, self._off, self.tries = 0, 0.0, 0.0, 0.0, 0
         self.wrenches = np.zeros((len(self.facets.bodies), 6))
         self.jacobians = np.zeros((len(self.facets.bodies), 6, model.nv))
         mujoco.mj_forward(model, self.data)
@@ -175,6 +175,7 @@ class Multibody:
             self._rest = self._slopes(q, v, here, k, lacking)
             lacking = self._asked(q, v, here, k)
         applied, slope = self._loads(k)
+        self.tries += 1
         self.data.qfrc_applied[:] = applied
         return lacking - applied, self._rest - slope
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from rft.vertical.stress import PlateStress
 from rft.walking.engines import Fineness, Walker
 from rft.walking.ground import Ground
 from rft.walking.limit import Found, Limit, limit_cycle
+from rft.walking.march import March
 from rft.walking.planar import Robots, State
 from rft.walking.robot import Rhex, Roller
 from rft.walking.stride import STUCK, Strides, Walk, from_rest
@@ -127,3 +129,16 @@ def again(
         for k, one in zip(here, _at_limits([walkers[k] for k in here], numerics, [walks[k].limit for k in here])):
             found[k] = walks[k]._replace(**one)
     return found
+
+
+def pace(walker: Walker, numerics: Fineness, enough: float) -> tuple[float, float]:
+    """(s of computing, times that forces are evaluated) of a time step: of the first ones from rest, till ``enough`` s are
+    over or a stride is."""
+    strides, alone, tries, begin = _strides([walker], numerics), np.zeros(1, int), 0, time.process_time()
+    stop = lambda state, which: strides.ended(state, which) != ""
+    one = March(strides.robots, alone, strides.robots.placed(), strides.phases, strides.of, stop)
+    while one.step[0] < len(strides.of) and time.process_time() - begin < enough:
+        one.iterate(alone)
+        tries += 1
+    steps = max(1, int(one.step[0]))
+    return (time.process_time() - begin) / steps, tries / steps

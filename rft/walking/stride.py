@@ -9,10 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.walking.march import march
-from rft.walking.planar import Robots, State
+from rft.walking.planar import GRAVITY, Robots, State
 from rft.walking.robot import Robot, Tripod
 
-PERIODIC = 1e-3  # of the speed of the legs' ends, what a cycle's start may differ from the last one's, to be repeated
+PERIODIC = (
+    1e-3  # of the speed of the legs' ends, or of that of a fall for a cycle if that is less, what a cycle's start may
+)
+# differ from the last one's, and from all to come, for the cycle to be repeated
 SETTLED = 1e-3  # of a leg's reach: what the progress of a cycle may yet change, in all, at the limit
 MOST_STRIDES = 10  # on the way to the limit cycle
 FEW_STRIDES = 4  # the same from one that is near
@@ -109,7 +112,8 @@ def from_rest(strides: Strides, durations: np.ndarray, progress: Callable = lamb
     told = [[_rows(np.zeros(1), state.take([[k]]), 0)] for k in range(count)]
     most = np.ceil(durations * strides.frequency / strides.period - 1e-9).astype(int)
     done, how, going = np.zeros(count, int), np.full(count, "", "U10"), np.arange(count)
-    starts, fold = [strides.scaled(state, going)] * 3, np.ones(count, int)
+    starts, fold = [strides.scaled(state, going)] * 5, np.ones(count, int)
+    quick = np.where(strides.free[:, None] >= 2, np.maximum(1.0, strides.fast * strides.frequency / GRAVITY), 1.0)
     for stride in range(most.max()):
         phases, states = strides.run(state.take(going), stride, going)
         state = state.put(going, states.take(-1))
@@ -117,16 +121,26 @@ def from_rest(strides: Strides, durations: np.ndarray, progress: Callable = lamb
             told[k].append(_rows(phases / strides.frequency[k], states, j))
         starts = [*starts[1:], strides.scaled(state, np.arange(count))]
         done[going] = stride + 1
-        fold[going] = folds(*(x[:, going] for x in starts))
+        fold[going] = folds(*(x[:, going] for x in starts[-3:]))
         how[going] = strides.ended(state.take(going), going)
-        change = np.abs(starts[-1] - starts[-1 - strides.cycle])[:, going].max(0)
-        again = (how[going] == "") & (change < PERIODIC) & (stride >= strides.cycle)
+        here, last, before = ((x * quick)[:, going] for x in starts[:: -strides.cycle][:3])
+        to_come = still_to_come(here - last, last - before, (most - done)[going] / strides.cycle)
+        again = (how[going] == "") & (to_come < PERIODIC) & (stride >= strides.cycle)
         how[going] = np.where(again, "periodic", how[going])
         going = going[(how[going] == "") & (done[going] < most[going])]
         progress((stride + 1) / most[going].max(initial=stride + 1))
         if not going.size:
             break
     return state, told, done, how, fold
+
+
+def still_to_come(change, before, cycles) -> np.ndarray:
+    """(B,): what starts of cycles (n, B) may yet change, and the last change at least: the sum of all changes to come if they
+    go on to shrink as that from the one before, but not more than if they stay as they are for so many cycles (B,)."""
+    now, then = np.abs(change).max(0), np.abs(before).max(0)
+    shrinks = now < then
+    series = np.where(shrinks, now / np.where(shrinks, 1 - now / np.where(shrinks, then, 1.0), 1.0), np.inf)
+    return np.minimum(series, now * np.maximum(1.0, cycles))
 
 
 def folds(before, last, now) -> np.ndarray:
