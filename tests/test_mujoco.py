@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from geomech import scene as scenes
+from geomech.scene import WalkerScene
+from geomech.study.walking import walked
 from rft.spatial import Spatial, wrench
-from rft.vertical import CLeg, RoundRod, StressMap
+from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel
 from rft.vertical.effects import Aeration, GrainInertia
-from rft.walking import Fineness, Rhex, Roller, Tripod, Walker
+from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
 from rft.walking.facets import Grains
+from rft.walking.planar import GRAVITY
 from rft.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
@@ -210,6 +213,19 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
     way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
     np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
     np.testing.assert_allclose(found.more["y"][1:], way.imag, atol=1e-9)
+
+
+def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():
+    """At the default grazing, where triangles lead or do not as a whole: against the balance of forces of a wheel of 400
+    elements, with the slip at which it pulls nothing; both engines tell how far they are off."""
+    stress, wheel, turn = VERTICAL["poppy-seeds-loose"].stress, Wheel(0.1, 0.08), 2 * np.pi
+    slip = np.linspace(0.3, 0.33, 7)
+    pull = rolling(stress, wheel, 2.0 * GRAVITY, turn, slip, elements=400).pull
+    truth = (1 - np.interp(0.0, pull, slip)) * turn * 0.1
+    scene = WalkerScene(stress, Roller(2.0, wheel), Tripod(1.0), numerics=Fineness(elements=48))
+    for engine, most in (("planar", 0.01), ("mujoco", 0.03)):
+        (one,) = walked([scene], engine, settling=True)
+        assert abs(one.walk.speed - truth) < one.estimate < most * truth
 
 
 def test_the_figure_compares_steps_and_engines(monkeypatch):

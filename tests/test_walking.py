@@ -274,6 +274,11 @@ def test_the_estimate_covers_the_error():
     assert done == sorted(done) and 0 < done[0] < 0.5 and done[-1] == 1.0 and len(done) > 5
     truth = again([scene.walker], dataclasses.replace(QUICK, steps=64, elements=32), [one.walk], 2)[0].speed
     assert abs(one.walk.speed - truth) < one.estimate < 0.15 * truth
+    sandbot = scenes.load("sandbot")  # at 8 rad/s, where finer outlines rear up another way
+    sandbot = dataclasses.replace(sandbot, gait=dataclasses.replace(sandbot.gait, frequency=8 / (2 * np.pi)))
+    one = walking.walked([sandbot], settling=True)[0]
+    truth = again([sandbot.walker], dataclasses.replace(sandbot.numerics, elements=32), [one.walk], 2)[0].speed
+    assert 0.08 * truth < abs(one.walk.speed - truth) < one.estimate < 0.2 * truth
 
 
 def test_trends_of_figure_12():

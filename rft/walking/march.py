@@ -27,7 +27,7 @@ ITERATIONS, HALVINGS = 14, 3  # of Newton's method, and of a step that it does n
 WIDTHS = np.array(
     [1.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0]
 )  # times the rounding, one after another until one is solved as it is
-FARTHEST = 0.2  # of a leg's reach, that a step of Newton's method moves a body by
+FARTHEST = 0.5  # of a leg's reach, that a step of Newton's method moves a body by
 LEAST = 0.05  # of a step of Newton's method, below which it is given up
 ENOUGH = 0.1  # of the fall of the residual that Newton's method foretells
 
