@@ -18,10 +18,10 @@ from geomech.study import walking
 from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.vertical.effects import Aeration, GrainInertia, Slope, folded
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Limit, limit_cycle
+from rft.walking.limit import Found, Limit, _Search, limit_cycle
 from rft.walking.march import step
 from rft.walking.planar import GRAVITY, State
-from rft.walking.planar_walk import _strides, again, walk
+from rft.walking.planar_walk import _speed, _strides, again, walk
 from rft.walking.stride import from_rest, still_to_come
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -141,6 +141,28 @@ def test_what_falls_free_falls_as_galilei_says():
     assert state.pose[0, 0] == pytest.approx(0.03, abs=1e-9)
     assert state.pose[0, 1] + z == pytest.approx(5.0 + 0.1 - GRAVITY * 0.01 / 2, abs=1e-4)
     assert (state.pose[0, 2], state.work[0], state.loss[0]) == pytest.approx((0.07, 0.0, 0.0))
+
+
+def test_a_box_pitches_about_its_width():
+    assert ROBOT.inertia == pytest.approx(0.2 * (0.15**2 + 0.03**2) / 12)
+
+
+def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
+    """Of a map of one stride, and of two: all progress to come, and what defects move; stuck below 2 % of a reach a cycle."""
+    strides, both = _strides([xplorer(1.0, 3.0)] * 2, QUICK), np.arange(2)
+    start = strides.robots.placed()
+    slopes, gains = np.diag([0.5, 0.2, 0.8, 0.1, -0.3]), np.array([0.02, 0.0, 0.05, 0.01, 0.0])
+    search = _Search(strides, [Limit(start.take([k]), fold, slopes, gains) for k, fold in enumerate((1, 2))])
+    left = np.array([[1e-3], [2e-3], [4e-3], [0.0], [1e-3]]) * [1.0, 1.0]
+    search._step(both, search.at.copy(), left, np.array([1e-3, 1e-3]))
+    np.testing.assert_allclose(search.drift, (0.02 * 1e-3 / 0.5 + 0.05 * 4e-3 / 0.2) / np.array([1, 2]))
+    np.testing.assert_allclose(search.off, 1e-3 * 0.05 / 0.2 / strides.fast / [1, 2])
+    one = np.ones(1)
+    for progress, status in ((4.0e-4, "stuck"), (4.2e-4, "walking")):
+        found = Found(progress * one, 2e-3 * one, 1e-3 * one, [True], 5 * one, [""], search.limits)
+        told = _speed(strides, found, 0)
+        assert told["status"] == status and told["cycles"] == 2.5
+        assert [told[x] for x in ("speed", "drift", "off")] == pytest.approx([6 * progress, 12e-3, 6e-3])
 
 
 def test_the_limit_cycle_is_that_of_many_strides():
