@@ -151,11 +151,11 @@ def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
     """Of a map of one stride, and of two: all progress to come, and what defects move; stuck below 2 % of a reach a cycle."""
     strides, both = _strides([xplorer(1.0, 3.0)] * 2, QUICK), np.arange(2)
     start = strides.robots.placed()
-    slopes, gains = np.diag([0.5, 0.2, 0.8, 0.1, -0.3]), np.array([0.02, 0.0, 0.05, 0.01, 0.0])
+    slopes, gains = np.diag([0.5, 0.2, 0.8, 0.1, -0.3]), np.array([0.2, 0.0, 0.05, 0.01, 0.0])
     search = _Search(strides, [Limit(start.take([k]), fold, slopes, gains) for k, fold in enumerate((1, 2))])
     left = np.array([[1e-3], [2e-3], [4e-3], [0.0], [1e-3]]) * [1.0, 1.0]
     search._step(both, search.at.copy(), left, np.array([1e-3, 1e-3]))
-    np.testing.assert_allclose(search.drift, (0.02 * 1e-3 / 0.5 + 0.05 * 4e-3 / 0.2) / np.array([1, 2]))
+    np.testing.assert_allclose(search.drift, (0.2 * 1e-3 / 0.5 + 0.05 * 4e-3 / 0.2) / np.array([1, 2]))
     np.testing.assert_allclose(search.off, 1e-3 * 0.05 / 0.2 / strides.fast / [1, 2])
     one = np.ones(1)
     for progress, status in ((4.0e-4, "stuck"), (4.2e-4, "walking")):
