@@ -18,7 +18,7 @@ from geomech.study import walking
 from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.vertical.effects import Aeration, GrainInertia, Slope, folded
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Found, Limit, _Search, limit_cycle
+from rft.walking.limit import Found, Limit, _late, _Search, limit_cycle
 from rft.walking.march import step
 from rft.walking.planar import GRAVITY, State
 from rft.walking.planar_walk import _speed, _strides, again, walk
@@ -163,6 +163,20 @@ def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
         told = _speed(strides, found, 0)
         assert told["status"] == status and told["cycles"] == 2.5
         assert [told[x] for x in ("speed", "drift", "off")] == pytest.approx([6 * progress, 12e-3, 6e-3])
+
+
+def test_without_a_limit_cycle_the_mean_of_four_cycles_counts():
+    """Half cycles of 1, 2, 3, ... mm, each off by 0.5 mm/s: eight of them, and what they differ by from cycle to cycle."""
+
+    def run(state, k, r):
+        pose, defect = state.pose + np.array([1e-3 * (k + 1), 0, 0]), state.defect + 5e-4
+        return None, State(*(x[None] for x in state._replace(pose=pose, defect=defect)))
+
+    fake = types.SimpleNamespace(cycle=2, period=0.5, frequency=np.array([3.0]), ended=lambda state, r: [""], run=run)
+    start = Limit(State.still(np.zeros((1, 3))), 1)
+    found = _late(fake, [start], np.array([0]), Found(*np.zeros((5, 1)), np.array([""]), [start]))
+    assert (found.progress[0], found.drift[0], found.strides[0]) == pytest.approx((4.5e-3, 6e-3, 8))
+    assert found.off[0] * 3.0 / 0.5 == pytest.approx(5e-4)
 
 
 def test_the_limit_cycle_is_that_of_many_strides():
