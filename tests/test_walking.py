@@ -278,6 +278,13 @@ def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
     )
 
 
+def test_what_is_to_come_is_asked_for_the_cycles_that_are_left(monkeypatch):
+    left = []
+    monkeypatch.setattr("rft.walking.stride.still_to_come", lambda *x: left.append(x[2].tolist()) or np.ones(1))
+    walk([xplorer(1.0, 4.0)], Fineness(steps=8, elements=4, duration=0.5))
+    assert left == [[1.5], [1.0], [0.5], [0.0]]
+
+
 def test_what_a_walk_takes_is_told_from_its_first_steps(geomech, tmp_path):
     """Of a body so light that it bounces, of one whose legs are so fast that it takes many cycles to come to their speed."""
     numerics = dataclasses.replace(QUICK, duration=10.0)

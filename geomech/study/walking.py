@@ -113,10 +113,8 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     with named(scene.name):
         pace, tries = engine(how).pace(scene.walker, numerics, PILOT)
     cycles = SETTLING if settling else numerics.duration * scene.gait.frequency
-    if tries > HARD:
-        cycles += IN_VAIN
-    else:
-        cycles = cycles + MOST_STRIDES if own else min(cycles, 2 * LIMIT + _speeding_up(scene))
+    vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
+    cycles = cycles + vain if vain else min(cycles, 2 * LIMIT + _speeding_up(scene))
     steps, batches = (cycles + 2 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
     seconds = each * steps * (batches + (count - batches) * MORE)
@@ -124,7 +122,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
 
 
 def _speeding_up(scene: WalkerScene) -> float:
-    """Cycles till legs have brought a body to their speed, at a fraction of gravity: many where they are quick."""
+    """Cycles till legs have brought a body to their speed, at a fraction of gravity."""
     if not isinstance(scene.robot, Rhex | Roller):
         return 0.0
     reach, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
