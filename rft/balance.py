@@ -103,7 +103,7 @@ def body_velocity(
             guess = None if guess is None else guess[:, moving]
             solved = problem.solve(_moving(model, cut, shape, rate), speed[moving], threads, guess, model)
             xi[:, moving], residual[moving], iterations[moving], stuck[moving] = solved
-    xi = (xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
+    xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
     status = STATUSES[np.where(residual <= problem.limit, stuck.astype(int), UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 

@@ -133,6 +133,12 @@ class Contact:
     def rate_independent(self) -> bool:
         return self.law.rate_independent and not self.shares and not self.additions
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a law in closed form and no more."""
+        closed = isinstance(self.law, Averages) and self.law.nodes == 1
+        return closed and not (self.factors or self.shares or self.additions)
+
     def load(self, v_t, v_n, spin, eps) -> np.ndarray:
         """(3, 4, n, B) at the velocities of its elements, (n, B) each."""
         out = sided(self.law, self.shares, v_t, v_n, spin, eps) if self.shares else self.law(v_t, v_n, spin, eps)
@@ -224,6 +230,19 @@ class Model:
         """(3, 4, n, B) of all contacts' elements, one contact after the other in the given rows of v (3, n, B)."""
         loads = [c.load(*v[:, which], eps) for c, which in zip(self.contacts.values(), rows)]
         return loads[0] if len(loads) == 1 else np.concatenate(loads, 2)
+
+    def drag(self, rows: list[slice], eps: float) -> np.ndarray | None:
+        """(3, 4, n, 1), the load at rest, with its tangents, which is all there is to know of it where it is rounded off so
+        far: of laws in closed form that are the same for all samples, with nothing else; None for other models."""
+        size = rows[-1].stop
+        if (size, eps) not in self._drags:
+            plain = self.alike and not self.terms and all(c.is_plain for c in self.contacts.values())
+            self._drags[size, eps] = self.load(np.zeros((3, size, 1)), rows, np.array([eps])) if plain else None
+        return self._drags[size, eps]
+
+    @cached_property
+    def _drags(self) -> dict:
+        return {}
 
     def take(self, index) -> Model:
         """For the samples ``index``; itself where nothing differs from sample to sample."""

@@ -58,15 +58,15 @@ class Descending:
     def _advance(self, s: State, ended: list) -> State | None:
         """One step of all samples; those that end leave, for ``ended``. None when none are left."""
         net, slope, kept = self._step(s)
-        done = (s.residual <= self.limit) & (s.eps <= self.last)
-        done &= kept
-        done |= s.iterations >= self.descent.budget
-        done &= s.going
         left = s.going
+        done = (s.residual <= self.limit) & left
+        if np.count_nonzero(done):
+            done &= kept & (s.eps <= self.last)
+        done |= (s.iterations >= self.descent.budget) & left
         if np.count_nonzero(done):
             some = np.flatnonzero(done)
             ended.append([x[..., some] for x in (s.of.index, s.xi, s.v, s.eps, s.residual, s.iterations)])
-            s.going = left = s.going & ~done
+            s.going = left = left & ~done
             if not np.count_nonzero(left):
                 return None
         dx = self._next_step(s, net, slope, kept)

@@ -22,7 +22,7 @@ from rft.lane_nets import (
 )  # fmt: skip
 # isort: on
 
-VISCOUS = 1e3  # rounding at which every law is a viscous one
+VISCOUS = 1e8  # rounding at which every law is a viscous one to the last digit
 
 
 @inlined

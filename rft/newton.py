@@ -34,7 +34,7 @@ COMPILED_WORTH = 512  # samples from which on another thread pays
 keep_freed_memory()
 
 
-QUICK = Descent(0.01, 0.4, 0.1, 4.0, 48)
+QUICK = Descent(0.011, 0.32, 0.08, 4.0, 48)
 WARM = Descent(0.0, 0.0, 0.0, np.inf, 12)  # from a good guess, at the wanted rounding at once
 # Walks along a curve: size of a step's first correction, evaluations allowed. A force law alone needs no more than these;
 # the slow descents are for effects, and quadrature rules, with kinks of their own that no rounding takes away.
@@ -44,6 +44,7 @@ SLOW = (
     Descent(0.3, 0.3, 1e-6, np.inf, 500),
     Descent(1.0, 0.6, 1e-8, np.inf, 3000),
 )
+WITHOUT_END = 1e8  # rounding at which every law is a viscous one to the last digit
 DIFFERENCE = 1e-6  # of eps, for the derivative with respect to it
 
 
@@ -170,8 +171,12 @@ class Balance:
 
     def viscous(self, of: Samples) -> np.ndarray:
         """(3, B): the solution with kinks rounded off almost without end."""
-        net = self.net(of, of.motion.v, np.zeros((3, of.size)), np.full(of.size, 1e3))[0]
-        return -solve3(net[:, 1:], net[:, 0])
+        drag = None if self.scaled else self.model.drag(self.rows, WITHOUT_END)
+        if drag is None:
+            net = self.net(of, of.motion.v, np.zeros((3, of.size)), np.full(of.size, WITHOUT_END))[0]
+            return -solve3(net[:, 1:], net[:, 0])
+        net, drift = of.motion.assembled(np.broadcast_to(drag, (*drag.shape[:-1], of.size)), of.motion.v)
+        return -solve3(net[:, 1:], drift)
 
     def with_slope(self, of: Samples, xi, v, eps) -> tuple[np.ndarray, np.ndarray, int]:
         """What comes to the frame, (3, 4, B), its derivative with respect to log eps, (3, B), and the evaluations taken."""

@@ -103,7 +103,7 @@ def test_starts():
             np.testing.assert_allclose(warm.xi, cold.xi, atol=1e-8)
             counts = cold.iterations.mean(), warm.iterations.mean()
             print(f"\n{name}, {what}: {counts[0]:.1f} evaluations cold, {counts[1]:.1f} warm", end="")
-            assert counts[1] < counts[0]
+            assert counts[1] <= counts[0]
 
 
 def test_a_march_of_a_hundred_elements():

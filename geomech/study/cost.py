@@ -28,7 +28,7 @@ from geomech.tiers.path import axes
 LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
-PILOT = 0.1  # s after which a pilot has seen enough
+PILOT = 0.05  # s after which a pilot has seen enough
 FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
 SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
 POWER = 0.15  # of a balance, that its power takes
