@@ -29,7 +29,7 @@ from rft.workers import each, keep_freed_memory, split, workers
 
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
-COMPILED_WORTH = 512  # samples from which on another thread pays
+COMPILED_WORTH = 4096  # samples a thread, below which another does not pay
 
 keep_freed_memory()
 
