@@ -108,7 +108,7 @@ LARGE = {
     "phases": ["run", "phases.toml", "-o", "out"],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
     "time stepping": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
-    "a tolerance": ["displacement", "sandfish-loose", "--amplitudes", "0.1:1:99999", "--tol", "1e-4"],
+    "a tolerance": ["displacement", "butterfly-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-5"],
     "accuracy": ["accuracy", "phases.toml", "-o", "out"],
 }
 

@@ -73,7 +73,7 @@ class March:
         self.angle = np.zeros(self.angles.shape[1:])
         self._begin(np.arange(count))
 
-    def iterate(self, r):
+    def iterate(self, r: np.ndarray) -> None:
         """One evaluation for robots ``r``, and what follows."""
         ground = replace(self.robots.ground.take(self.which[r]), width=WIDTHS[self.width[r]])
         parts = (x[r] for x in (self.base, self.from_, self.trial, self.angle))
