@@ -65,10 +65,8 @@ class March:
         self.states = np.empty((steps, *self.now.shape))
         self.step, self.level, self.done, self.stage, self.width, self.tries = np.zeros((6, count), int)
         self.k, self.off, self.share, self.most = np.zeros((4, count))
-        self.power, self.first = (
-            np.zeros((2, count)),
-            np.zeros((3, count)),
-        )  # of motors and ground; the same and off, of stage 0
+        self.power = np.zeros((2, count))  # of motors and ground
+        self.first = np.zeros((3, count))  # the same and off, of stage 0
         self.base, self.from_, self.guess, self.found, self.trial, self.newton = np.zeros((6, count, 3))
         self.angle = np.zeros(self.angles.shape[1:])
         self._begin(np.arange(count))

@@ -150,9 +150,8 @@ def _compiled(file: str):
         import mujoco
     except ImportError:
         raise ValueError(MISSING) from None
-    mujoco.set_mju_user_warning(
-        lambda _: None
-    )  # it writes them to the screen and a file; what matters is refused below
+    # MuJoCo writes warnings to the screen and to a file; what matters of them is refused below.
+    mujoco.set_mju_user_warning(lambda _: None)
     path = Path(file)
     try:
         require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")

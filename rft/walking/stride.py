@@ -12,10 +12,9 @@ from rft.walking.march import march
 from rft.walking.planar import GRAVITY, Robots, State
 from rft.walking.robot import Robot, Tripod
 
-PERIODIC = (
-    1e-3  # of the speed of the legs' ends, or of that of a fall for a cycle if that is less, what a cycle's start may
-)
-# differ from the last one's, and from all to come, for the cycle to be repeated
+# What a cycle's start may differ from the last one's, and from all to come, for the cycle to be repeated: of the speed of the
+# legs' ends, or of that of a fall for a cycle if that is less.
+PERIODIC = 1e-3
 SETTLED = 1e-3  # of a leg's reach: what the progress of a cycle may yet change, in all, at the limit
 MOST_STRIDES = 10  # on the way to the limit cycle
 FEW_STRIDES = 4  # the same from one that is near
