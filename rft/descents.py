@@ -61,7 +61,7 @@ class Descending:
         left = s.going
         done = (s.residual <= self.limit) & left
         if np.count_nonzero(done):
-            done &= kept & (s.eps <= self.last)
+            done &= s.eps <= self.last
         done |= (s.iterations >= self.descent.budget) & left
         if np.count_nonzero(done):
             some = np.flatnonzero(done)

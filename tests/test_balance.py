@@ -7,10 +7,12 @@ import pytest
 from registry import BODIES, CLOSED, DRY, LINEAR, MEDIA
 
 from geomech import cli, symbolic
-from rft import Chain, Coulomb, GrainInertia, Granular, Viscous, body_velocity
+from rft import Chain, Coulomb, EndCaps, GrainInertia, Granular, SkinFriction, TowedSled, Viscous, body_velocity
+from rft.balance import _moving
 from rft.contact import Model
+from rft.effects.base import Prepared
 from rft.media.base import TermLaw
-from rft.newton import QUICK, Balance
+from rft.newton import QUICK, WITHOUT_END, Balance
 from rft.symbolic import viscous_chain
 
 GLASS = MEDIA["glass-0.3mm-loose"]
@@ -214,6 +216,36 @@ def test_curves_of_laws_that_know_speed(speed, loads, monkeypatch):
     np.testing.assert_allclose(found.xi / speed, wanted.xi / speed, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("medium", "effects", "loads", "plain"),
+    [
+        (GLASS, (), "exact", True),
+        (Coulomb(), (), "exact", True),
+        (Viscous(2.0), (), "exact", True),
+        (Mud(), (), "exact", True),
+        (GLASS, (), "gauss:5", False),
+        (GLASS, (SkinFriction(0.1, 0.4, 0.2),), "exact", False),
+        (GLASS, (EndCaps(0.1, tail=3.0),), "exact", False),
+        (GLASS, (TowedSled(0.2, 0.3),), "exact", False),
+    ],
+)
+def test_the_start_is_that_of_kinks_rounded_off_without_end(medium, effects, loads, plain, monkeypatch):
+    """Of plain laws from their drag at rest, which is worked out once; of others, where a side or a contact differs, from the
+    load itself."""
+    body = Chain((2, 1, 3), frame="link-1")
+    cut, model, rows = Prepared.of(medium, body, effects, loads, 8)
+    balance = Balance(model, rows, 1e-6, 1e-10)
+    balance.solve(_moving(model, cut, *(x.T.copy() for x in samples(body, 30))), np.full(30, 0.7), 1)
+    some = balance.samples(np.arange(30))
+    assert (model.drag(rows, WITHOUT_END) is not None) == plain
+    found = balance.viscous(some)
+    monkeypatch.setattr(Model, "drag", lambda *asked: None)
+    np.testing.assert_allclose(balance.viscous(some), found, rtol=0, atol=1e-13)
+    monkeypatch.setattr("rft.newton.WITHOUT_END", 1e5)
+    np.testing.assert_allclose(balance.viscous(some), found, rtol=0, atol=1e-6)
+    assert np.abs(found).max() > 0.1
+
+
 def test_a_starved_solver_says_so(monkeypatch):
     monkeypatch.setattr("rft.newton.QUICK", QUICK._replace(budget=2))
     monkeypatch.setattr("rft.newton.WALKS", ((0.2, 4),))
@@ -224,6 +256,11 @@ def test_a_starved_solver_says_so(monkeypatch):
     assert (solution.iterations == 6).all()
     with pytest.raises(RuntimeError, match="20 of 20 force balances did not converge"):
         solution.checked()
+    monkeypatch.setattr("rft.newton.WALKS", ())
+    easy = body_velocity(GLASS, THREE, *samples(THREE, 20), tolerance=1e3)
+    assert (
+        easy.status == "unconverged"
+    ).all()  # near enough to another problem, with its kinks rounded off more widely
 
 
 @pytest.mark.parametrize("as_json", [[], ["--json"]])
