@@ -257,10 +257,10 @@ def test_a_starved_solver_says_so(monkeypatch):
     with pytest.raises(RuntimeError, match="20 of 20 force balances did not converge"):
         solution.checked()
     monkeypatch.setattr("rft.newton.WALKS", ())
-    easy = body_velocity(GLASS, THREE, *samples(THREE, 20), tolerance=1e3)
-    assert (
-        easy.status == "unconverged"
-    ).all()  # near enough to another problem, with its kinks rounded off more widely
+    easy = body_velocity(
+        GLASS, THREE, *samples(THREE, 20), tolerance=1e3
+    )  # near enough, but of kinks rounded off widely
+    assert np.count_nonzero(easy.status == "unconverged") > 10
 
 
 @pytest.mark.parametrize("as_json", [[], ["--json"]])
