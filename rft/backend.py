@@ -3,9 +3,9 @@ and a model is nothing but numbers.
 
 Both take the same steps to the same answer, but for rounding. For a hundred samples compiled code is some twenty times as
 fast, for many thousands some six times; but to load it takes half a second, and to make it, once for an installation, some
-fifteen. So "auto" begins with NumPy, and loads the compiled code once NumPy has worked for as long as loading takes. Where
-it is not made yet, a process of lower priority makes it meanwhile; nobody waits for it, and it ends with the command.
-`python -m rft` makes it beforehand.
+fifteen. So "auto" begins with NumPy, and loads the compiled code once NumPy has worked, or a batch would take it, for as
+long as loading takes. Where it is not made yet, a process of lower priority makes it meanwhile; nobody waits for it, and it
+ends with the command. `python -m rft` makes it beforehand.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from rft.numbers import foreign
 
 BACKENDS = ("auto", "numpy", "numba")
 TO_LOAD, LONG = 0.5, 3.0  # s of NumPy's work after which the compiled code is loaded, and is made
+AHEAD = 3e-6  # s that NumPy takes for a sample of one element, on the machine this was written on
 
 
 def check(backend: str) -> None:
@@ -46,12 +47,12 @@ def installed() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
-def takes(backend: str, model: Model) -> bool:
-    """Whether the next descents of a model are compiled ones."""
+def takes(backend: str, model: Model, evaluations: int = 0) -> bool:
+    """Whether the next descents of a model, of so many samples times elements, are compiled ones."""
     backend = (_settled.get() or backend) if backend == "auto" else backend
     if backend == "numpy" or foreign(model) is not None or not installed():
         return False
-    return backend == "numba" or AUTO.ready()
+    return backend == "numba" or AUTO.ready(AHEAD * evaluations)
 
 
 _settled: ContextVar[str] = ContextVar("settled", default="")
@@ -118,9 +119,9 @@ class Auto:
     def __init__(self):
         self.worked, self.maker, self.is_ready = 0.0, None, False
 
-    def ready(self) -> bool:
-        """Whether compiled code lies ready, and has been worth loading."""
-        if self.is_ready or self.worked < TO_LOAD:
+    def ready(self, ahead: float = 0.0) -> bool:
+        """Whether compiled code lies ready, and has been worth loading, or is for what lies ahead, s."""
+        if self.is_ready or self.worked + ahead < TO_LOAD:
             return self.is_ready
         if self.maker is not None and self.maker.poll() is None:
             return False

@@ -147,7 +147,7 @@ class Balance:
             out.xi[:, index], out.residual[index], out.stuck[index] = xi, residual, self._stuck(slowest)
             out.iterations[index] += evaluations
 
-        if backend.takes(self.backend, self.model):
+        if backend.takes(self.backend, self.model, todo.size * self.rows[-1].stop * self.nodes):
             batch = 4 * self._together()
             run, useful = (lambda share, stop: self._compiled(share, stop, batch, way, guess, wrote)), COMPILED_WORTH
         else:

@@ -250,6 +250,21 @@ def test_auto_begins_with_numpy_and_loads_when_that_pays(auto):
     assert seen.started == 0
 
 
+def test_auto_loads_at_once_for_a_batch_that_takes_long(auto, monkeypatch):
+    """Half a second of NumPy: by samples times elements, as the solver counts them."""
+    fresh, seen = auto
+    model, many = Model.of(GLASS), round(1.01 * backend.TO_LOAD / backend.AHEAD)
+    assert not backend.takes("auto", model, many)
+    seen.made = True
+    assert not backend.takes("auto", model, many // 2)
+    assert backend.takes("auto", model, many)
+    asked = []
+    monkeypatch.setattr(backend, "takes", lambda how, model, count: asked.append(count) or False)
+    body_velocity(GLASS, BODY, np.zeros((7, 2)), np.ones((7, 2)), loads="gauss:5")
+    body_velocity(GLASS, BODY, np.zeros((7, 2)), np.ones((7, 2)))
+    assert asked == [7 * 3 * 5, 7 * 3]
+
+
 def test_auto_waits_for_no_compilation(auto):
     """Another process makes the code; until it has, NumPy goes on."""
     fresh, seen = auto

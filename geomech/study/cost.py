@@ -31,7 +31,6 @@ WORTH_SAYING = 5.0  # s
 PILOT = 0.05  # s after which a pilot has seen enough
 FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
 SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
-POWER = 0.15  # of a balance, that its power takes
 CYCLES = 3  # that it takes to reach a limit cycle
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
@@ -208,8 +207,6 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
 def _per_sample(job: Job, count: float) -> float:
     """Seconds a force balance, the power of one, or a look-up, takes."""
     scene = job.scene
-    if job.what == "powers":
-        return POWER * _per_sample(job._replace(what="balances"), count)
     if job.what == "look-ups":
         look = TIERS[job.tier].sample(scene.system, scene.numerics) if count >= 1e5 else None
         return _grown(look, 64, count) if look else 0.0
@@ -220,8 +217,10 @@ def _per_sample(job: Job, count: float) -> float:
 
     def solve(samples: int):
         if job.gait is None:
-            alpha = rng.uniform(-extent, extent, (samples, joints))
-            return scene.system.sample(alpha, rng.normal(size=(samples, joints)))
+            alpha, alphadot = rng.uniform(-extent, extent, (samples, joints)), rng.normal(size=(samples, joints))
+            if job.what == "powers":
+                return scene.system.work(alpha, alphadot, np.zeros((samples, 3)))
+            return scene.system.sample(alpha, alphadot)
         phases = max(8, 2 * job.gait.harmonics + 2)
         return scene.system.sample(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
 
