@@ -252,7 +252,7 @@ def test_auto_begins_with_numpy_and_loads_when_that_pays(auto):
 
 def test_auto_loads_at_once_for_a_batch_that_takes_long(auto, monkeypatch):
     """Half a second of NumPy: by samples times elements, as the solver counts them."""
-    fresh, seen = auto
+    _, seen = auto
     model, many = Model.of(GLASS), round(1.01 * backend.TO_LOAD / backend.AHEAD)
     assert not backend.takes("auto", model, many)
     seen.made = True
