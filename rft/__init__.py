@@ -16,7 +16,7 @@ from rft.media import CATALOGUE, Coulomb, Granular, Medium, Table, Viscous
 from rft.time_stepping import TimeSteps, time_steps
 from rft.work import Work, work_done
 
-SOLVER = 5  # raised with every change that moves a number: what was computed before is not taken up after it
+SOLVER = 6  # raised with every change that moves a number: what was computed before is not taken up after it
 
 __all__ = [
     "CATALOGUE",

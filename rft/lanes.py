@@ -44,29 +44,22 @@ def solved3(of, lane, x, y, z):
 
 @compiled
 def add_momentum(of, lane, mass, sample):
-    """Add strength (rate p - past + ad*_xi p), p = M xi + shape, to the force and its tangent: `rft.effects.body_inertia`.
-    mass (17, B): M, shape, past, rate and strength of each sample."""
-    at, scale, rate, strength = TOTAL * LANES + lane, of[SCALE * LANES + lane], mass[15, sample], mass[16, sample]
+    """Add strength (M xi + held) to the force and its tangent: `rft.effects.body_inertia`. mass (13, B): M, held and strength
+    of each sample."""
+    at, strength = TOTAL * LANES + lane, mass[12, sample]
+    of_v = strength * of[SCALE * LANES + lane]
     x, y, turn = (
-        (of[(XI + 0) * LANES + lane] + of[(DX + 0) * LANES + lane]) * scale,
-        (of[(XI + 1) * LANES + lane] + of[(DX + 1) * LANES + lane]) * scale,
-        (of[(XI + 2) * LANES + lane] + of[(DX + 2) * LANES + lane]) * scale,
+        of[(XI + 0) * LANES + lane] + of[(DX + 0) * LANES + lane],
+        of[(XI + 1) * LANES + lane] + of[(DX + 1) * LANES + lane],
+        of[(XI + 2) * LANES + lane] + of[(DX + 2) * LANES + lane],
     )
-    p0 = mass[0, sample] * x + mass[1, sample] * y + mass[2, sample] * turn + mass[9, sample]
-    p1 = mass[3, sample] * x + mass[4, sample] * y + mass[5, sample] * turn + mass[10, sample]
-    p2 = mass[6, sample] * x + mass[7, sample] * y + mass[8, sample] * turn + mass[11, sample]
-    of[at] += strength * (rate * p0 - turn * p1 - mass[12, sample])
-    of[at + 5 * LANES] += strength * (rate * p1 + turn * p0 - mass[13, sample])
-    of[at + 10 * LANES] += strength * (rate * p2 + x * p1 - y * p0 - mass[14, sample])
     for k in range(3):
-        m0, m1, m2 = mass[k, sample], mass[3 + k, sample], mass[6 + k, sample]
-        of[at + (k + 1) * LANES] += strength * scale * (rate * m0 - turn * m1)
-        of[at + (k + 6) * LANES] += strength * scale * (rate * m1 + turn * m0)
-        of[at + (k + 11) * LANES] += strength * scale * (rate * m2 + x * m1 - y * m0)
-    of[at + 11 * LANES] += strength * scale * p1
-    of[at + 12 * LANES] -= strength * scale * p0
-    of[at + 3 * LANES] -= strength * scale * p1
-    of[at + 8 * LANES] += strength * scale * p0
+        m_x, m_y, m_turn = mass[3 * k, sample], mass[3 * k + 1, sample], mass[3 * k + 2, sample]
+        row = at + 5 * k * LANES
+        of[row] += of_v * (m_x * x + m_y * y + m_turn * turn) + strength * mass[9 + k, sample]
+        of[row + LANES] += of_v * m_x
+        of[row + 2 * LANES] += of_v * m_y
+        of[row + 3 * LANES] += of_v * m_turn
 
 
 @compiled
@@ -194,7 +187,7 @@ def built(stamp: str):
         the slowest element's speed (B,), velocities over the scale (B,). scaled: drag knows of true ones. law: dry terms
         (T, 3), viscous coefficients (n, 2), and which terms an element has (n, 3). factors: (4, n, B or 1). pasts: (5, k, B),
         shares developed left and right, velocity across before, and shares that are given, of the first k elements. rates:
-        (2, B or 1), dt and e-foldings a length, dt < 0 where nothing develops. masses: (17, B) as `add_momentum` has them,
+        (2, B or 1), dt and e-foldings a length, dt < 0 where nothing develops. masses: (13, B) as `add_momentum` has them,
         or (0, 1)."""
         _ = stamp  # this source's, so that numba's cache knows which it keeps
         terms, viscous, which = law

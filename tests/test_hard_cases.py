@@ -311,19 +311,22 @@ def random_problem(rng, count):
 
 
 @pytest.mark.soak
+@pytest.mark.parametrize("backend", ["numpy", "numba"])
 @pytest.mark.parametrize(("problem", "batches"), [(random_problem, 400), (hard_problem, 1600)])
-def test_a_million_random_problems(problem, batches):
+def test_a_million_random_problems(problem, batches, backend):
     """Media and bodies, 500 samples each, to a normalised residual of 1e-10: prints the README's reliability rows."""
     rng = np.random.default_rng(2026)
     residuals, iterations, stuck, failures = [], [], 0, 0
     for _ in range(batches):
-        solution = body_velocity(*problem(rng, 500), tolerance=8e-11)
+        solution = body_velocity(*problem(rng, 500), tolerance=8e-11, backend=backend)
         residuals.append(solution.residual)
         iterations.append(solution.iterations)
         stuck += np.count_nonzero(solution.status == "stuck")
         failures += np.count_nonzero(~(solution.residual <= 1e-10))
     residuals, iterations = np.concatenate(residuals), np.concatenate(iterations)
-    print(f"\n{residuals.size:,} problems: {failures} failures, worst residual {residuals.max():.1e}, {stuck:,} stuck,")
+    print(
+        f"\n{backend}: {residuals.size:,} problems: {failures} failures, residuals to {residuals.max():.1e}, {stuck:,} stuck"
+    )
     print(
         f"iterations mean {iterations.mean():.1f}, 99 % {np.percentile(iterations, 99):.0f}, worst {iterations.max()}"
     )

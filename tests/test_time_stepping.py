@@ -37,6 +37,7 @@ from rft.bodies.base import halves
 from rft.effects import folded
 from rft.limit_cycle import Approach
 from rft.newton import Balance
+from rft.se2 import compose, exp
 from rft.time_stepping import _Steps
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -484,38 +485,40 @@ def test_a_kicked_body_coasts():
     body, effects = Chain(), (heavy(1e6),)
     problem = Balance.of(folded(effects, Viscous(2.0), body), body, 1e-6, 1e-10)
     steps = _Steps(problem, body, halves(body), alpha, alphadot, effects)
-    over_ground = lambda: complex(*steps.states[0][-1][:2, :, 0].sum(1)) * np.exp(1j * steps.pose[2, 0])
+    over_ground = lambda: steps.states[0][-1][:, :, 0].sum(1)  # momentum, and its moment
     for _ in range(5):
         steps.next(False)
     before, change = over_ground(), np.array([[0.3], [-0.2], [0.4]])
     steps.kick(change)
     kicked = over_ground()
-    assert abs(kicked - before) > 0.3
+    np.testing.assert_array_less(0.02, np.abs(kicked - before))
     after = [steps.next(False) and over_ground() for _ in range(12)]
-    assert np.abs(np.array(after) - kicked).max() < 0.01 * abs(kicked - before)
+    np.testing.assert_allclose(after, np.broadcast_to(kicked, (12, 3)), atol=1e-4)
 
 
 @pytest.mark.parametrize(
     ("medium", "off"), [(GLASS, 1e-3), (Viscous(2.0), 1e-7)]
 )  # work rounds kinks as at its own speed
 def test_moments_of_a_heavy_body_move_its_elements(medium, off):
-    """Beside what the medium asks for, at a joint: the moment of d(momentum)/dt of all on the tail's side, by hand in the
-    body frame, with the differences in time of the march."""
+    """Beside what the medium asks for, at a joint: the moment of d(momentum)/dt of all on the tail's side, by hand over the
+    ground, with the differences in time of the march, from the poses it foresees by the velocities before."""
     body, inertia, N = Chain((1, 1.4, 0.8), frame="link-1"), 3.0, 32
     alpha, alphadot = HEAVY.cycle(N)
     found = time_steps(
         medium, body, alpha, alphadot, effects=(heavy(inertia),), cycles=1, tolerance=1e-13, with_work=True
     )
     medium_alone = work_done(medium, body, alpha, alphadot, found.xi).bending_moment
-    motion, (x, y, turn) = body.motion(alpha.T, alphadot.T), found.xi.T
-    along, half, place, xi = motion.c + 1j * motion.s, motion.half, motion.place, x + 1j * y
-    velocity = (motion.v[0] + 1j * motion.v[1]) * along + xi + 1j * turn * place
+    dt, motion, (x, y, turn) = 2 * np.pi / N, body.motion(alpha.T, alphadot.T), found.xi.T
+    ahead = np.concatenate([found.xi[:1], 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]])  # mean of the last and the next
+    pose = np.concatenate([found.pose[:1], compose(found.pose[:-2], exp(dt * ahead))])
+    at, facing = pose[:, 0] + 1j * pose[:, 1], np.exp(1j * pose[:, 2])
+    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.place
+    velocity = (motion.v[0] + 1j * motion.v[1]) * along + facing * (x + 1j * y) + 1j * turn * (place - at)
     spin = motion.v[2] / half + turn
     p = 2 * half * velocity
     L = (place.conj() * p).imag + 2 * half * half**2 / 3 * spin
-    rate = lambda q: (1.5 * q[:, 2:] - 2 * q[:, 1:-1] + 0.5 * q[:, :-2]) / (2 * np.pi / N)
-    force = inertia * (rate(p) + 1j * (turn * p)[:, 2:])
-    torque = inertia * (rate(L) + (xi.conj() * p).imag[:, 2:])
+    rate = lambda q: (1.5 * q[:, 2:] - 2 * q[:, 1:-1] + 0.5 * q[:, :-2]) / dt
+    force, torque = inertia * rate(p), inertia * rate(L)
     joints = (place + half * along)[:-1, 2:]
     wanted = (joints.conj() * np.cumsum(force, 0)[:-1]).imag - np.cumsum(torque, 0)[:-1]
     got = (found.work.bending_moment - medium_alone)[2:].T
@@ -605,14 +608,27 @@ def random_march(rng):
     return medium, body, alpha, alphadot, kept
 
 
+def test_fast_spinning_heavy_bodies_are_solved():
+    """Three radians of spin a radian of phase, a third of a radian a step: an equation quadratic in the velocity was not."""
+    rng = np.random.default_rng(2026)
+    marches = [random_march(rng) for _ in range(344)]
+    for k, sample in (250, 0), (343, 0):
+        medium, body, alpha, alphadot, effects = marches[k]
+        alpha, alphadot = alpha[sample], alphadot[sample]
+        time_steps(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11).checked()
+
+
 @pytest.mark.soak
-def test_two_hundred_thousand_steps_of_random_marches():
+@pytest.mark.parametrize("backend", ["numpy", "numba"])
+def test_two_hundred_thousand_steps_of_random_marches(backend):
     """800 marches of eight gaits, two cycles each, to 1e-10: prints the README's reliability row."""
     rng, residuals, failures = np.random.default_rng(2026), [], 0
     for _ in range(800):
         medium, body, alpha, alphadot, effects = random_march(rng)
         try:
-            found = time_steps(medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11)
+            found = time_steps(
+                medium, body, alpha, alphadot, effects=effects, cycles=2, tolerance=8e-11, backend=backend
+            )
         except ValueError as error:
             if "comes to the surface" not in str(error):
                 raise
@@ -620,5 +636,5 @@ def test_two_hundred_thousand_steps_of_random_marches():
         residuals.append(found.residual)
         failures += np.count_nonzero(found.status == "unconverged")
     residuals = np.concatenate(residuals)
-    print(f"\n{residuals.size * 32:,} steps: {failures} marches failed, worst residual {residuals.max():.1e}")
+    print(f"\n{backend}: {residuals.size * 32:,} steps: {failures} marches failed, residuals to {residuals.max():.1e}")
     assert failures == 0

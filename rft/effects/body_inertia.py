@@ -1,8 +1,9 @@
 """Mass of the body: the balance of forces becomes an equation of motion.
 
-In the body frame the momentum p of a body that keeps it over the ground changes by -ad*_xi p; the medium changes it too:
-dp/dt + ad*_xi p = force. So does that of each element. Time derivatives are backward differences of order 2 (order 1
-after the first step).
+Over the ground, about a point of it, d(momentum)/dt = force; so for each element. Time derivatives are backward
+differences of order 2 (order 1 after the first step). What was is seen from where the frame is foreseen to be, so that an
+equation is linear in the body velocity but for drag, and where drag is monotone has one solution whatever the mass, spin and
+step; without drag momentum stays what it was to the last digit.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rft.contact import SIDE, Model, PerSample
 from rft.effects.base import Process, Site
 from rft.media.base import check_ranges, require
 from rft.premise import Premise
+from rft.se2 import rotated
 
 UNIT_MASS = np.array([1.0, 1.0, 1 / 3])[:, None, None]  # <v_t>, <v_n> and <s v_n> of an element from v_t, v_n, spin
 
@@ -53,7 +55,7 @@ class BodyInertia(Process):
         return self.mass * self.length * (2 * np.pi * self.frequency) ** 2 / self.drag
 
     def begin(self, site: Site) -> tuple:
-        """Momenta (3, n, B) of the elements, per unit mass, in the body frame, after the last two steps; none so far."""
+        """Momenta (3, n, B) of the elements, per unit mass, over the ground, at the last two steps; none so far."""
         return ()
 
     def at(self, state: tuple, site: Site) -> Momentum:
@@ -61,35 +63,35 @@ class BodyInertia(Process):
         mass = _uniform(motion)
         units = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, motion.c.shape[1]))
         M = np.stack([mass.wrench(UNIT_MASS * motion.carried(unit)) for unit in units], 1)
-        rate, past = _difference(state, site.dt)
-        return Momentum(self.inertia, M, mass.wrench(UNIT_MASS * motion.v), rate, past, past.sum(1))
+        rate, pasts = _difference(state, site.dt)
+        held = rate * mass.wrench(UNIT_MASS * motion.v) - _from_frame(site.pose, pasts.sum(1))
+        return Momentum(self.inertia, rate * M, held, rate, pasts, site.pose)
 
     def after(self, state: tuple, site: Site, v) -> tuple:
-        return *state[-1:], _uniform(site.motions[SIDE]).wrenches(UNIT_MASS * v[SIDE])
+        return *state[-1:], _over_ground(site.pose, _uniform(site.motions[SIDE]).wrenches(UNIT_MASS * v[SIDE]))
 
     def kicked(self, state: tuple, site: Site, xi, change) -> tuple:
         """It has coasted with this change of velocity."""
-        motion, dt = site.motions[SIDE], site.dt
-        more = _uniform(motion).wrenches(UNIT_MASS * motion.carried(change))
-        xi, change = xi[:, None], change[:, None]
-        before = more + dt * (_coadjoint(xi, more) + _coadjoint(change, state[-1] + more))
-        return tuple(p + kick for p, kick in zip(state, (before, more)))
+        motion = site.motions[SIDE]
+        more = _over_ground(site.pose, _uniform(motion).wrenches(UNIT_MASS * motion.carried(change)))
+        return tuple(momenta + more for momenta in state)
 
 
 @dataclass(frozen=True)
 class Momentum(PerSample):
-    """The term inertia x unit x (rate p - past + ad*_xi p), p = M xi + shape, at one step.
+    """The term inertia x unit x (M xi + held) at one step.
 
-    M: (3, 3, B) and shape: (3, B), momentum of the body per unit mass from its velocity and from its change of shape. rate:
-    1/rad, of the time step. pasts: (3, n, B), what earlier momenta of the elements contribute, past (3, B) their sum.
+    M: (3, 3, B), the mass matrix per unit mass, and held: (3, B), what the change of shape comes to with the frame held, by the
+    backward difference: momenta x rate (1/rad) - pasts, (3, n, B), what earlier ones contribute, over the ground. pose: (3, B),
+    from which they are seen.
     """
 
     inertia: np.ndarray | float
     M: np.ndarray
-    shape: np.ndarray
+    held: np.ndarray
     rate: float
     pasts: np.ndarray
-    past: np.ndarray
+    pose: np.ndarray
     unit: float = 1.0
 
     def apply(self, model: Model) -> Model:
@@ -101,20 +103,15 @@ class Momentum(PerSample):
 
     @property
     def numbers(self) -> list:
-        """For compiled code (`rft.backend`): M, shape, past, rate and strength, each a number or (B,)."""
-        return [*self.M.reshape(9, -1), *self.shape, *self.past, self.rate, self.inertia * self.unit]
+        """For compiled code (`rft.backend`): M, held and strength, each a number or (B,)."""
+        return [*self.M.reshape(9, -1), *self.held, self.inertia * self.unit]
 
     def __call__(self, xi: np.ndarray) -> np.ndarray:
-        momentum = np.concatenate([(np.einsum("ijb,jb->ib", self.M, xi) + self.shape)[:, None], self.M], 1)
-        out = self.rate * momentum + _coadjoint(xi[:, None], momentum)
-        out[:, 0] -= self.past
-        for k, unit in enumerate(np.eye(3)[:, :, None]):
-            out[:, k + 1] += _coadjoint(unit, momentum[:, 0])
-        return self.inertia * self.unit * out
+        force = np.einsum("ijb,jb->ib", self.M, xi) + self.held
+        return self.inertia * self.unit * np.concatenate([force[:, None], self.M], 1)
 
     def on_elements(self, xi: np.ndarray, motion: Kinematics, v: np.ndarray) -> np.ndarray:
-        momenta = _uniform(motion).wrenches(UNIT_MASS * v)
-        change = self.rate * momenta - self.pasts + _coadjoint(xi[:, None], momenta)
+        change = self.rate * _uniform(motion).wrenches(UNIT_MASS * v) - _from_frame(self.pose, self.pasts)
         return self.inertia * self.unit * change
 
 
@@ -123,10 +120,17 @@ def _uniform(motion: Kinematics) -> Kinematics:
     return motion._replace(weight=2 * motion.half)
 
 
-def _coadjoint(xi, p):
-    """Rate at which momentum p (3, ...) seems to change in a frame that moves with xi, for a body that keeps it."""
-    x, y, turn = xi
-    return np.stack([-turn * p[1], turn * p[0], x * p[1] - y * p[0]])
+def _over_ground(pose: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Momenta p (3, ..., B) in a frame at pose (3, B), about its origin, as those over the ground, about that of the ground."""
+    x, y, heading = pose
+    p_x, p_y = rotated(heading, p[0], p[1])
+    return np.stack([p_x, p_y, p[2] + x * p_y - y * p_x])
+
+
+def _from_frame(pose: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """The other way."""
+    x, y, heading = pose
+    return np.stack([*rotated(-heading, p[0], p[1]), p[2] - x * p[1] + y * p[0]])
 
 
 def _difference(before: tuple, dt: float):
