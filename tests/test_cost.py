@@ -21,6 +21,7 @@ from geomech.field import Field
 from geomech.output import plots
 from geomech.study import accuracy, cost, estimate, sweep
 from geomech.study.bench import Study
+from rft.effects import SkinFriction
 from rft.newton import Balance
 
 GLASS = scenes.load("three-link-glass")
@@ -163,6 +164,26 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     unit, alpha = connection.directions(4, 64), np.array([axis[k] for axis, k in zip(axes, (3, 0, 2, 1))])
     wanted = np.linalg.lstsq(unit, FIVE.system.velocity(alpha, unit), rcond=None)[0].T
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("over", "batches"),
+    [
+        ({"medium.ratio": 3, "effects.skin-friction.backward": 5}, 0),  # as many as are taken for nothing
+        ({"medium.ratio": 40}, 40),
+        ({"medium.ratio": 25, "gait.amplitude": 4}, 25),
+        ({"effects.skin-friction.backward": 660}, 10.3),
+        ({"effects.skin-friction.forward": 10, "medium.ratio": 65}, 650),
+        ({"medium.ratio": 16, "effects.skin-friction.forward": 64}, 16),
+    ],
+    ids=lambda x: str(x),
+)
+def test_what_does_not_share_a_batch_is_counted(over, batches, monkeypatch):
+    """A sweep of media takes ten times what their balances do: each is a batch, which takes its 100 s here."""
+    monkeypatch.setattr(sweep, "_of_a_batch", lambda at, part: 100.0)
+    scene = VISCOUS.changed(effects=(SkinFriction(0.8, 1.2, 1.0),))
+    values = {k: np.linspace(0.5, 1.0, n).tolist() for k, n in over.items()}
+    assert sweep.cost(scene, values).seconds == pytest.approx(100 * batches, abs=20)
 
 
 def test_a_cost_reads_well():

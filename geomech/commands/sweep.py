@@ -58,12 +58,13 @@ def sweep(
     check_outputs(scene, out, plot, partial)
     with kept.alone(out):
         with terminal.progress(f"sweep of {scene.name}") as bar:
-            allow(scene, (sweeping.cost_of_sweep if walks else sweeping.cost)(scene, axes), yes)
+            cost = (sweeping.cost_of_sweep if walks else sweeping.cost)(scene, axes)
+            allow(scene, cost, yes)
             if kept.is_second(out, partial):
                 note(
                     f"another sweep to {out} is unfinished: what is done of it stays, this one keeps its own in {partial}"
                 )
-            results = sweeping.sweep(scene, axes, partial, bar)
+            results = sweeping.sweep(scene, axes, partial, bar, cost.seconds)
         try:
             sweeps.save(out, scene, results)
             if plot:

@@ -147,6 +147,10 @@ class Rows(Kept):
     def __len__(self) -> int:
         return self.count
 
+    def left(self, seconds: float | None) -> float | None:
+        """What is left of so many seconds, those of the whole sweep."""
+        return None if seconds is None else seconds * (1.0 - self.count / self.total)
+
     def unsaved(self) -> list[np.ndarray]:
         return [self.values[self.saved : self.count]] if self.count > self.saved else []
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +25,7 @@ from geomech.study.tables import of_pose
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
+MOST_BATCHES = 10  # that are taken for nothing in a forecast
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
 FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
@@ -64,7 +66,11 @@ def _twin(key: str) -> str:
 
 
 def sweep(
-    scene: Scene, over: Mapping[str, list[float]], partial: Path | None = None, progress: Callable | None = None
+    scene: Scene,
+    over: Mapping[str, list[float]],
+    partial: Path | None = None,
+    progress: Callable | None = None,
+    seconds: float | None = None,
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}
     by the direct tier; estimates as in `estimate.direct`. Where the swimmer has a frequency also {"frequency": (N_1, ...),
@@ -73,8 +79,8 @@ def sweep(
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
     solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
-    asked for; it is the caller's to remove, once the results are saved. Who computes: `geomech.workers`. SceneError if a
-    point of the grid makes no scene.
+    asked for; it is the caller's to remove, once the results are saved. seconds: what `cost` has said, if it was asked: others
+    begin sooner. Who computes: `geomech.workers`. SceneError if a point of the grid makes no scene.
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
@@ -86,7 +92,8 @@ def sweep(
     doubtful = uncertainty.uncertain(scene.system)
     kept_as = partial and Path(partial), question(scene, values), int(np.prod(solved)), workers.settle(parts)
     with kept.Rows(*kept_as, kept.WIDTH + 2 * doubtful) as rows:
-        for found in workers.each(_part, at, _parts(at, points, amplitudes, len(rows)), parts, rows.settled):
+        some = _parts(at, points, amplitudes, len(rows))
+        for found in workers.each(_part, at, some, parts, rows.settled, rows.left(seconds)):
             rows.add(found)
             if progress:
                 progress(len(rows) / rows.total)
@@ -129,11 +136,25 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     """Of `sweep`, by some of its points; SceneError as there."""
     tables, names, values, points = _grid(scene, over)
     total, at = points.total * len(values.get(AMPLITUDE, [0])), _At(tables, scene, tuple(names))
+    start, first = time.process_time(), [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
+    seconds = (time.process_time() - start) / len(first) * points.total
+    together = max(1, min(SAMPLES_TOGETHER, total // points.total * len(first) // len(set(map(kind, first)))))
     some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
-    jobs = [direct(s, s.gait, total, s.numerics.phases, SAMPLES_TOGETHER) + of_medium(s, s.gait, total) for s in some]
-    balances, seconds, _ = np.array(list(map(price, jobs))).T
+    jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
+    balances, each, _ = np.array(list(map(price, jobs))).T
+    if not scene.system.steps and total > MOST_BATCHES * together:
+        seconds += total / together * _of_a_batch(at, ([points[0]], values.get(AMPLITUDE, [])[:1] or None))
     held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
-    return Cost(round(balances.mean()), float(seconds.mean()), max(held) + HELD * total)
+    return Cost(round(balances.mean()), float(each.mean()) + seconds, max(held) + HELD * total)
+
+
+def _of_a_batch(at: _At, part: tuple) -> float:
+    """Seconds that a batch takes, however small it is."""
+    with workers.one_way(workers.MANY):
+        _part(at, part)  # loads what the first one loads
+        start = time.process_time()
+        _part(at, part)
+        return time.process_time() - start
 
 
 def _grid(scene: Scene, over: Mapping[str, list[float]]):

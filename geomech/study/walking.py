@@ -129,7 +129,13 @@ def _speeding_up(scene: WalkerScene) -> float:
     return float(2 * np.pi * reach * f**2 / (PUSHED * 9.81))
 
 
-def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progress: Callable | None = None) -> dict:
+def sweep(
+    scene: WalkerScene,
+    over: Mapping,
+    partial: Path | None = None,
+    progress: Callable | None = None,
+    seconds: float | None = None,
+) -> dict:
     """{"over": {parameter: values}, "speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}: as
     `geomech.study.sweep.sweep`, which keeps what is done."""
     tables, values, points = _grid(scene, over)
@@ -138,7 +144,7 @@ def sweep(scene: WalkerScene, over: Mapping, partial: Path | None = None, progre
     with Rows(partial and Path(partial), question(scene, values), points.total, workers.settle(parts)) as rows:
         left = range(len(rows), points.total, TOGETHER)
         some = ([points[i] for i in range(k, min(k + TOGETHER, points.total))] for k in left)
-        for found in workers.each(_part, at, some, parts, rows.settled):
+        for found in workers.each(_part, at, some, parts, rows.settled, rows.left(seconds)):
             rows.add(found)
             if progress:
                 progress(len(rows) / rows.total)
