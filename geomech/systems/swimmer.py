@@ -13,16 +13,15 @@ import rft
 from geomech.errors import real_array, short
 from geomech.images import Around, around
 from geomech.reconstruct import displacement, poses, repeated
-from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, not_so, refuse_mutable
-from geomech.systems.said import name_in, told
+from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
+from geomech.systems.said import Said
 from geomech.systems.solver import Solver
 from rft.bodies import KINDS as BODIES
 from rft.bodies.base import checked_body, halves, is_reversible, pace
 from rft.contact import Model
-from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
 from rft.effects.base import pieced
-from rft.loads import QUADRATURE, element_load, rule_for
+from rft.loads import element_load, rule_for
 from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
 from rft.media.base import is_central, require_law
 from rft.newton import ELEMENTS_TOGETHER
@@ -34,7 +33,7 @@ MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name
 
 
 @dataclass(frozen=True)
-class Swimmer(Plain):
+class Swimmer(Said, Plain):
     """A body in a medium, with the effects it is asked to have."""
 
     medium: rft.Medium
@@ -272,47 +271,3 @@ class Swimmer(Plain):
         if not self.linear:
             finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
         return self.with_solver(**finer) if finer else None
-
-    @property
-    def blames(self) -> str:
-        law = [] if is_rate_independent(self.medium) else [f"the law {name_in(LAWS, self.medium)}"]
-        return ", ".join(law + [e.kind for e in self.effects if e.breaks])
-
-    def blame(self, premises: Premise) -> str:
-        if Premise.RATE_INDEPENDENT in premises and not is_rate_independent(self.medium):
-            return f"the law {name_in(LAWS, self.medium)}, whose drag is of no one power of the speed"
-        for effect in self.effects:
-            if effect.breaks & premises:
-                return f"the effect {effect.kind}, which is {not_so(effect.breaks)}"
-        return ""
-
-    def refuse(self, what: str, premises: Premise, instead: str) -> None:
-        lawful = is_rate_independent(self.medium) or Premise.RATE_INDEPENDENT not in premises
-        super().refuse(what, premises, f"{instead}, or {'drop the effect' if lawful else 'take another law'}")
-
-    def about(self) -> dict:
-        return {
-            "loads": self.solver.loads if self.notes == () else QUADRATURE,
-            "regularisation": float(self.solver.regularisation),
-            "regularisation_unit": "body length rad-1",
-        }
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        if self.closed or self.solver.loads != "exact":
-            return ()
-        return (
-            f"the law {name_in(LAWS, self.medium)} has no closed form: its averages over an element are by quadrature "
-            f"({QUADRATURE}) in place of exact integrals, which takes some five times as long and, where drag is dry, is off "
-            "by 1 to 3 % of the displacement of three links, less of more; errors include it, and "
-            '[numerics] loads = "gauss:96" lowers it fourfold',
-        )
-
-    def told(self) -> list[str]:
-        return told(self)
-
-    @property
-    def because(self) -> str:
-        broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in self.effects if e.breaks & SHAPE_ALONE]
-        reasons = [f"with {kind} the scene is {not_so(lost)}" for kind, lost in broken]
-        return f"({ENGINES[self.engine]}): " + ("; ".join(reasons) or "nothing remembers, places are alike, no mass")
