@@ -17,8 +17,8 @@ SINGULAR = 1e-6  # of the largest singular value, below which two cycles went th
 UNKNOWN = 0.5  # ratio of the first change of displacement to the next, assumed
 SLOWEST = 0.95  # ratio of a change to that before, where they hardly shrink
 RATIOS = 3  # of late, whose mean counts
-ASTRAY = 100.0  # times the change of velocity before: a kick that led away from the limit
-FAILURES = 3  # after so many of these a sample goes round and round without
+ASTRAY = 5.0  # times the least change of velocity so far: a kick that led away from the limit
+FAILURES = 10  # after so many of these a sample goes round and round without
 
 
 class Approach:
@@ -43,37 +43,39 @@ class Approach:
 
 
 class HeavyApproach(Approach):
-    """The same with mass: from the last cycles' first velocities, their changes and displacements."""
+    """The same with mass: from the last cycles' first velocities, their changes and displacements. A kick after which
+    velocities change more than in the calmest cycle so far is taken back, to the end of that."""
 
     def __init__(self, samples: int):
         super().__init__(samples)
         self.cycles: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self.step, self.failures = np.zeros((3, samples)), np.zeros(samples, int)
+        self.calmest = tuple(np.full((3, samples), x) for x in (0.0, np.inf, 0.0))  # start, change and displacement
+        self.astray = np.zeros(samples, bool)
 
     def after(self, start, end, moved) -> np.ndarray:
         last, self.moved = self.moved, moved
         if start is None:  # the first cycle starts from rest
             return self.drift
-        self.cycles = [*self.cycles[1 - DEEPEST :], (start, end - start, moved)]
+        now = start, end - start, moved
+        size, least = (np.abs(change).max(0) for change in (now[1], self.calmest[1]))
+        self.astray = (size > ASTRAY * least) & (self.step != 0).any(0)
+        self.failures += self.astray
+        self.calmest = tuple(np.where(size < least, x, y) for x, y in zip(now, self.calmest))
+        old = [*self.cycles[1 - DEEPEST :], now]
+        self.cycles = [tuple(np.where(self.astray, x, y) for x, y in zip(self.calmest, cycle)) for cycle in old]
         if len(self.cycles) < 2:
             return self.drift
-        self._forget()
         starts, changes, moves = (np.diff(np.stack(x), axis=0) for x in zip(*self.cycles))
         mix = _mix(changes, self.cycles[-1][1])
-        self.step = ((starts + changes) * mix[:, None]).sum(0)
+        ahead = ((starts + changes) * mix[:, None]).sum(0)
+        self.step = np.where(self.astray, self.calmest[0] + self.calmest[1] - end, ahead)
         to_come = (moves * mix[:, None]).sum(0)
         return np.maximum(np.abs(to_come), np.abs(moved - last)).max(0)
 
-    def _forget(self):
-        """Drop all but the last cycle of samples that a kick has led astray."""
-        sizes = [np.abs(change).max(0) for _, change, _ in self.cycles[-2:]]
-        astray = (sizes[1] > ASTRAY * sizes[0]) & (self.step != 0).any(0)
-        self.failures += astray
-        self.cycles = [tuple(np.where(astray, x, y) for x, y in zip(self.cycles[-1], c)) for c in self.cycles]
-
     def kick(self, which: np.ndarray) -> np.ndarray:
         """(3, B): change of velocity that leads the samples ``which`` to the limit, as far as is known."""
-        self.step = np.where(which & (self.failures < FAILURES), self.step, 0.0)
+        self.step = np.where(which & (self.astray | (self.failures < FAILURES)), self.step, 0.0)
         return self.step
 
 

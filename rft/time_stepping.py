@@ -257,6 +257,14 @@ class _Steps:
 
     def kick(self, change: np.ndarray) -> None:
         """Go on as if the body had been moving faster by so much, (3, B), for the last steps; the ground does not notice."""
-        self.states = [p.kicked(s, self.site, self.xi[-1], change) for p, s in zip(self.processes, self.states)]
-        self.xi = [x + change for x in self.xi]
-        self.v = {name: v + self.site.motions[name].carried(change) for name, v in self.v.items()}
+        motions = self.site.motions
+        v = {name: old + motions[name].carried(change) for name, old in self.v.items()}
+        drag = (self._drag(v) - self._drag(self.v)) / self.model.unit
+        self.states = [p.kicked(s, self.site, change, drag) for p, s in zip(self.processes, self.states)]
+        self.xi, self.v = [x + change for x in self.xi], v
+
+    def _drag(self, v: dict[str, np.ndarray]) -> np.ndarray:
+        """(3, B): on the frame, of untouched ground at velocities of all contacts' elements at the last step."""
+        eps = self.balance.regularisation * self.scales[(self.step - 1) % self.phases]
+        load = self.model.load(np.concatenate(list(v.values()), 1), self.balance.rows, eps)
+        return Kinematics.stacked(list(self.site.motions.values())).wrench(load[:, 0])

@@ -35,7 +35,7 @@ from rft import (
 )
 from rft.bodies.base import halves
 from rft.effects import folded
-from rft.limit_cycle import Approach
+from rft.limit_cycle import Approach, HeavyApproach
 from rft.newton import Balance
 from rft.se2 import compose, exp
 from rft.time_stepping import _Steps
@@ -524,6 +524,41 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     got = (found.work.bending_moment - medium_alone)[2:].T
     np.testing.assert_allclose(got, wanted, atol=off * np.abs(wanted).max())
     assert np.abs(wanted).max() > 0.01
+
+
+def test_a_kick_that_leads_astray_is_taken_back():
+    """Two samples whose velocity halves its way to (1, -1, 2) in a cycle; one of them is thrown about after its first kick. It
+    goes on from the end of its calmest cycle, and both get there."""
+    limit, way = np.array([[1.0], [-1.0], [2.0]]), HeavyApproach(2)
+    halved = lambda x: x + 0.5 * (limit - x)
+    assert np.isinf(way.after(None, np.zeros((3, 2)), np.zeros((3, 2)))).all()
+    x = np.zeros((3, 2))
+    for _ in range(2):
+        start, x = x, halved(x)
+        way.after(start, x, x - limit)
+        step = way.kick(np.ones(2, bool))
+    calm, wild = x, halved(x + step) + [[0.0, 30.0], [0.0, -20.0], [0.0, 10.0]]
+    np.testing.assert_allclose(calm + step, limit * np.ones(2), atol=1e-12)
+    drift = way.after(calm + step, wild, wild - limit)
+    step = way.kick(np.ones(2, bool))
+    np.testing.assert_allclose(wild + step, np.hstack([limit, calm[:, 1:]]), atol=1e-12)
+    assert drift[0] <= 0.5 < 10.0 < drift[1]
+    x = wild + step
+    for _ in range(3):
+        start, x = x, halved(x)
+        way.after(start, x, x - limit)
+        x = x + way.kick(np.ones(2, bool))
+    np.testing.assert_allclose(x, limit * np.ones(2), atol=1e-9)
+
+
+@pytest.mark.parametrize(("inertia", "phases"), [(300.0, 8), (400.0, 8), (300.0, 16)])
+def test_no_kick_leads_a_body_astray(inertia, phases):
+    """Drag acts between the step before a kick and the next one; a velocity far from the limit once led to fast spin."""
+    shapes = Circle(amplitude=1.2).cycle(phases)
+    found = time_steps(Viscous(2.0), Chain(), *shapes, effects=(heavy(inertia),)).checked()
+    assert found.cycles <= 45
+    assert np.abs(found.xi).max() < 0.2
+    np.testing.assert_allclose(found.displacement[:2], [-0.05785, -0.00554], atol=1e-3)  # of 128 phases
 
 
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])

@@ -59,7 +59,7 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
     every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
     if stepping:  # a step rests on the one before: fewer phases are other steps
-        eighth, coarse, half, full = *(system.run(*fewer).net for fewer in every[:3]), run.net
+        eighth, coarse, half, full = *(_with_fewer(system, *fewer) for fewer in every[:3]), run.net
     else:
         eighth, coarse, half = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2))
         full = run.net
@@ -74,6 +74,16 @@ def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
         error += (1.2 if system.closed else 2.4) * apart(finer.run(*every[1], *near).net, coarse, scene.system.length)
     error += np.asarray(run.to_come)[..., None] + system.own_error(*every[2])
     return full, error, pieces_error(scene, shapes, every[1], coarse)
+
+
+def _with_fewer(system, alpha, alphadot) -> np.ndarray:
+    """Poses by fewer steps of time than were asked for; RuntimeError, which says so."""
+    try:
+        return system.run(alpha, alphadot).net
+    except RuntimeError as error:
+        raise RuntimeError(
+            f"at {alpha.shape[-2]} phases, for the estimate of the error, {error}, or raise [numerics] phases"
+        ) from None
 
 
 def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:

@@ -96,9 +96,9 @@ class Process(Effect):
         """What is remembered after a step that ended with velocities v (3, n, B) of every contact's elements."""
         return state
 
-    def kicked(self, state, site: Site, xi, change) -> Any:
-        """What is remembered as if the body had moved faster by ``change`` than with xi, (3, B) each, after the last steps,
-        of which that at ``site`` was the last; the ground does not notice."""
+    def kicked(self, state, site: Site, change, drag) -> Any:
+        """What is remembered as if the body had moved faster by ``change`` (3, B) at the last steps, of which that at ``site``
+        was the last, with so much more drag (3, B), over the model's unit; the ground does not notice."""
         return state
 
 

@@ -70,11 +70,13 @@ class BodyInertia(Process):
     def after(self, state: tuple, site: Site, v) -> tuple:
         return *state[-1:], _over_ground(site.pose, _uniform(site.motions[SIDE]).wrenches(UNIT_MASS * v[SIDE]))
 
-    def kicked(self, state: tuple, site: Site, xi, change) -> tuple:
-        """It has coasted with this change of velocity."""
+    def kicked(self, state: tuple, site: Site, change, drag) -> tuple:
+        """It has coasted with this change of velocity, which the drag has lessened since the step before."""
         motion = site.motions[SIDE]
-        more = _over_ground(site.pose, _uniform(motion).wrenches(UNIT_MASS * motion.carried(change)))
-        return tuple(momenta + more for momenta in state)
+        now = _uniform(motion).wrenches(UNIT_MASS * motion.carried(change))
+        lost = site.dt / (self.inertia + site.dt) * drag  # over inertia, where that is much
+        before = now + motion.half / motion.half.sum(0) * lost[:, None]
+        return tuple(p + _over_ground(site.pose, more) for p, more in zip(state, (before, now)))
 
 
 @dataclass(frozen=True)
