@@ -14,7 +14,7 @@ from geomech.output import netcdf
 from geomech.scene.frames import framed
 from geomech.study import cost, effort
 from geomech.systems import NoSlipSnake, Swimmer, Table
-from rft import BodyInertia, Chain, Granular, Serpenoid, SkinFriction, Transient, Viscous
+from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 FLUID, SAND = Viscous(2.7), Granular(C=1.8, gamma0=np.radians(13.8))
 UNEVEN = Chain((0.7, 1.4, 0.9), length=0.3)
@@ -98,6 +98,23 @@ def test_errors_cover_four_times_as_many_phases():
     for key in ("path_length", "work"):
         assert (np.abs(coarse[key] - fine[key]) <= coarse[f"{key}_error"]).all()
         assert (coarse[f"{key}_error"] < 1e-2 * fine[key]).all()
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        BodyInertia(mass=1.5, frequency=1 / (2 * np.pi), length=1.0, drag=1.0),
+        Transient(0.05),
+        DisturbedGround(0.1, 0.6),
+    ],
+    ids=lambda e: e.kind,
+)
+def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
+    """The mean over every other step of the same march knows of neither."""
+    one = scene(Swimmer(Viscous(2.5), Chain((1, 1.4, 0.7)), (effect,))).with_numerics(pieces=20)
+    found, fine = (effort.effort(s, GAIT, [0.7], n) for s, n in ((one, 32), (one.with_numerics(pieces=80), 64)))
+    off = np.abs(found["work"] - fine["work"])
+    assert off <= found["work_error"] < 0.05 * fine["work"]
 
 
 @pytest.mark.parametrize(

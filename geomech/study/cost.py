@@ -200,8 +200,11 @@ def of_metric(scene: Scene) -> list[Job]:
 
 
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
-    """Path length and work of ``count`` amplitudes (`effort.effort`)."""
-    return direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
+    """Path length and work of ``count`` amplitudes (`effort.effort`): steps of time again at half and a quarter of the
+    phases, and a quarter of the phases with twice the pieces."""
+    times = 1.0 + 0.75 * bool(scene.system.steps) + 0.5 * bool(scene.system.cut)
+    jobs = direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
+    return [job._replace(count=times * job.count) for job in jobs]
 
 
 def _per_sample(job: Job, count: float) -> float:

@@ -22,6 +22,7 @@ from geomech.harmonics import Harmonics
 from geomech.metric import Finsler, Metric
 from geomech.scene.model import Scene
 from geomech.study import tables
+from geomech.study.estimate import MOST_PIECES
 from geomech.study.results import Displacements
 from geomech.systems.base import SHAPE_ALONE, System
 from geomech.tiers import TIERS
@@ -146,28 +147,46 @@ def refuse_costless(scene: Scene) -> None:
 
 
 def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
-    """{"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the direct tier; each
-    error the change with half of the phases. Path lengths are nan where power is of no one degree in the rate. ValueError
-    where nothing says what moving costs."""
+    """{"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the direct tier. Each
+    error is the change with half of the phases, in time stepping at least a quarter of that from there to a quarter of them,
+    and twice that with twice the pieces into which effects cut the body; what cycles still to come would change is not in
+    it. Path lengths are nan where power is of no one degree in the rate. ValueError where nothing says what moving costs."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     number("phases", phases or 8, 8, 1e6, whole=True)
-    phases, degree = 2 * (-(-(phases or scene.numerics.phases) // 2)), system.power_degree
+    phases = max(32 if system.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
+    finer = scene.with_numerics(pieces=min(2 * system.cut, MOST_PIECES)).system if system.cut else None
+
+    integral = lambda rates: 2 * np.pi * rates.mean(-1)
 
     def told(some):
-        alpha, alphadot = gait.cycle(phases, some)
-        if system.cost is not None:  # a metric, of which there is no work
-            square = np.asarray(system.cost(alpha, alphadot))
-            rates = np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
+        shapes = gait.cycle(phases, some)
+        rates = _rates(system, *shapes)
+        fine = integral(rates)
+        fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
+        if system.steps:  # a step rests on the one before: fewer phases are other steps
+            half, quarter = (integral(_rates(system, *some)) for some in fewer)
+            error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
-            done = system.run(alpha, alphadot, True).work
-            P = system.power(alpha, alphadot) if done is None else done.power / system.length
-            rates = np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
-        fine, half = (2 * np.pi * x.mean(-1) for x in (rates, rates[..., ::2]))
-        return np.concatenate([fine, np.abs(fine - half)], 1)
+            half, quarter = (integral(rates[..., ::step]) for step in (2, 4))
+            error = np.abs(fine - half)
+        if finer:
+            error += 2 * np.abs(integral(_rates(finer, *fewer[1])) - quarter)
+        return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
     return dict(zip(names, in_groups(told, amplitudes, system.at_once(phases))[:, :4].T))
+
+
+def _rates(system: System, alpha, alphadot) -> np.ndarray:
+    """(B, 2, N): what path length and work are the integrals of, nan where there is none."""
+    degree = system.power_degree
+    if system.cost is not None:  # a metric, of which there is no work
+        square = np.asarray(system.cost(alpha, alphadot))
+        return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
+    done = system.run(alpha, alphadot, True).work
+    P = system.power(alpha, alphadot) if done is None else done.power / system.length
+    return np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
 
 
 def add_effort(table: Displacements) -> None:
