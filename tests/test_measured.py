@@ -9,22 +9,24 @@ import numpy as np
 import pytest
 import xarray
 from scipy.interpolate import CubicSpline
+from scipy.io import loadmat
 
 import geomech
 import rft
 from figures import measured_gait
-from geomech import cli, connection, gaits, measured
+from geomech import cli, connection, gaits, measured, tables
 from geomech.connection import Connection
 from geomech.curvature import ccf
 from geomech.errors import SceneError, UnitWarning
 from geomech.measured import cycles, phase, regression, smooth, synthetic
+from geomech.output import mat, netcdf
 from geomech.output import measured as told
-from geomech.output import netcdf
 from geomech.output.explain import explain
 from geomech.reconstruct import displacement
 from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
+from geomech.tables.mat import ERROR
 from geomech.tube import Loop, Tube, waves
 from rft import se2
 
@@ -403,6 +405,37 @@ def test_a_field_written_again_keeps_every_digit(field, tmp_path):
     for f in dataclasses.fields(one):
         a, b = (getattr(x, f.name) for x in (one, other))
         np.testing.assert_array_equal(*((a.coefficients, b.coefficients) if f.name == "loop" else (a, b)))
+    one, other = (xarray.open_dataset(x, engine="scipy") for x in (field / "field.nc", tmp_path / "again.nc"))
+    assert {*one.variables} == {*other.variables}
+    for name in one.variables:
+        np.testing.assert_array_equal(one[name], other[name])
+        assert (one[name].dims, one[name].attrs) == (other[name].dims, other[name].attrs)
+    assert one.attrs["frame_meaning"] == other.attrs["frame_meaning"] and one.attrs["level"] == other.attrs["level"]
+
+
+@pytest.mark.parametrize(("sign", "order"), [("+", "ndgrid"), ("-", "meshgrid")])
+def test_errors_of_A_go_with_it_into_a_mat_file(field, tmp_path, sign, order):
+    """Nan where A is, which leaves nothing to look up."""
+    study = Study(load(field / "mine.toml"))
+    mat.save_connection(tmp_path / "a.mat", study, sign, order)
+    first = xarray.open_dataset(field / "field.nc", engine="scipy")
+    error = loadmat(tmp_path / "a.mat")[ERROR]
+    np.testing.assert_array_equal(error if order == "ndgrid" else error.swapaxes(-1, -2), first.A_error)
+    held = tables.load(tmp_path / "a.mat")
+    for found, wanted in (
+        (held.connection.A, first.A), (held.connection.residual, first.fit_residual), (held.A_error, first.A_error),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(found, wanted)
+    assert (held.level, held.frame) == (0.95, "that of the log")
+    with pytest.raises(ValueError, match="nothing is looked up between those: give the .nc file of the measured gait"):
+        Table(tmp_path / "a.mat")
+
+
+def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
+    (tmp_path / "old.nc").write_bytes((field / "field.nc").read_bytes().replace(b"A_error", b"a_error"))
+    old, now = Table(tmp_path / "old.nc"), Table(field / "field.nc")
+    assert old.held.A_error is None
+    np.testing.assert_allclose(old.stored("A_error"), now.stored("A_error"), rtol=1e-12)
 
 
 def test_lengths_and_signs_of_a_field(usual, field, tmp_path):

@@ -71,8 +71,13 @@ def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     netcdf.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)
-    with pytest.raises(ValueError, match="has singular shapes"):
-        Table(tmp_path / "b.nc")
+    mat.save_connection(tmp_path / "b.mat", snake)
+    again = Connection.load(tmp_path / "b.mat")
+    np.testing.assert_array_equal(again.A, snake.fitted.A)
+    np.testing.assert_array_equal(again.residual, snake.fitted.residual)
+    for name in ("b.nc", "b.mat"):
+        with pytest.raises(ValueError, match="has singular shapes .nan., and nothing is looked up between those$"):
+            Table(tmp_path / name)
 
 
 @pytest.mark.parametrize("sign", "+-")
@@ -93,6 +98,88 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     more = loadmat(tmp_path / "b.mat")
     for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
         np.testing.assert_array_equal(more[name], found[name])
+
+
+@pytest.mark.parametrize("links", [2, 4])
+def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch, capsys):
+    """Before anything is computed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Study, "compute_field", None)
+    gait = Fourier(cos=((0.2,),) * (links - 1), sin=((0.1,),) * (links - 1))
+    scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5))
+    Path("mine.toml").write_text(scenes.toml(scene))
+    said = f"sysplotter's layout, which is of two joints, and this body has {links - 1}: write a .nc file"
+    with pytest.raises(SceneError, match=said):
+        mat.save_connection("a.mat", Study(scene))
+    for more in ((), ("--plot", "a.png")):
+        with pytest.raises(SystemExit) as left:
+            cli.main(["connection", "mine.toml", "-o", "a.mat", *more])
+        err = capsys.readouterr().err
+        assert left.value.code == 2 and said in err and err.count("\n") == 1 and "maps" not in err
+    assert [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
+
+
+def test_a_connection_of_one_joint_is_not_drawn(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1, 1))), Fourier(cos=((0.2,),), sin=((0.1,),)), Numerics(grid=5))
+    Path("mine.toml").write_text(scenes.toml(scene))
+    for command in (
+        ("connection", "mine.toml", "-o", "a.nc", "--plot", "a.png"),
+        ("ccf", "mine.toml", "--plot", "a.png"),
+    ):
+        with pytest.raises(SystemExit) as left:
+            cli.main([*command])
+        assert left.value.code == 2
+        assert "mine.toml: a body of one joint has no map, a loop of it encloses no area" in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
+
+
+@pytest.mark.parametrize("ending", [".nc", ".mat"])
+def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending, made, tmp_path):
+    """Of whatever file has them beside A, on a grid of its own."""
+    folder, s = made
+    error = 0.01 * np.random.default_rng(0).uniform(1, 2, s.fitted.A.shape)
+    path = tmp_path / f"a{ending}"
+    if ending == ".nc":
+        data = xarray.open_dataset(folder / "a.nc", engine="scipy").load()
+        data["A_error"] = (data.A.dims, error)
+        data.attrs["level"] = 0.9
+        path.write_bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
+    else:
+        plain_mat(path, s.fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+", "level": 0.9}))
+        halves = Table(path, body_length=2.0).stored("A_error")
+        np.testing.assert_allclose(halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1))
+    table = Study(Scene(Table(path), GAIT))
+    np.testing.assert_array_equal(table.to_xarray().A_error, error)
+    netcdf.save_connection(tmp_path / "b.nc", table)
+    mat.save_connection(tmp_path / "b.mat", table, "-", "meshgrid")
+    for again in (tables.load(tmp_path / "b.nc"), tables.load(tmp_path / "b.mat")):
+        np.testing.assert_array_equal(again.A_error, error)
+        assert again.level == 0.9
+    cycle = GAIT.cycle(64, 0.7)
+    plain = dataclasses.replace(table.scene.system.held, A_error=None)
+    whole = table.scene.system.own_error(*cycle)
+    object.__setattr__(table.scene.system, "held", plain)
+    more = whole - table.scene.system.own_error(*cycle)
+    path_length = 2 * np.pi * np.linalg.norm(cycle[1], axis=-1).mean()
+    low, high = (
+        np.sqrt(2) * 0.01 * k * path_length for k in (1.0, 2.0)
+    )  # of the heading, and of x and y in body lengths
+    assert low < more[1] < high and more[0] * table.scene.system.length > low
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (np.ones((3, 2, 9, 8)), r"A_error of shape \(3, 2, 9, 8\) where A has \(3, 2, 9, 9\)"),
+        (-np.ones((3, 2, 9, 9)), "A_error below 0"),
+        (np.full((3, 2, 9, 9), np.nan), "A_error that is not finite"),
+    ],
+)
+def test_intervals_that_are_none_are_refused(error, said, made, tmp_path):
+    plain_mat(tmp_path / "a.mat", made[1].fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+"}))
+    with pytest.raises(SceneError, match=said):
+        tables.load(tmp_path / "a.mat")
 
 
 def plain_mat(path, c: Connection, sign=1.0, order="ndgrid", **more):

@@ -12,6 +12,7 @@ from geomech.commands.options import check_outputs
 from geomech.errors import Note, SceneError, check_angle, named
 
 WORTH_SAYING = 1.0  # s that a field takes
+NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
 
 
 def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
@@ -118,9 +119,8 @@ def field(
     study, joints = Study(scene), scene.system.joints
     with named(scene.name):
         TIERS["path"].refuse(scene.system)
-        if maps and joints != 2:
-            two = f"maps of shape space take a body of two joints, or modes, this one has {joints}"
-            raise SceneError(f"{scene.name}: {two}: give a chain two [body] modes")
+        if maps and joints == 1:
+            raise SceneError(NO_MAP)
         if with_gait:
             study.refuse_outside()
         check_outputs(scene, output, plot)
@@ -157,7 +157,7 @@ def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
     with named(scene.name):
         TIERS["path"].refuse(scene.system)
         if joints == 1:
-            raise SceneError("a body of one joint has no map: a loop of it encloses no area")
+            raise SceneError(NO_MAP)
         pairs = [_pair(pair, joints)] if pair is not None else list(combinations(range(joints), 2))
         if len(pairs) > MOST_PAIRS:
             raise SceneError(

@@ -56,6 +56,8 @@ def connection(
     if style is not None:
         choose("--style", style, plots.CONNECTION_STYLES)
     scene = loaded(name, grid, extent)
+    if out.suffix == ".mat":
+        mat.check_joints(scene)
     sliced = plot and (scene.system.joints > 2 or pair is not None or slice_ is not None)
     if sliced and beside is not None:
         raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
@@ -64,7 +66,7 @@ def connection(
     with keeping(scene, out, command="connection", **asked):
         if sliced:
             found = planes(Study(scene), pair, slice_, yes)
-        study = field(name, grid, extent, out, plot, out.suffix == ".mat", yes, harmonics=out.suffix == ".nc")
+        study = field(name, grid, extent, out, plot, bool(plot) and not sliced, yes, harmonics=out.suffix == ".nc")
         if out.suffix == ".nc":
             netcdf.save_connection(out, study)
         else:

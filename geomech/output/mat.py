@@ -9,23 +9,34 @@ import numpy as np
 
 from geomech.errors import SceneError
 from geomech.files import whole_file
+from geomech.scene.model import Scene
 from geomech.study.bench import Study
-from geomech.tables.mat import ABOUT, ENTRIES, RESIDUAL
+from geomech.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
+
+
+def check_joints(scene: Scene) -> None:
+    """SceneError for other than the two joints that sysplotter's layout has arrays for."""
+    if (joints := scene.system.joints) != 2:
+        why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
+        raise SceneError(f"{scene.name}: {why}: write a .nc file, which takes any number of joints")
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
     """Write alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M), for xi = ``sign`` A alphadot; rows run over
     alpha1 as of ndgrid, or over alpha2 as of meshgrid. Beside them ABOUT, a JSON text of sign, frame, body length, unit
-    and spline, and the fit residual (3, N, M). The file appears whole or not at all; SceneError for other than two joints."""
+    and spline, and the fit residual (3, N, M); of a table that tells what A may be off by, half
+    widths of its intervals (3, 2, N, M). The file appears whole or not at all; SceneError for other than two joints."""
     from scipy.io import savemat
 
-    scene, fitted = study.scene, study.fitted
-    if len(fitted.axes) != 2:
-        raise SceneError(f"{scene.name}: a .mat file takes a body of two joints: write a .nc file")
+    scene = study.scene
+    check_joints(scene)
+    fitted = study.fitted
     run = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
     even = study.even_part  # counts at half of all directions
     left = fitted.residual if even is None else np.sqrt(fitted.residual**2 + even**2 / 2)
-    rest = {} if np.isnan(left).any() else {RESIDUAL: left}
+    rest = {} if np.isnan(left[:, ~np.isnan(fitted.A).any((0, 1))]).any() else {RESIDUAL: left}
+    if (error := scene.system.stored("A_error")) is not None:
+        rest[ERROR] = error
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
     entries = dict(zip(ENTRIES, factor * fitted.A.reshape(6, *fitted.A.shape[2:])))
@@ -37,6 +48,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     about = {
         "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": s.unit, "interpolation": fitted.degree,
         "shapes": names, "conventions": f"xi = {sign} A alphadot; {meaning}",
+        **{key: value for key, value in s.about().items() if key in ("singular_shapes", "level")},
     }  # fmt: skip
     arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, **rest}.items()}
     with whole_file(path) as part:

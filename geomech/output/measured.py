@@ -10,9 +10,19 @@ import numpy as np
 from geomech.curvature import ccf
 from geomech.curvature import error as curvature_error
 from geomech.measured.fit import SHOWN, Fitted
-from geomech.output.netcdf import UNITS, Variable, angles_of, of_ccf, of_connection, of_known, write
+from geomech.output.netcdf import (
+    INTERVAL_OF_CCF,
+    UNITS,
+    angles_of,
+    of_ccf,
+    of_connection,
+    of_error,
+    of_known,
+    of_reach,
+    write,
+)
 from geomech.scene.write import gait_table, table
-from geomech.tube import BEYOND, Tube
+from geomech.tube import BEYOND
 
 STATUS = {True: "fitted", False: "fitted along the gait alone: its cycles do not vary enough to tell A across it"}
 
@@ -89,24 +99,12 @@ def save_field(path: str | Path, fit: Fitted) -> None:
     """A, nan where the data do not reach, its error, the CCF of two joints there, and all that a lookup near the gait takes, as
     NetCDF that `Connection.load` and [system] kind = "table" read."""
     tube, unit = fit.tube, fit.unit
-    found = [*of_connection(tube, unit), _error(tube, unit), *of_known(tube.known, unit), _reach(tube)]
+    error = of_error(tube.at_grid(tube.known.of_error), unit)
+    found = [*of_connection(tube, unit), error, *of_known(tube.known, unit), of_reach(tube)]
     if len(tube.axes) == 2:
-        said = "half width of the interval of ccf"
-        found += [of_ccf(ccf(tube), unit), of_ccf(curvature_error(tube), unit, "ccf_error", said)]
+        found += [of_ccf(ccf(tube), unit), of_ccf(curvature_error(tube), unit, "ccf_error", INTERVAL_OF_CCF)]
     labels = tuple((name, "rad") for name in angles_of(tube.axes))
     write(path, _about(fit), tube.axes, labels, found)
-
-
-def _error(tube: Tube, unit: str) -> Variable:
-    units, angles = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)", angles_of(tube.axes)
-    error = tube.at_grid(tube.known.of_error)
-    return Variable("A_error", ("component", "joint", *angles), error, units, "half width of the interval of A")
-
-
-def _reach(tube: Tube) -> Variable:
-    shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
-    told = "distance from the mean gait over that which the data reach: A is nan beyond 1"
-    return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", told)
 
 
 def _about(fit: Fitted) -> dict:

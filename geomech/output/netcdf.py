@@ -24,6 +24,7 @@ from geomech.two_form import TwoForm
 
 COMPONENTS = ("x", "y", "theta")
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
+INTERVAL_OF_CCF = "half width of the interval of ccf"
 UNITS = {"BL": "body length", "m": "m"}
 
 
@@ -84,11 +85,14 @@ def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
     unit, lookups = study.scene.system.unit, study.lookups
     found = of_connection(study.fitted, unit)
+    if (error := study.scene.system.stored("A_error")) is not None:
+        found.append(of_error(error, unit))
     if isinstance(study.fitted, Tube):
-        found += of_known(study.fitted.known, unit)
+        found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
         found.append(of_ccf(study.curvature, unit))
-        found.append(of_ccf(study.curvature_error, unit, "ccf_error", ERROR_OF_CCF))
+        what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
+        found.append(of_ccf(study.curvature_error, unit, "ccf_error", what))
     elif len(study.fitted.axes) > 2:
         found += of_pairs(study.two_form, two_form.error(study.fitted), unit)
     if study.scene.system.carried:
@@ -117,6 +121,19 @@ def of_connection(fitted: Connection, unit: str) -> list[Variable]:
         Variable("fit_residual", ("component", *angles), fitted.residual, units, left),
         Variable("speed", ("component", *angles), fitted.speed, units, speed),
     ]
+
+
+def of_error(error: np.ndarray, unit: str) -> Variable:
+    """Half widths (3, d, N_1, ...) of intervals of A."""
+    units, over = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)", angles_of(error.shape[2:])
+    return Variable("A_error", ("component", "joint", *over), error, units, "half width of the interval of A")
+
+
+def of_reach(tube: Tube) -> Variable:
+    """How far the grid of a connection near one gait is from it."""
+    shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
+    told = "distance from the mean gait over that which the data reach: A is nan beyond 1"
+    return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", told)
 
 
 def of_known(known: Known, unit: str) -> list[Variable]:
@@ -231,6 +248,7 @@ def about(scene: Scene) -> dict:
     system = scene.system
     meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
     meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"
+    meanings["that of the log"] = "the one whose x, y and heading were logged"
     meaning = meanings.get(scene.frame, "centre and heading of that link, 1 the tail")
     return {
         "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,8 @@ class Table(Plain):
         if self.sha256.lower() not in ("", held.sha256):
             raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")
         if held.connection.field.masked and not isinstance(held.connection, Tube):
-            raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those")
+            cure = "" if held.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
+            raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
         if self.body_length != 1.0 and (held.unit, held.length) != ("BL", 1.0):
             raise ValueError(
                 f"{self.file} says the body's length itself, {held.length:g} {held.unit}: drop body_length"
@@ -105,7 +107,15 @@ class Table(Plain):
     def stored(self, name: str):
         held = self.held
         own = {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}
-        return {**own, "metric": held.metric}.get(name)
+        return self.A_error if name == "A_error" else {**own, "metric": held.metric}.get(name)
+
+    @cached_property
+    def A_error(self) -> np.ndarray | None:
+        """(3, joints, N_1, ...), half widths of intervals of A on the file's grid, as the file has them, else of what is known
+        near a measured gait; None where nothing tells them."""
+        if self.held.A_error is None and self.tube is not None:
+            return self.tube.at_grid(self.tube.known.of_error)
+        return self.held.A_error
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """xi (..., 3) looked up; ValueError outside the table's grid."""
@@ -135,7 +145,7 @@ class Table(Plain):
         """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
         lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
         sums up like a random walk of k steps; what is even in alphadot does not, and a gait may keep to directions where it is
-        largest, sqrt(2) times the rms of one harmonic."""
+        largest, sqrt(2) times the rms of one harmonic. Nor do intervals of A, which may be off the same way all along."""
         if self.tube is not None:
             x, y, theta = np.moveaxis(self.tube.known.error(alpha, alphadot), -1, 0)
             return np.stack([np.hypot(x, y) / self.length, theta], -1)
@@ -148,6 +158,7 @@ class Table(Plain):
         lever = np.hypot(*np.moveaxis(net[..., None, :] - pose, -1, 0)[:2])
         left = [(held.table.residual, 1 / np.sqrt(held.highest))] if held.told else []
         left += [(held.even, np.sqrt(2))] if held.even is not None else []
+        left += [(np.linalg.norm(held.A_error, axis=1), 1.0)] if held.A_error is not None else []
         for values, factor in left:
             x, y, theta = np.moveaxis(self._times(values, alpha, alphadot), -1, 0)
             error += 2 * np.pi * factor * np.stack([np.hypot(x, y) + lever * theta, theta], -1).mean(-2)
@@ -156,7 +167,7 @@ class Table(Plain):
     def about(self) -> dict:
         own = {"table": self.file, "table_sha256": self.sha256}
         if self.tube is None:
-            return own
+            return own if self.held.level is None else {**own, "level": self.held.level}
         known = self.tube.known
         return {**own, "singular_shapes": BEYOND, "level": known.level, "error_factor": known.factor}
 
@@ -178,6 +189,8 @@ class Table(Plain):
             lines.append("A alone: xi = A alphadot" + ", and what the fit left is part of every error" * held.told)
         if held.even is not None:
             lines.append("xi is not odd in alphadot: what is even is part of every error")
+        if held.A_error is not None and self.tube is None:
+            lines.append("its file tells intervals of A: they are part of every error")
         if not held.told:
             lines.append("the file does not tell what its fit left: errors are those of the grid alone")
         lines.append(

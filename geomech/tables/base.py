@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -34,7 +35,8 @@ class Stored:
     xi(alphadot) + xi(-alphadot), if that is not 0. metric: what a change of shape costs, where the file has it, in body
     lengths, power being its norm to power_degree. length: of the body, in ``unit``, "BL" or "m".
     frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
-    the file. shapes: names of the shape variables, alpha_k where none are told."""
+    the file. shapes: names of the shape variables, alpha_k where none are told. A_error: (3, d, N_1, ...), half widths of
+    intervals of A, which cover it in a share ``level`` of cases, where the file has them."""
 
     connection: Connection
     harmonics: Harmonics | None = None
@@ -49,6 +51,8 @@ class Stored:
     shapes: tuple[str, ...] = ()
     metric: Metric | Finsler | None = None
     power_degree: float | None = None
+    A_error: np.ndarray | None = None
+    level: float | None = None
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -116,7 +120,8 @@ def scaled(held: Stored, factor: float) -> Stored:
     near = {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
     c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **near)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
-    return replace(held, connection=c, harmonics=h, even=None if held.even is None else times(held.even))
+    even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
+    return replace(held, connection=c, harmonics=h, even=even, A_error=error)
 
 
 def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
@@ -149,6 +154,33 @@ def numbers(name: str, values) -> np.ndarray:
     if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
         raise ValueError(f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}: mend it")
     return array
+
+
+def masks(name: str, values: np.ndarray, masked: np.ndarray, told: Mapping) -> None:
+    """ValueError where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), of which the file must
+    speak in what it has ``told``, or not all there."""
+    if masked.any() and "singular_shapes" not in told:
+        numbers(name, values)
+    if not np.isnan(values[..., masked]).all():
+        raise ValueError(f"has {name} at singular shapes, where A is nan: write it anew")
+    numbers(name, np.where(masked, 0.0, values))
+
+
+def checked_error(name: str, error: np.ndarray, A: np.ndarray, told: Mapping) -> np.ndarray:
+    """Half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; or ValueError."""
+    if error.shape != A.shape:
+        raise ValueError(f"has {name} of shape {error.shape} where A has {A.shape}")
+    masks(name, error, np.isnan(A).any((0, 1)), told)
+    if (error < 0).any():
+        raise ValueError(f"has {name} below 0 where it is half of an interval of A")
+    return error.astype(float)
+
+
+def checked_level(told: Mapping) -> float | None:
+    """The share of cases that intervals cover, as a file has told it; None where that makes no sense."""
+    level = told.get("level")
+    good = np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
+    return float(level) if good else None
 
 
 def _first(bad: np.ndarray) -> str:

@@ -1,7 +1,7 @@
 """A connection from a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M).
 
 Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Connection_Matrix.mat. Files that
-`geomech.output.mat` wrote say more, in the variables ABOUT and RESIDUAL.
+`geomech.output.mat` wrote say more, in the variables ABOUT, RESIDUAL and ERROR.
 """
 
 from __future__ import annotations
@@ -21,15 +21,18 @@ from geomech.tables.base import (
     SIGNS,
     Stored,
     checked_axis,
+    checked_error,
+    checked_level,
     checked_names,
     detected_sign,
+    masks,
     numbers,
     rms,
 )
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
-ABOUT, RESIDUAL = "geomech_about", "geomech_fit_residual"
+ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_error"
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
@@ -37,17 +40,11 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
     found = _variables(raw)
     axes, order = _axes(found, order)
-    arrays = []
-    for name in ENTRIES:
-        values = numbers(name, found[name])
-        expected = tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
-        if values.shape != expected:
-            raise ValueError(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
-        arrays.append(values if order == "ndgrid" else values.T)
-    A = np.array(arrays).reshape(3, 2, *arrays[0].shape)
+    about = _about(found)
+    A = _entries(found, axes, order, about)
     if not A.any():
         raise ValueError("has a connection that is zero everywhere")
-    about, residual = _about(found), _residual(found, A, order)
+    residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
     plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree)
@@ -60,7 +57,8 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
     turned = plain if sign == "+" else Connection(axes, -A, residual, plain.speed, degree)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
-    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256, shapes)
+    known = {"A_error": error, "level": checked_level(about)}
+    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256, shapes, **known)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
@@ -124,13 +122,36 @@ def _about(found: dict) -> dict:
     return told if isinstance(told, dict) else {}
 
 
-def _residual(found: dict, A: np.ndarray, order: str) -> np.ndarray:
+def _entries(found: dict, axes, order: str, about: dict) -> np.ndarray:
+    """A (3, 2, N, M); nan at singular shapes, if the file speaks of such, and there in all entries."""
+    arrays, expected = {}, tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
+    for name in ENTRIES:
+        values = found[name] if found[name].dtype.kind == "f" else numbers(name, found[name])
+        if values.shape != expected:
+            raise ValueError(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
+        arrays[name] = _of_ndgrid(values, order).astype(float)
+    masked = np.isnan([*arrays.values()]).any(0)
+    for name, values in arrays.items():
+        masks(name, values, masked, about)
+    return np.array([*arrays.values()]).reshape(3, 2, *masked.shape)
+
+
+def _of_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
+    """(..., N, M) of arrays that run as ``order``'s."""
+    return values if order == "ndgrid" else values.swapaxes(-1, -2)
+
+
+def _residual(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
     """(3, N, M): rms of what the fit leaves, nan where the file does not say."""
-    unknown = np.full((3, *A.shape[2:]), np.nan)
     values = found.get(RESIDUAL)
-    if not isinstance(values, np.ndarray):
-        return unknown
-    if values.shape == (3, *(A.shape[2:] if order == "ndgrid" else A.shape[:1:-1])):
-        values = values if order == "ndgrid" else values.swapaxes(1, 2)
-        return numbers(RESIDUAL, values)
-    return unknown
+    if not isinstance(values, np.ndarray) or _of_ndgrid(values, order).shape != (3, *A.shape[2:]):
+        return np.full((3, *A.shape[2:]), np.nan)
+    values = _of_ndgrid(values, order)
+    masks(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
+    return values.astype(float)
+
+
+def _error(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
+    """(3, 2, N, M): half widths of intervals of A, None where the file does not say."""
+    values = found.get(ERROR)
+    return checked_error(ERROR, _of_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None

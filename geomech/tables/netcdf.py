@@ -12,7 +12,18 @@ import numpy as np
 from geomech.connection import Connection
 from geomech.harmonics import Harmonics
 from geomech.metric import Finsler, Metric
-from geomech.tables.base import ROWS, SIGNS, Stored, checked_axis, checked_names, numbers, rms
+from geomech.tables.base import (
+    ROWS,
+    SIGNS,
+    Stored,
+    checked_axis,
+    checked_error,
+    checked_level,
+    checked_names,
+    masks,
+    numbers,
+    rms,
+)
 from geomech.tube import Known, Loop, Tube
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
@@ -70,9 +81,9 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     if A.shape[:2] != (3, joints) or residual.shape[0] != 3 or not _rows(found):
         raise ValueError(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
     masked = np.isnan(A).any((0, 1))
-    _masks("A", A, masked, told)
+    masks("A", A, masked, told)
     unknown = np.isnan(residual).all() and not masked.all()
-    _masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
+    masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
     speed = pick("speed", "component") if "speed" in found else rms(A, residual)
     length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))
     length = float(length) if np.ndim(length) == 0 and np.asarray(length).dtype.kind in "iuf" else np.nan
@@ -100,9 +111,12 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
         raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
     _check_pairs(found, axes, masked)
     metric, power = _metric(found, told, axes, degree)
+    has_error = "A_error" in found
+    error = checked_error("A_error", pick("A_error", "component", "joint"), A, told) if has_error else None
     return Stored(
-        connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power
-    )
+        connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power,
+        A_error=error, level=checked_level(told),
+    )  # fmt: skip
 
 
 def _known(found: dict, told: dict, turn: float) -> Known:
@@ -190,12 +204,3 @@ def _rows(found: dict) -> bool:
     if names.dtype.kind == "S" and names.ndim == 2:
         names = [b"".join(row).rstrip(b"\0 ").decode("ascii", "replace") for row in names]
     return [str(name) for name in names] == list(ROWS)
-
-
-def _masks(name: str, values: np.ndarray, masked: np.ndarray, told: dict) -> None:
-    """ValueError where values are nan elsewhere than at singular shapes, of which the file must speak, or not all there."""
-    if masked.any() and "singular_shapes" not in told:
-        numbers(name, values)
-    if not np.isnan(values[..., masked]).all():
-        raise ValueError(f"has {name} at singular shapes, where A is nan: {SOURCE}")
-    numbers(name, np.where(masked, 0.0, values))
