@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -284,6 +285,67 @@ def test_three_joints(tmp_path):
     told.save_field(tmp_path / "a.nc", f)
     system = Table(tmp_path / "a.nc")
     np.testing.assert_allclose(system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12)
+
+
+def travelling(joints, harmonics=1):
+    """A wave of joint angles that goes along a chain, 0.9 rad from joint to joint."""
+    turn = 0.9 * np.arange(joints)[:, None] * np.arange(1, harmonics + 1)
+    size = 0.5 / np.arange(1, harmonics + 1) ** 2
+    return gaits.Fourier(cos=size * np.cos(turn), sin=size * np.sin(turn), centre=(0.1,) * joints)
+
+
+def bent(joints):
+    """The velocity of a made-up body."""
+    rng = np.random.default_rng(7)
+    C, D = 0.2 * rng.normal(size=(3, joints)), 0.15 * rng.normal(size=(3, joints, joints))
+    return lambda alpha, rate: np.einsum("...ij,...j->...i", C + np.einsum("ijk,...k->...ij", D, np.sin(alpha)), rate)
+
+
+def tied(rows, noise, spread=0.05):
+    """A log of joints of which those beyond the first are these combinations of them, to what encoders are off by."""
+    whole = np.vstack([np.eye(len(rows[0])), rows])
+    gait = GAIT if len(rows[0]) == 2 else travelling(len(rows[0]), 2)
+    velocity = lambda alpha, rate: bent(len(whole))(alpha @ whole.T, rate @ whole.T)
+    made = synthetic.made(velocity, gait, cycles=20, samples=24, spread=spread, noise=0.0, pose_noise=noise, seed=3)
+    alpha = made.alpha @ whole.T
+    alpha += 5e-4 * np.sin(2 * alpha)
+    return log_of(made._replace(alpha=alpha + noise * np.random.default_rng(5).normal(size=alpha.shape)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out with --columns$"),
+        ([[0, -2]], "alpha_3 is -2 alpha_2, but for"),
+        (
+            [[1, -1], [0.5, 2]],
+            "alpha_3 is 1 alpha_1 - 1 alpha_2, alpha_4 is 0.5 alpha_1 \\+ 2 alpha_2, .* leave alpha_3, alpha_4 out",
+        ),
+        ([[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, but for"),
+    ],
+)
+def test_joints_that_follow_from_others_are_named(rows, said, noise):
+    log = tied(rows, noise)
+    f = measured.fit_log(log)
+    found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", told.status(f))  # noise moves the third digit
+    assert re.match("fitted along the gait alone: " + said, found)
+    assert said[:20] in re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", told.text(f))
+    if noise == 1e-3 and len(rows) == 1:
+        kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
+        assert told.status(measured.fit_log(kept, harmonics=2)) == "fitted"
+
+
+@pytest.mark.parametrize(("joints", "harmonics"), [(3, 1), (4, 1), (5, 1), (3, 2), (5, 2)])
+@pytest.mark.parametrize("spread", [0.05, 0.0])
+def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
+    """Those of one harmonic lie in a plane; what does not vary about them tells A along them, whatever is left out."""
+    made = synthetic.made(bent(joints), travelling(joints, harmonics), 24, 20, spread, seed=1)
+    f = measured.fit_log(log_of(made), harmonics=1 if spread else None)
+    assert f.combined == {}
+    assert told.status(f) == (
+        "fitted" if spread else f"{told.ALONG}: its cycles do not vary enough to tell A across it"
+    )
 
 
 def test_normals_are_orthonormal_and_close():

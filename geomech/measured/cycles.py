@@ -20,6 +20,7 @@ LEAST_APART = 0.05  # of the gait's size, between the means of two gaits
 STEADY = 4  # times the scatter of a joint's cycles about it, that a drift is at least
 SURELY = 1.5  # standard deviations of noise that may look like a motion
 THIN = 1e-3  # of its length, the width of a gait that encloses nothing
+SLIGHT = 0.01  # of a joint, that another must have in it to be named
 REFINED = 3  # times the phase is that of the nearest point of the mean gait
 
 
@@ -59,8 +60,7 @@ def period(log: Log) -> float:
 def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
     """SceneError if a joint does nothing but noise, or if all joints are one: what goes to and fro on a line is no loop. rows:
     a cycle."""
-    off = joints.values - joints.values.mean(0)
-    left = SURELY * joints.noise * np.sqrt(joints.knots / rows)  # of noise in a spline
+    off, left = joints.values - joints.values.mean(0), _noise(joints, rows)
     for name, size, noise in zip(log.joints, off.std(0), left):
         if size <= noise:
             raise log.wrong(f"{name} does not move beyond its noise: leave it out with --columns")
@@ -72,6 +72,27 @@ def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
         f"{last} is {slope:.3g} times {first}, but for a constant and noise: one shape variable recorded "
         f"{len(log.joints)} times goes to and fro, and is no loop; name the columns of joints that move apart, by --columns"
     )
+
+
+def _noise(joints: Smoothed, rows: float) -> np.ndarray:
+    """(d,), rad: what noise may look like in splines through the joints. rows: a cycle."""
+    return SURELY * joints.noise * np.sqrt(joints.knots / rows)
+
+
+def combined(joints: Smoothed, rows: float) -> dict[int, np.ndarray]:
+    """Joints that are linear combinations of others but for a constant and noise, and the factors (d,) of these, which come
+    before them and are none. rows: a cycle. A wave of one harmonic has no more than two that are none."""
+    off, noise = joints.values - joints.values.mean(0), _noise(joints, rows)
+    others, found = [0], {}
+    for k in range(1, off.shape[1]):
+        factors = np.zeros(off.shape[1])
+        factors[others] = np.linalg.lstsq(off[:, others], off[:, k], rcond=None)[0]
+        left = (off[:, k] - off @ factors).std()
+        if left <= max(THIN * off[:, k].std(), np.hypot(noise[k], np.linalg.norm(factors * noise))):
+            found[k] = factors * (np.abs(factors) * off.std(0) > SLIGHT * off[:, k].std())
+        else:
+            others.append(k)
+    return found
 
 
 def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[np.ndarray, Loop]:

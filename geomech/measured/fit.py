@@ -34,7 +34,8 @@ class Fitted:
     frequency: cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual:
     (3,), rms of what the fit leaves of xi, over that of the joint rates; explained: (3,), share of the squares of xi
     that it does not leave. noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary
-    enough to tell A across the gait. length: of the body in m; 1 for a log in body lengths."""
+    enough to tell A across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where
+    that is why they do not. length: of the body in m; 1 for a log in body lengths."""
 
     log: Log
     known: Known
@@ -47,6 +48,7 @@ class Fitted:
     explained: np.ndarray
     noise: np.ndarray
     across: bool
+    combined: dict[int, np.ndarray]
     length: float
     samples: regression.Samples
 
@@ -118,10 +120,11 @@ def fit_log(
         raise log.wrong(f"{count.max() + 1} whole cycles are too few: give at least {cycles.FEWEST}")
     cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
-    return _regressed(log, loop, phase, count, joints, pose, level, harmonics, within, body_length)
+    combined = cycles.combined(joints, rows)
+    return _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
 
 
-def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, within, length) -> Fitted:
+def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, within, length) -> Fitted:
     kept = count >= 0
     xi, *xi_halves = (_in_the_body(*x)[kept] for x in ((pose.values, pose.rates), *pose.halves))
     halves = tuple((a[kept], u[kept]) for a, u in joints.halves)
@@ -130,7 +133,9 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
         nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi, halves, tuple(xi_halves)
     )
     varies = regression.varied(loop, samples)
-    across = varies == regression.RATES
+    across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
+    if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
+        combined = {}  # nothing is gained by leaving them out
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
         raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
@@ -161,7 +166,8 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, level, harmonics, wi
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
         log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[kept])),
-        over.residual, over.explained, np.concatenate([joints.noise, pose.noise]), across, length, samples,
+        over.residual, over.explained, np.concatenate([joints.noise, pose.noise]), across, combined, length,
+        samples,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ alphadot at it (Euler's theorem); that is not the least-squares A over all direc
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -151,6 +152,14 @@ def varied(loop: Loop, samples: Samples) -> int:
         return RATES
     size = ((theta - theta.mean(0)) ** 2).sum()
     return SHAPES if _sure(samples, [off(x - theta) for x, _ in samples.halves], size) else NOTHING
+
+
+def of_joints(loop: Loop, samples: Samples, kept: Sequence[int]) -> tuple[Loop, Samples]:
+    """The mean gait and the samples of some joints alone."""
+    kept = list(kept)
+    halves = tuple((alpha[:, kept], rate[:, kept]) for alpha, rate in samples.halves)
+    some = samples._replace(alpha=samples.alpha[:, kept], rate=samples.rate[:, kept], halves=halves)
+    return Loop(loop.coefficients[kept]), some
 
 
 def _sure(samples: Samples, halves, size: float) -> bool:

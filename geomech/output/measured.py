@@ -24,7 +24,26 @@ from geomech.output.netcdf import (
 from geomech.scene.write import gait_table, table
 from geomech.tube import BEYOND
 
-STATUS = {True: "fitted", False: "fitted along the gait alone: its cycles do not vary enough to tell A across it"}
+ALONG = "fitted along the gait alone"
+
+
+def status(fit: Fitted) -> str:
+    """What of A is told, and why not all; with the cure, where joints depend on each other."""
+    if fit.across:
+        return "fitted"
+    if not fit.combined:
+        return f"{ALONG}: its cycles do not vary enough to tell A across it"
+    said = ", ".join(f"{fit.log.joints[k]} is {_sum(fit, factors)}" for k, factors in fit.combined.items())
+    names = ", ".join(fit.log.joints[k] for k in fit.combined)
+    return (
+        f"{ALONG}: {said}, but for constants and noise, which leaves A across it open: leave {names} out with --columns"
+    )
+
+
+def _sum(fit: Fitted, factors: np.ndarray) -> str:
+    """0.5 alpha_1 - 2 alpha_2."""
+    terms = (f"{x:.3g} {name}" for x, name in zip(factors, fit.log.joints) if x)
+    return " + ".join(terms).replace("+ -", "- ")
 
 
 def numbers(fit: Fitted) -> dict:
@@ -63,7 +82,7 @@ def numbers(fit: Fitted) -> dict:
         },
         "units": {"displacement": [fit.unit, fit.unit, "rad"], "frequency": "cycles per unit of t", "phase_residual": "rad",
                   "residual": [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"], "reach": "rad"},
-        "status": STATUS[fit.across],
+        "status": status(fit),
     }  # fmt: skip
 
 
@@ -91,7 +110,7 @@ def text(fit: Fitted) -> str:
     return "\n".join([
         *lines,
         f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explains of the body velocity {told}",
-        f"the data reach {wide.min():.3g} to {wide.max():.3g} rad from the mean gait; status: {STATUS[fit.across]}",
+        f"the data reach {wide.min():.3g} to {wide.max():.3g} rad from the mean gait; status: {status(fit)}",
     ])  # fmt: skip
 
 
@@ -128,7 +147,7 @@ def _about(fit: Fitted) -> dict:
         "cycles": len(fit.measured),
         "frequency": float(fit.frequency),
         "columns": ", ".join(fit.log.joints),
-        "status": STATUS[fit.across],
+        "status": status(fit),
     }
 
 
