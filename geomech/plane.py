@@ -15,6 +15,7 @@ from geomech.errors import is_whole, real_array, short
 from geomech.field import Field
 from geomech.gaits import Gait
 from geomech.images import mirrored
+from geomech.tube import Tube
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
 
@@ -98,12 +99,20 @@ def plane(
 
 
 def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
-    """The plane in a field of all joints, on its axes, interpolated between its points. ValueError off the field."""
+    """The plane in a field of all joints, on its axes, interpolated between its points; near one gait nan where the data do not
+    reach. ValueError off the field, or for a plane that meets nothing of it."""
     at, pair = fitted.field.inside(real_array("at", at)), checked_pair(pair, len(fitted.axes))
     axes = tuple(fitted.axes[k] for k in pair)
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
     alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
-    A = np.moveaxis(fitted(alpha), (-2, -1), (0, 1))[:, list(pair)]
+    A = fitted.known.reached(alpha) if isinstance(fitted, Tube) else fitted(alpha)
+    if np.isnan(A).all():
+        held = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
+        there = ",".join(f"{x:.3f}" for x in fitted.known.loop.shape(np.array(0.0)))
+        raise ValueError(
+            f"the data do not reach the plane of {held}: slice it at a shape of the mean gait, --slice {there}"
+        )
+    A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
     told = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit
     left = [
         Field(fitted.axes, x, 1) if told else lambda a: np.full(a.shape, np.nan)

@@ -200,6 +200,13 @@ class Known:
         w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.whole, w, terms)
 
+    def reached(self, alpha) -> np.ndarray:
+        """A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
+        near = self.reach(alpha) <= 1
+        found = np.full((*near.shape, *self.A.shape[:2]), np.nan)
+        found[near] = self.of(alpha[near])
+        return found
+
     def of_error(self, alpha) -> np.ndarray:
         """(..., 3, d): of `of`."""
         t = self.loop.nearest(alpha)
@@ -284,11 +291,7 @@ def tube(known: Known, axes: Sequence[np.ndarray], residual: np.ndarray) -> Tube
     """On a grid, nan where the data do not reach. residual: (3,), what the fit leaves of xi for |alphadot| = 1."""
     axes = tuple(axes)
     shapes = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    flat = shapes.reshape(-1, len(axes))
-    inside = known.reach(flat) <= 1
-    A = np.full((len(flat), 3, len(axes)), np.nan)
-    A[inside] = known.of(flat[inside])
-    A = np.moveaxis(A.reshape(*shapes.shape[:-1], 3, -1), (-2, -1), (0, 1))
+    A = np.moveaxis(known.reached(shapes), (-2, -1), (0, 1))
     masked = np.isnan(A[:, 0])
     left = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
     return Tube(axes, A, left, np.sqrt((A**2).mean(1) + left**2), min(3, min(map(len, axes)) - 1), known)

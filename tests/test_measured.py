@@ -24,6 +24,7 @@ from geomech.output import mat, netcdf
 from geomech.output import measured as told
 from geomech.output.explain import explain
 from geomech.reconstruct import displacement
+from geomech.plane import looked_up
 from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
@@ -285,6 +286,18 @@ def test_three_joints(tmp_path):
     told.save_field(tmp_path / "a.nc", f)
     system = Table(tmp_path / "a.nc")
     np.testing.assert_allclose(system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12)
+    study, there = Study(Scene(system, f.gait)), f.known.loop.shape(np.array(0.0))
+    plane = study.plane((0, 2), there)
+    alpha = np.broadcast_to(there, (*plane.connection.A.shape[2:], 3)).copy()
+    alpha[..., 0], alpha[..., 2] = np.meshgrid(*plane.connection.axes, indexing="ij")
+    reached, A = f.known.reach(alpha) <= 1, np.moveaxis(plane.connection.A, (0, 1), (-2, -1))
+    np.testing.assert_allclose(A[reached], f.known.of(alpha[reached])[..., [0, 2]], rtol=1e-9)
+    assert np.isnan(A[~reached]).all() and 0 < reached.sum() < reached.size / 4
+    thin = dataclasses.replace(f.tube, known=dataclasses.replace(f.known, spread=1e-9 * f.known.spread))
+    with pytest.raises(
+        ValueError, match="do not reach the plane of alpha_2 = 0.1: slice it at a shape of the mean gait, --"
+    ):
+        looked_up(thin, (0, 2), [0.0, 0.1, 0.0])
 
 
 def travelling(joints, harmonics=1):
