@@ -23,8 +23,8 @@ from geomech.measured import cycles, phase, regression, smooth, synthetic
 from geomech.output import mat, netcdf
 from geomech.output import measured as told
 from geomech.output.explain import explain
-from geomech.reconstruct import displacement
 from geomech.plane import looked_up
+from geomech.reconstruct import displacement
 from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
@@ -716,6 +716,63 @@ def test_columns_in_any_order_and_unit_tell_the_same(short, tmp_path):
     np.testing.assert_allclose(third.known.A, one.known.A, rtol=1e-6, atol=1e-9)
     with pytest.warns(UnitWarning, match="drop --degrees"):
         measured.read(tmp_path / "a.csv", degrees=True)
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """Of a body that is no table, and turns and moves by a fifth of what its joints do."""
+    return synthetic.made(bent(2), GAIT, cycles=14, samples=30, seed=1)
+
+
+def test_a_left_handed_pose_is_refused(moving):
+    """y that runs down, x and y swapped, a heading that runs clockwise; wherever it is seen from."""
+    measured.fit_log(log_of(moving), harmonics=2)
+    for wrong in (moving.pose * [1, -1, 1], moving.pose[:, [1, 0, 2]], moving.pose * [1, 1, -1] + [0, 0, 2]):
+        with pytest.raises(SceneError, match="x, y and heading do not fit each other, .* give y upwards"):
+            measured.fit_log(log_of(moving._replace(pose=wrong)), harmonics=2)
+
+
+@pytest.mark.parametrize(
+    ("names", "change", "said"),
+    [
+        (
+            NAMES,
+            changed(5, np.degrees),
+            "the heading turns .* times as fast as the joints: .* _deg if it is in degrees",
+        ),
+        (
+            NAMES,
+            changed(slice(3, 5), lambda x: 150 * x),
+            "x and y move by .* body lengths .* or in m with --body-length",
+        ),
+        (NAMES, changed(0, lambda t: 1000 * t), "the joints repeat every 1005, and t is taken for s"),
+        (("t", "a1", "a2", "x_m", "y_m", "heading"), None, "x and y are in m by the names .* say --body-length"),
+    ],
+)
+def test_likely_slips_of_unit_are_noted(names, change, said, moving, tmp_path):
+    path = written(tmp_path / "log.csv", moving, names, change)
+    with pytest.warns(UnitWarning, match=f"^log.csv: {said}") as told_once:
+        measured.fit_log(path)
+    assert len(told_once) == 1
+    if names != NAMES:
+        measured.fit_log(path, body_length=0.3)
+
+
+@pytest.mark.parametrize("name", ["x_mm", "y_cm", "t_ms", "y_px"])
+def test_columns_in_another_unit_by_their_names_are_refused(name, short, tmp_path):
+    columns = [name if name[0] == c else c for c in NAMES]
+    path = written(tmp_path / "log.csv", short, columns)
+    with pytest.raises(SceneError, match=f"log.csv: {name} is in {name[2:]} by its name: give t in s, x and y in body"):
+        measured.fit_log(path, columns=columns)
+
+
+@pytest.mark.parametrize("name", ["phase", "frame"])
+def test_what_is_no_time_makes_no_frequency(name, short, tmp_path):
+    """Of a scene whose displacements would become speeds."""
+    path = written(tmp_path / "log.csv", short, (name, *NAMES[1:]), changed(0, lambda t: 2 * np.pi * t))
+    f = measured.fit_log(path, columns=(name, *NAMES[1:]))
+    assert f.gait.frequency is None and math.isclose(f.frequency, 1 / (2 * np.pi), rel_tol=0.02)
+    assert "frequency" not in told.scene_toml(f, tmp_path / "a.nc", tmp_path / "a.toml")
 
 
 def test_a_table_as_r_writes_it(short, tmp_path):

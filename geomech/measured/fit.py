@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech.errors import number
 from geomech.gaits import Fourier
-from geomech.measured import cycles, regression, smooth
+from geomech.measured import cycles, regression, slips, smooth
 from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
@@ -56,10 +56,11 @@ class Fitted:
 
     @cached_property
     def gait(self) -> Fourier:
-        """The mean gait, of amplitude 1, with the log's frequency."""
+        """The mean gait, of amplitude 1, with the log's frequency if its t is a time."""
         c = self.known.loop.coefficients
         cos, sin = (tuple(map(tuple, c[:, k::2].tolist())) for k in (1, 2))
-        return Fourier(cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=self.frequency)
+        frequency = self.frequency if self.log.seconds else None
+        return Fourier(cos=cos, sin=sin, centre=tuple(c[:, 0].tolist()), frequency=frequency)
 
     @cached_property
     def displacement(self) -> tuple[np.ndarray, np.ndarray]:
@@ -120,8 +121,11 @@ def fit_log(
         raise log.wrong(f"{count.max() + 1} whole cycles are too few: give at least {cycles.FEWEST}")
     cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
+    slips.check_right_handed(log, loop, phase, joints, pose, count)
     combined = cycles.combined(joints, rows)
-    return _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
+    found = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
+    slips.note_units(log, joints, pose, period, body_length)
+    return found
 
 
 def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, within, length) -> Fitted:

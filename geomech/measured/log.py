@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,8 @@ POSE = {
     "heading": ("heading", "theta", "yaw"),
 }
 JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
-SUFFIXES = ("_rad", "_deg")
+UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns that stand for t, and tell no s
+ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|in|ft|ms|min)")  # in units that are not those of t, x and y
 SPIKE = 20.0  # times as far off its neighbours as nine in ten rows
 LARGE = 0.05  # of a column's range, that a row must be off besides
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
@@ -33,7 +34,8 @@ WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
 @dataclass(frozen=True, eq=False)
 class Log:
     """name: of the file. t: (N,), ascending. alpha: (N, d), rad, without jumps of a turn, as the heading. pose: (N, 3), x, y,
-    heading. joints: the names of their columns. lines: (N,), the rows' lines in the file."""
+    heading. joints: the names of their columns. lines: (N,), the rows' lines in the file. seconds: t is a time. metres: x and y
+    are in m by the names of their columns."""
 
     name: str
     t: np.ndarray
@@ -41,6 +43,8 @@ class Log:
     pose: np.ndarray
     joints: tuple[str, ...]
     lines: np.ndarray
+    seconds: bool = True
+    metres: bool = False
 
     def wrong(self, what: str, row: int | None = None) -> SceneError:
         """To be raised for what is wrong in a row, or in the whole file."""
@@ -66,7 +70,8 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     turn = np.where([degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0)
     turn[[0, -3, -2]] = 1.0
     rows = rows * turn
-    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines)
+    told = {"seconds": picked[0] not in UNTIMED, "metres": all(name.endswith("_m") for name in picked[-3:-1])}
+    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines, **told)
     _check_times(log)
     _check_units(log, picked, turn)
     return _checked(log)
@@ -110,6 +115,11 @@ def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
         raise ValueError(
             f"{name}: {len(columns) - 4} joint angles, more than {MOST_JOINTS}: give the shape in a few modes as columns"
         )
+    if other := [m for c in (columns[0], *columns[-3:-1]) if (m := ELSEWHERE.fullmatch(c))]:
+        raise ValueError(
+            f"{name}: {other[0][0]} is in {other[0][1]} by its name: give t in s, x and y in body lengths, or in m with "
+            "--body-length"
+        )
     return tuple(columns)
 
 
@@ -151,7 +161,7 @@ def _checked(log: Log) -> Log:
             raise log.wrong(f"{name} does not move: leave it out with --columns")
     if (np.ptp(pose, axis=0) == 0).all():
         raise log.wrong("x, y and heading do not move: nothing was measured of the body's motion")
-    return Log(log.name, log.t, alpha, pose, log.joints, log.lines)
+    return replace(log, alpha=alpha, pose=pose)
 
 
 def check_rows(log: Log) -> None:
