@@ -641,7 +641,9 @@ def larger(rows):
 
 
 BAD = {
-    "gap": (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one"),
+    "gap": (lambda r: np.delete(r, slice(100, 120), 0), "line 101: no rows for 0.7 after this one .*, its one gap: cut"),
+    "gaps": (lambda r: np.delete(r, [*range(100, 120), *range(220, 230)], 0), "line 101: .*, the longest of 2 gaps: cut"),
+    "nine": (lambda r: r[: 9 * 30 + 15], "7 whole cycles, .*, are too few: give at least 10 in all"),
     "unsorted": (swapped, "line 103: t = .* comes after .*: sort the rows by time"),
     "twice": (changed(0, lambda t: t[0] + 0 * t, slice(99, 101)), "line 102: t = .* is given twice: keep one"),
     "degrees": (changed(slice(1, 3), np.degrees), "line .*: alpha_1 reaches .* where joint angles are in rad: say --degrees"),
@@ -656,7 +658,7 @@ BAD = {
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
     "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
-    "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 9 cycles"),
+    "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
     "thin": (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),
     "noise": (changed(slice(1, 6), noise), "the joints (do not repeat|repeat 2.. times)"),
@@ -682,7 +684,7 @@ def test_bad_logs_get_one_line(name, short, tmp_path):
     ("names", "columns", "said"),
     [
         (("t", "alpha_1", "alpha_2", "x", "y", "course"), (), "no column heading; it has"),
-        (("t", "alpha_1", "bend", "x", "y", "heading"), (), "1 columns of joint angles"),
+        (("t", "alpha_1", "bend", "x", "y", "heading"), (), "one column of joint angles, and a gait is a loop"),
         (("t", "alpha_1", "alpha_1", "x", "y", "heading"), (), "column 'alpha_1' is there twice"),
         (NAMES, ("t", "alpha_1", "alpha_3", "x", "y", "heading"), "no column 'alpha_3'"),
         (NAMES, ("t", "alpha_1", "x", "y", "heading"), "--columns are those of t, two joint angles or more"),

@@ -10,7 +10,8 @@ from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
 from geomech.tube import Loop, waves
 
-FEWEST = 8  # cycles: fewer do not tell how they scatter
+FEWEST = 8  # whole cycles: fewer do not tell how they scatter
+ENOUGH = FEWEST + 2  # cycles of a log that surely has as many: half of one at each end is not taken
 ROWS = 12  # a cycle, at least
 GAP = 1 / 8  # of a cycle without a row, at most
 APART = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
@@ -40,17 +41,18 @@ def period(log: Log) -> float:
     count = (log.t[-1] - log.t[0]) / found if found else 0.0
     if count < FEWEST + 1:
         said = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
-        raise log.wrong(f"{said}: give at least {FEWEST + 1} cycles of one gait, some dozens are better")
+        raise log.wrong(f"{said}: give at least {ENOUGH} cycles of one gait, some dozens are better")
     if found * FASTEST < 1.0:
         raise log.wrong(f"the joints repeat every {found:.3g} where t is in s: give t in s, or in any longer unit")
     if (rows := len(log.t) / count) < ROWS:
         raise log.wrong(f"{rows:.1f} rows a cycle are too few: give at least {ROWS}")
     gaps = np.diff(log.t)
     k = int(gaps.argmax())
-    if gaps[k] > max(GAP * found, 2.5 * np.median(gaps)):
+    if many := int((gaps > max(GAP * found, 2.5 * np.median(gaps))).sum()):
+        here = "its one gap" if many == 1 else f"the longest of {many} gaps"
         raise log.wrong(
-            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle: cut the log "
-            "there and give the longer part, or fill the gap",
+            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle, {here}: cut the "
+            f"log and give the longest part, or fill what is longer than {GAP:g} of a cycle",
             k,
         )
     check_rows(log)

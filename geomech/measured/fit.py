@@ -118,7 +118,9 @@ def fit_log(
     phase, loop = cycles.phased(log, joints, period, most)
     count = cycles.whole(log, phase, period)
     if count.max() + 1 < cycles.FEWEST:
-        raise log.wrong(f"{count.max() + 1} whole cycles are too few: give at least {cycles.FEWEST}")
+        raise log.wrong(
+            f"{count.max() + 1} whole cycles, without the log's ends, are too few: give at least {cycles.ENOUGH} in all"
+        )
     cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
     slips.check_right_handed(log, loop, phase, joints, pose, count)

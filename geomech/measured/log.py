@@ -102,9 +102,8 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
     joints = [c for _, k, c in sorted(matches) if k == kind]
     missing = [role for role, c in found.items() if c is None]
     if missing or len(joints) < 2:
-        what = (
-            f"no column {missing[0]}" if missing else f"{len(joints)} columns of joint angles where two are the least"
-        )
+        few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
+        what = f"no column {missing[0]}" if missing else few
         cure = "name them t,alpha_1,alpha_2,x,y,heading, or say --columns"
         raise ValueError(f"{name}, line {line}: {what}; it has {short(', '.join(header), 120)}: {cure}")
     return _of_joints(name, [found["t"], *joints, found["x"], found["y"], found["heading"]])
