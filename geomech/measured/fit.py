@@ -145,8 +145,10 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
         raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
+    size = joints.knots * (samples.cycle[-1] + 1)
+    most, second = regression.afforded(len(log.joints), most if harmonics is None else harmonics, varies, size)
     try:
-        held = regression.sums(loop, samples, most if harmonics is None else harmonics, varies)
+        held = regression.sums(loop, samples, most if harmonics is None else harmonics, varies, second)
         held = held.kept(regression.chosen(held)) if harmonics is None else held
         found, errors = regression.solution(held)
     except np.linalg.LinAlgError:

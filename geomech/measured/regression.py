@@ -21,8 +21,10 @@ from geomech.tube import Loop, waves
 FOLDS = 5  # of the cross-validation over cycles that chooses harmonics
 MOST_BLOCKS = 120  # of cycles, that are left out as one
 MOST_NUMBERS = 20_000_000  # of all their matrices
+FEWEST = 2  # harmonics for which those of the second order are given up
 LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
-SECOND = 2  # harmonics of what is of the second order in the deviation
+SECOND = 2  # harmonics of what is of the second order in the deviation, at most
+SHARE = 0.5  # of the numbers that splines through the rows have, that unknowns are at most: more follow the noise
 LAGS = 8  # blocks over which errors are correlated
 CERTAIN = 5.0  # standard errors by which the cycles must vary
 LEAST_VARIED = 3e-3  # of the joint rates, or of the gait's size, that those across it must be: splines make up as much
@@ -99,9 +101,9 @@ def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
     return np.moveaxis((along @ least.T).reshape(*along.shape[:-1], d, wide), -2, -3)
 
 
-def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int) -> np.ndarray:
-    """(N, P): of alphadot_j and s_k alphadot_j, times waves in phase, and of s_k s_l alphadot_j times a few. Where not all
-    varies, the pace along the gait stands for alphadot, and s_k are left out."""
+def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second: int = SECOND) -> np.ndarray:
+    """(N, P): of alphadot_j and s_k alphadot_j, times waves in phase, and of s_k s_l alphadot_j times a few, ``second``, or
+    none if that is -1. Where not all varies, the pace along the gait stands for alphadot, and s_k are left out."""
     one, mean = np.ones((len(phase), 1)), loop.shape(phase, 1)
     if varies < RATES:
         rate = ((rate * mean).sum(-1) / (mean**2).sum(-1))[:, None]
@@ -109,8 +111,8 @@ def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int) -> np.n
         return _times(rate, one, waves(phase, harmonics))
     normal = np.einsum("nik,ni->nk", loop.normals(phase), alpha - loop.shape(phase))
     k, m = np.triu_indices(normal.shape[1])
-    groups = ((np.concatenate([one, normal], 1), harmonics), (normal[:, k] * normal[:, m], SECOND))
-    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups], 1)
+    groups = ((np.concatenate([one, normal], 1), harmonics), (normal[:, k] * normal[:, m], second))
+    return np.concatenate([_times(rate, s, waves(phase, h)) for s, h in groups if h >= 0], 1)
 
 
 def _times(rate, s, w) -> np.ndarray:
@@ -118,16 +120,34 @@ def _times(rate, s, w) -> np.ndarray:
     return np.einsum("nj,ns,nw->njsw", rate, s, w).reshape(len(rate), -1)
 
 
-def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES) -> Sums:
+def afforded(joints: int, most: int, varies: int, size: float) -> tuple[int, int]:
+    """(harmonics of the connection, at most ``most``, and of what is of the second order, -1 for none), of which the unknowns
+    are no more than a SHARE of ``size`` numbers that tell them; at least one harmonic."""
+    rates, deviations = (joints if varies == RATES else 1), (0 if varies == NOTHING else joints - 1)
+    unknowns = lambda harmonics, second: (
+        rates
+        * (
+            (1 + deviations) * (2 * harmonics + 1)
+            + deviations * (deviations + 1) // 2 * (2 * second + 1) * (second >= 0)
+        )
+    )
+    ways = [*((LEAST, k) for k in range(SECOND, 0, -1)), (FEWEST, 0)]
+    second = next((k for h, k in ways if unknowns(min(h, most), k) <= SHARE * size), -1)
+    return next((h for h in range(most, 1, -1) if unknowns(h, second) <= SHARE * size), 1), second
+
+
+def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES, second: int = SECOND) -> Sums:
     """Over blocks of cycles. The product of a regressor with itself is that of its two halves: these have independent noise,
     which then biases nothing (instrumental variables; noise in a regressor would draw its coefficient to 0)."""
     d = samples.alpha.shape[1]
-    count = columns(loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, varies).shape[1]
+    count = columns(
+        loop, *(x[:1] for x in (samples.phase, samples.alpha, samples.rate)), harmonics, varies, second
+    ).shape[1]
     most = min(MOST_BLOCKS, max(FOLDS * LAGS, MOST_NUMBERS // count**2))
     found = []
     for some in blocks(samples, most):
         one, other = (
-            columns(loop, samples.phase[some], x[some], u[some], harmonics, varies) for x, u in samples.halves
+            columns(loop, samples.phase[some], x[some], u[some], harmonics, varies, second) for x, u in samples.halves
         )
         product, xi = one.T @ other, samples.xi[some]
         found.append(((product + product.T) / 2, (one + other).T @ xi / 2, (xi**2).sum(0)))
