@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import itertools
 import json
 import math
 import re
@@ -19,7 +20,7 @@ from geomech import cli, connection, gaits, measured, tables
 from geomech.connection import Connection
 from geomech.curvature import ccf
 from geomech.errors import SceneError, UnitWarning
-from geomech.measured import cycles, phase, regression, smooth, synthetic
+from geomech.measured import cycles, phase, regression, smooth, synthetic, unknowns
 from geomech.output import mat, netcdf
 from geomech.output import measured as told
 from geomech.output.explain import explain
@@ -356,9 +357,39 @@ def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
     made = synthetic.made(bent(joints), travelling(joints, harmonics), 24, 20, spread, seed=1)
     f = measured.fit_log(log_of(made), harmonics=1 if spread else None)
     assert f.combined == {}
-    assert told.status(f) == (
-        "fitted" if spread else f"{told.ALONG}: its cycles do not vary enough to tell A across it"
-    )
+    if joints < 5:  # of which 24 cycles tell less
+        along = f"{told.ALONG}: its cycles do not vary enough to tell A across it"
+        assert told.status(f) == ("fitted" if spread else along)
+
+
+@pytest.mark.parametrize(
+    ("joints", "harmonics", "asked", "across", "wide"),
+    [
+        (4, 1, {"cycles": 32}, True, 0.01),  # as many unknowns as half of what the splines have: else +-6
+        (5, 1, {"cycles": 40}, True, 0.01),
+        (3, 1, {"spread": 0.02, "noise": 5e-3}, True, 0.01),  # noise is what is of the second order: else +-0.07
+        (3, 2, {"spread": 0.02, "noise": 5e-3}, False, 0.02),  # and what is across the gait: else +-0.9
+    ],
+)
+def test_no_more_is_fitted_than_cycles_tell(joints, harmonics, asked, across, wide):
+    """Intervals cover the truth, and are no wider than a hundredth or two of a displacement of 0.3."""
+    velocity, gait = bent(joints), travelling(joints, harmonics)
+    made = synthetic.made(velocity, gait, **{"cycles": 40, "samples": 30, "spread": 0.05, "seed": 1, **asked})
+    f = measured.fit_log(log_of(made))
+    net, off = f.displacement
+    assert f.across == across and off.max() < wide
+    assert (np.abs(net - displacement(velocity(*f.gait.cycle(128)))) <= off).all()
+    assert (f.explained > 0.8).all()
+
+
+@pytest.mark.parametrize("joints", [2, 3, 5])
+def test_unknowns_are_half_of_what_tells_them_at_most(joints):
+    loop, alpha = Loop(np.random.default_rng(0).normal(size=(joints, 3))), np.ones((1, joints))
+    for most, varies, size in itertools.product((1, 4, 12), range(3), (20.0, 200.0, 2000.0)):
+        first, second = unknowns.afforded(joints, most, varies, size)
+        count = regression.columns(loop, np.zeros(1), alpha, alpha, first, varies, second).shape[1]
+        assert 1 <= first <= most and (count <= size / 2 or (first, second) == (1, -1))
+    assert unknowns.afforded(joints, 12, regression.RATES, 1e5) == (12, 2)
 
 
 def test_normals_are_orthonormal_and_close():

@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech.errors import number
 from geomech.gaits import Fourier
-from geomech.measured import cycles, regression, slips, smooth
+from geomech.measured import cycles, regression, slips, smooth, unknowns
 from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
@@ -139,20 +139,18 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi, halves, tuple(xi_halves)
     )
     varies = regression.varied(loop, samples)
-    across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
-    if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
-        combined = {}  # nothing is gained by leaving them out
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
     if harmonics is not None and harmonics > most:
         raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
     size = joints.knots * (samples.cycle[-1] + 1)
-    most, second = regression.afforded(len(log.joints), most if harmonics is None else harmonics, varies, size)
     try:
-        held = regression.sums(loop, samples, most if harmonics is None else harmonics, varies, second)
-        held = held.kept(regression.chosen(held)) if harmonics is None else held
+        held, varies = unknowns.settled(loop, samples, most, harmonics, varies, size)
         found, errors = regression.solution(held)
     except np.linalg.LinAlgError:
         raise log.wrong("its cycles do not settle so many unknowns: lower --harmonics, or give more cycles") from None
+    across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
+    if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
+        combined = {}  # nothing is gained by leaving them out
     A, errors = (held.split(x, loop) for x in (found, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])

@@ -21,10 +21,7 @@ from geomech.tube import Loop, waves
 FOLDS = 5  # of the cross-validation over cycles that chooses harmonics
 MOST_BLOCKS = 120  # of cycles, that are left out as one
 MOST_NUMBERS = 20_000_000  # of all their matrices
-FEWEST = 2  # harmonics for which those of the second order are given up
-LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
 SECOND = 2  # harmonics of what is of the second order in the deviation, at most
-SHARE = 0.5  # of the numbers that splines through the rows have, that unknowns are at most: more follow the noise
 LAGS = 8  # blocks over which errors are correlated
 CERTAIN = 5.0  # standard errors by which the cycles must vary
 LEAST_VARIED = 3e-3  # of the joint rates, or of the gait's size, that those across it must be: splines make up as much
@@ -67,6 +64,12 @@ class Sums:
         wide, all_columns = 2 * self.harmonics + 1, np.arange(self.matrix.shape[1])
         pick = all_columns[(all_columns >= self.terms * wide) | (all_columns % wide <= 2 * harmonics)]
         return Sums(self.matrix[:, pick][:, :, pick], self.right[:, pick], self.square, self.kinds, harmonics)
+
+    @property
+    def plain(self) -> Sums:
+        """Without what is of the second order."""
+        first = self.terms * (2 * self.harmonics + 1)
+        return replace(self, matrix=self.matrix[:, :first, :first], right=self.right[:, :first])
 
     def solved(self, weights: np.ndarray) -> np.ndarray:
         """(..., P, 3) for weights (..., B) of the blocks."""
@@ -118,22 +121,6 @@ def columns(loop: Loop, phase, alpha, rate, harmonics: int, varies: int, second:
 def _times(rate, s, w) -> np.ndarray:
     """(N, d S W): all products of rates (N, d), deviations (N, S) and waves (N, W)."""
     return np.einsum("nj,ns,nw->njsw", rate, s, w).reshape(len(rate), -1)
-
-
-def afforded(joints: int, most: int, varies: int, size: float) -> tuple[int, int]:
-    """(harmonics of the connection, at most ``most``, and of what is of the second order, -1 for none), of which the unknowns
-    are no more than a SHARE of ``size`` numbers that tell them; at least one harmonic."""
-    rates, deviations = (joints if varies == RATES else 1), (0 if varies == NOTHING else joints - 1)
-    unknowns = lambda harmonics, second: (
-        rates
-        * (
-            (1 + deviations) * (2 * harmonics + 1)
-            + deviations * (deviations + 1) // 2 * (2 * second + 1) * (second >= 0)
-        )
-    )
-    ways = [*((LEAST, k) for k in range(SECOND, 0, -1)), (FEWEST, 0)]
-    second = next((k for h, k in ways if unknowns(min(h, most), k) <= SHARE * size), -1)
-    return next((h for h in range(most, 1, -1) if unknowns(h, second) <= SHARE * size), 1), second
 
 
 def sums(loop: Loop, samples: Samples, harmonics: int, varies: int = RATES, second: int = SECOND) -> Sums:
@@ -210,17 +197,6 @@ def unknown(loop: Loop, A: np.ndarray, varies: int) -> np.ndarray:
     return np.array(found)
 
 
-def chosen(held: Sums) -> int:
-    """Harmonics: MORE than those with which cycles that are left out are predicted best, of the component of xi that asks for
-    most, so that what is cut off stays below the noise."""
-    fold, errors = np.arange(len(held.square)) % FOLDS, []
-    for k in range(1, held.harmonics + 1):
-        some = held.kept(k)
-        parts = [some.left(some.solved((fold != f).astype(float)))[fold == f].sum(0) for f in range(FOLDS)]
-        errors.append(np.sum(parts, 0))
-    return min(held.harmonics, max(LEAST, int(np.argmin(errors, 0).max()) + 1 + MORE))
-
-
 def solution(held: Sums) -> tuple[np.ndarray, np.ndarray]:
     """(found (P, 3), errors (E, P, 3)), which are independent and of which the squares add up to the variance.
 
@@ -234,7 +210,7 @@ def solution(held: Sums) -> tuple[np.ndarray, np.ndarray]:
     errors = lagged(without - found)
     if first == len(found):
         return found, errors
-    plain = replace(held, matrix=held.matrix[:, :first, :first], right=held.right[:, :first]).solved(np.ones(count))
+    plain = held.plain.solved(np.ones(count))
     change = np.concatenate([found[:first] - plain, np.zeros_like(found[first:])]) / 2
     return found, np.concatenate([errors, change[None]])
 
