@@ -327,31 +327,36 @@ def tied(rows, noise, spread=0.05):
     return log_of(made._replace(alpha=alpha + noise * np.random.default_rng(5).normal(size=alpha.shape)))
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-2])
+SUM = [[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out with --columns$"
+
+
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("noise", "rows", "said"),
     [
-        ([[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 out with --columns$"),
-        ([[0, -2]], "alpha_3 is -2 alpha_2, but for"),
+        (0.0, *SUM),
+        (1e-3, *SUM),
+        (1e-2, *SUM),
+        (1e-3, [[0, -2]], "alpha_3 is -2 alpha_2, but for"),
         (
+            1e-3,
             [[1, -1], [0.5, 2]],
             "alpha_3 is 1 alpha_1 - 1 alpha_2, alpha_4 is 0.5 alpha_1 \\+ 2 alpha_2, .* leave alpha_3, alpha_4 out",
         ),
-        ([[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, but for"),
+        (1e-2, [[0.4, -0.3, 1]], "alpha_4 is 0.4 alpha_1 - 0.3 alpha_2 \\+ 1 alpha_3, but for"),
     ],
 )
-def test_joints_that_follow_from_others_are_named(rows, said, noise):
+def test_joints_that_follow_from_others_are_named(noise, rows, said):
     log = tied(rows, noise)
     f = measured.fit_log(log)
     found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", told.status(f))  # noise moves the third digit
     assert re.match("fitted along the gait alone: " + said, found)
-    assert said[:20] in re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", told.text(f))
+    assert told.status(f) in told.text(f)
     if noise == 1e-3 and len(rows) == 1:
         kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
         assert told.status(measured.fit_log(kept, harmonics=2)) == "fitted"
 
 
-@pytest.mark.parametrize(("joints", "harmonics"), [(3, 1), (4, 1), (5, 1), (3, 2), (5, 2)])
+@pytest.mark.parametrize(("joints", "harmonics"), [(3, 1), (5, 1), (5, 2)])
 @pytest.mark.parametrize("spread", [0.05, 0.0])
 def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
     """Those of one harmonic lie in a plane; what does not vary about them tells A along them, whatever is left out."""
