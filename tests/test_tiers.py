@@ -17,7 +17,7 @@ from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
 from geomech.systems import Swimmer
 from geomech.tiers.direct import direct
-from rft import BodyInertia, Chain, se2
+from rft import BodyInertia, Chain, Granular, se2
 
 GLASS = scenes.load("three-link-glass")
 BENCH = Study(GLASS)
@@ -194,6 +194,44 @@ def test_direct_estimates_cover_the_truth(truths):
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
+
+
+BY_RULES = [  # links, C, gamma0, amplitude, frame, centre: headings that two rules see half of, by chance
+    ((1.467, 1.521, 0.829), 1.557, 0.2287, 1.232, "link-2", (0.156, 0.053)),
+    ((1.389, 1.217, 1.404), 1.967, 0.3765, 1.678, "link-2", (-0.124, -0.201)),
+    ((0.598, 1.452, 1.474), 0.406, 0.1793, 1.291, "mean", (-0.166, -0.178)),
+    ((0.541, 1.007, 1.379), 0.778, 0.1301, 1.171, "link-2", (0.229, 0.214)),
+    ((1.0, 1.4, 0.7), 1.8, 0.2409, 0.5, "mean", (0.0, 0.0)),
+]
+
+
+@dataclasses.dataclass(frozen=True)
+class TractionAlone:
+    """A granular law that tells no closed form."""
+
+    C: float
+    gamma0: float
+
+    def traction(self, v_t, v_n, eps=0.0):
+        return Granular(self.C, self.gamma0).traction(v_t, v_n, eps)
+
+
+@pytest.mark.parametrize(("lengths", "C", "gamma0", "amplitude", "frame", "centre"), BY_RULES)
+def test_estimates_between_two_rules_cover_exact_integrals(lengths, C, gamma0, amplitude, frame, centre):
+    gait, a = Circle(centre=centre), np.array([amplitude])
+    own, exact_ = (
+        Scene(Swimmer(law(C, gamma0), Chain(lengths, frame=frame)), gait) for law in (TractionAlone, Granular)
+    )
+    (poses, error), (true, _) = (estimate.direct(s, gait, a, 128) for s in (own, exact_))
+    off = estimate.apart(poses, true, 1.0)
+    assert (off <= error).all()
+    assert (error < 12 * off.max()).all()
+
+
+def test_no_estimate_is_below_rounding():
+    some = scenes.load("three-link-ideal-fluid")
+    error = estimate.direct(some, some.gait, np.array([0.5, 1.0]), 256)[1]
+    assert (error >= 5e-16).all()
 
 
 def test_estimates_of_refinement_are_neither_short_nor_long():

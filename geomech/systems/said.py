@@ -48,8 +48,8 @@ class Said:
         return (
             f"the law {name_in(LAWS, self.medium)} has no closed form: its averages over an element are by quadrature "
             f"({QUADRATURE}) in place of exact integrals, which takes some five times as long and, where drag is dry, is off "
-            "by 1 to 3 % of the displacement of three links, less of more; errors include it, and "
-            '[numerics] loads = "gauss:96" lowers it fourfold',
+            "by 1 to 7 % of the displacement of three links, less of more; errors include it, and "
+            '[numerics] loads = "gauss:96" lowers it tenfold',
         )
 
     def told(self) -> list[str]:
