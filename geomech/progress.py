@@ -7,7 +7,7 @@ import html
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 
 EVERY = 10.0  # s between lines
@@ -42,6 +42,14 @@ class Course:
 
 
 _under_way: ContextVar[Course | None] = ContextVar("course", default=None)
+
+
+def told(found: Iterable, count: int, progress: Callable | None) -> Iterator:
+    """What is found, ``count`` in all, while ``progress`` is told how much of it there is."""
+    for done, one in enumerate(found, 1):
+        if progress:
+            progress(done / count)
+        yield one
 
 
 @contextlib.contextmanager

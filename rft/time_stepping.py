@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.backend import check
+from rft import in_turn
+from rft.backend import check, settled_on
 from rft.balance import checked_input
 from rft.bodies.base import Body, Kinematics, halves, pace
 from rft.bodies.pieces import PIECES
@@ -131,8 +132,7 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
     approach = (HeavyApproach if steps.heavy else Approach)(steps.pose.shape[1])
     for done in itertools.count(1):
         start = steps.xi[-1] if steps.xi else None
-        rows = [steps.next(with_work) for _ in range(phases)]
-        xi, pose, residual, work = zip(*rows)
+        xi, pose, residual, work = steps.cycle(with_work)
         pose = np.stack([*pose, steps.foreseen()[1]])
         path += [pose[:-1]] if with_path else []
         moved = _between(pose[0], pose[-1])
@@ -145,9 +145,9 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
     worst = np.max(residual, 0)
     status = np.where(periodic, "periodic", "not periodic" if cycles is None else "running")
     status = np.where(worst <= steps.limit, status, "unconverged")
-    work = Work(*(np.stack(x) for x in zip(*work))) if with_work else None
     whole = np.concatenate([*path, pose[-1:]]) if with_path else None
-    return TimeSteps(np.stack(xi), pose, worst, status, drift, done, work, whole)
+    work = Work(*work) if with_work else None
+    return TimeSteps(xi, pose, worst, status, drift, done, work, whole)
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -194,6 +194,7 @@ class _Steps:
         if self.heavy:  # a heavy body moves while its joints pause
             self.scales = np.broadcast_to(usual, speed.shape)
         self.step, self.pose, self.xi = 0, np.zeros((3, samples)), []
+        self.v, self.states, self.site = {}, [], None
         self.limit, self.kept = 0.0, []
 
     def foreseen(self):
@@ -216,6 +217,38 @@ class _Steps:
             phases = (slice(i * samples, (i + 1) * samples) for i in range(self.phases))
             self.kept = [self.model.motions(whole.take(phase)) for phase in phases]
         return self.kept[k]
+
+    def cycle(self, with_work: bool) -> list:
+        """Take all steps of a cycle: [xi (N, 3, B), pose (N, 3, B), residual (N, B), work, a tuple of such arrays, empty
+        unless asked for]."""
+        sure, pieces, left = self.balance.backend != "auto" or bool(settled_on()), [], self.phases
+        while left:
+            some = lambda left=left: (self._some(left, with_work), self.numbers())
+            found, numbers = in_turn.known("steps", some, lambda left=left: (left, self.numbers()), sure)
+            self.go_on(numbers)
+            pieces.append(found)
+            left -= len(found[0])
+        *plain, work = zip(*pieces)
+        return [*map(np.concatenate, plain), tuple(map(np.concatenate, zip(*work)))]
+
+    def _some(self, most: int, with_work: bool) -> tuple:
+        """As `cycle`, of a piece of it."""
+        *plain, work = zip(*in_turn.piece(lambda: self.next(with_work), most))
+        return *map(np.stack, plain), tuple(map(np.stack, zip(*work))) if with_work else ()
+
+    def numbers(self) -> tuple:
+        """All that steps to come follow from."""
+        states = tuple(p.numbers(state) for p, state in zip(self.processes, self.states))
+        site = (self.site.pose, *self.site.before.values()) if self.site else ()
+        return self.step, float(self.limit), self.pose, tuple(self.xi), tuple(self.v.values()), states, site
+
+    def go_on(self, numbers: tuple) -> None:
+        """From where `numbers` were."""
+        self.step, self.limit, self.pose, xi, v, states, (pose, *before) = numbers
+        motions, dt = self.motions((self.step - 1) % self.phases), 0.0 if self.step == 1 else self.dt
+        self.xi, self.v = list(xi), dict(zip(motions, v))
+        self.states = [p.state(x) for p, x in zip(self.processes, states)]
+        self.site = Site(dt, pose, motions, dict(zip(motions, before)))
 
     def next(self, with_work: bool):
         """Take a step: (xi, pose, residual, work) at it."""

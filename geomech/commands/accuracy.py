@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from pathlib import Path
 
@@ -22,7 +21,7 @@ def accuracy(
     """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
     scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
     from geomech.output import plots, walks
-    from geomech.scene import Intruding, Scene, WalkerScene, inputs, load
+    from geomech.scene import Intruding, WalkerScene, inputs, load
     from geomech.study import accuracy as study
     from geomech.study import intrusion, walking
 
@@ -33,8 +32,8 @@ def accuracy(
         study, draw = walking, walks.accuracy_figure
     else:
         scene, draw = loaded(name), plots.work_precision_figure
-    sides = keeping(scene, out, command="accuracy") if isinstance(scene, Scene) else contextlib.nullcontext()
-    with sides, whole_folder(out, inputs(scene)) as folder, terminal.progress(f"accuracy of {scene.name}") as bar:
+    kept, told = keeping(scene, out, command="accuracy"), terminal.progress(f"accuracy of {scene.name}")
+    with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
         allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)
         text = "\n".join([study.table(results), "", *study.sentences(results)])

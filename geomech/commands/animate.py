@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, keeping, loaded
 from geomech.commands.options import SceneArgument, YesOption, check_outputs
 
 
@@ -36,8 +36,10 @@ def animate(
     if film.is_film(out):
         costs.append(film.cost(scene.numerics.phases, count))
     balances, seconds, memory = zip(*costs)
-    allow(scene, type(costs[0])(sum(balances), sum(seconds), max(memory)), yes)
-    with terminal.progress(f"motion of {scene.name}") as bar:
+    takes = type(costs[0])(sum(balances), sum(seconds), max(memory))
+    allow(scene, takes, yes)
+    kept = keeping(scene, out, not takes.small, not takes.small, command="animate", cycles=count)
+    with kept, terminal.progress(f"motion of {scene.name}") as bar:
         found = motion.motion(scene, count)
         if mapped:
             study.compute_field()

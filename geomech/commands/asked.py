@@ -74,11 +74,12 @@ def loaded_walker(name: str):
 
 
 @contextlib.contextmanager
-def keeping(scene, output: Path | None, large: bool = True, **asked) -> Iterator[None]:
-    """In the body of the statement what is computed side by side is kept beside the output, a file or a folder, and is taken up
-    where it was stopped; at its end nothing is kept any more. asked: all that it is asked for, but for where the results go.
-    Of what is only printed, None, it is kept in the current folder if it is ``large``. SceneError while another computation
-    to the same output is under way."""
+def keeping(scene, output: Path | None, large: bool = True, one_way: bool = False, **asked) -> Iterator[None]:
+    """In the body of the statement what is computed side by side, or piece after piece, is kept beside the output, a file or a
+    folder, and is taken up where it was stopped; at its end nothing is kept any more. asked: all that it is asked for, but for
+    where the results go. Of what is only printed, None, it is kept in the current folder if it is ``large``. one_way: by one
+    back end from beginning to end, without which no steps in time are kept: "auto" may take another one the next time.
+    SceneError while another computation to the same output is under way."""
     from geomech import workers
     from geomech.files import refuse_inputs
     from geomech.scene import inputs
@@ -97,7 +98,7 @@ def keeping(scene, output: Path | None, large: bool = True, **asked) -> Iterator
         if partial is None:
             yield
             return
-        with Parts(partial, question) as parts, workers.keeping(parts):
+        with Parts(partial, question) as parts, workers.keeping(parts), workers.one_way(workers.MANY * one_way):
             yield
         partial.unlink(missing_ok=True)
 

@@ -51,21 +51,22 @@ def displacement(
     if effort:
         refuse_costless(scene)
     with terminal.progress(f"displacement of {scene.name}") as bar:
-        more = cost.of_effort(scene, len(values)) if effort else []
+        more, study = cost.of_effort(scene, len(values)) if effort else [], Study(scene)
         if tol is None:
-            study = Study(scene)
             takes = study.cost(values, chosen or study.methods, more=more)
             allow(scene, takes, yes)
-            asked = {"command": "displacement", "amplitudes": values, "methods": chosen}
-            with keeping(scene, plot, not takes.small, **asked):
-                table = study.study(values, chosen or study.methods, progress=bar)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
-        else:
-            ask = lambda jobs: allow(scene, cost.price([*jobs, *more]), yes)
-            table = cheapest(scene, values, tol, ask=ask)
-        if effort:
-            add_effort(table)
+        large = tol is not None or not takes.small  # of a tolerance nobody knows before
+        asked = {"command": "displacement", "amplitudes": values, "methods": chosen, "tol": tol, "cost": effort}
+        with keeping(scene, plot, large, large, **asked):
+            if tol is None:
+                table = study.study(values, chosen or study.methods, progress=bar)
+            else:
+                ask = lambda jobs: allow(scene, cost.price([*jobs, *more]), yes)
+                table = cheapest(scene, values, tol, ask=ask)
+            if effort:
+                add_effort(table)
     if plot:
         system, name = scene.system, type(scene.gait).__name__.lower()
         plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)

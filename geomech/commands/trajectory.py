@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, keeping, loaded
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
 
 
@@ -26,9 +26,12 @@ def trajectory(
     scene = loaded(name)
     check_outputs(scene, out, None)
     with terminal.progress(f"motion of {scene.name}") as bar:
-        allow(scene, motion.cost(scene, cycles), yes)
-        found = motion.motion(scene, cycles)
-        trajectories.save(out, found, bar)
+        takes = motion.cost(scene, cycles)
+        allow(scene, takes, yes)
+        large = not takes.small
+        with keeping(scene, out, large, large, command="trajectory", cycles=cycles):
+            found = motion.motion(scene, cycles)
+            trajectories.save(out, found, bar)
     (x, y, theta), unit = found.pose[-1], scene.system.unit
     ends = f"after {cycles} cycle{'s' * (cycles > 1)} x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad"
     print(f"{ends}; {len(found.phase)} rows of {len(found.columns)} columns in {out}")

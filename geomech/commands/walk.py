@@ -9,7 +9,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded_walker
+from geomech.commands.asked import allow, keeping, loaded_walker
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, check_outputs, folder
 from geomech.files import whole_folder
 
@@ -40,12 +40,14 @@ def walk(
     if animate:
         film.check_format(animate)
     check_outputs(scene, animate, None)
-    allow(scene, walking.price(scene, by=engine), yes)
-    with terminal.progress(f"walk of {scene.name}") as bar:
-        found = walking.run(scene, engine, bar, math.inf if yes else LONGEST)
-    if animate:
-        walks.film(animate, scene, found)
-    if out:
-        with whole_folder(out, inputs(scene)) as place:
-            walks.save(place, scene, found)
+    takes = walking.price(scene, by=engine)
+    allow(scene, takes, yes)
+    with keeping(scene, out or animate, not takes.small, command="walk", engine=engine):
+        with terminal.progress(f"walk of {scene.name}") as bar:
+            found = walking.run(scene, engine, bar, math.inf if yes else LONGEST)
+        if animate:
+            walks.film(animate, scene, found)
+        if out:
+            with whole_folder(out, inputs(scene)) as place:
+                walks.save(place, scene, found)
     print(walks.as_json(found) if as_json else walks.told(scene, found))

@@ -13,6 +13,7 @@ from geomech.errors import SceneError
 from geomech.files import whole_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
+from geomech.progress import told
 from geomech.study.cost import Cost
 from geomech.study.motion import Motion
 
@@ -55,16 +56,9 @@ def save(path: Path, motion: Motion, field=None, error=None, progress: Callable 
         plots.save(plots.filmstrip(motion, field, error), path)
         return
     shown = rows(motion.scene.numerics.phases, motion.cycles)
-    film = _told(_frames(motion, shown, field, error), len(shown), progress)
+    film = told(_frames(motion, shown, field, error), len(shown), progress)
     with whole_file(path) as part:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
-
-
-def _told(frames: Iterator, count: int, progress: Callable | None) -> Iterator:
-    for k, frame in enumerate(frames, 1):
-        yield frame
-        if progress:
-            progress(k / count)
 
 
 def _frames(motion: Motion, shown: np.ndarray, field, error) -> Iterator[np.ndarray]:

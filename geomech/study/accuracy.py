@@ -8,7 +8,7 @@ Errors are distances between net positions in body lengths, rms over a few ampli
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from geomech import workers
 from geomech.errors import SceneError, named
+from geomech.progress import told
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
@@ -103,7 +104,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     for knob in knobs:
         asked += [Asked(_limit(scene, knob), knob.tier, 1)] if knob.against == "limit" else []
         asked += [Asked(knob.turned(scene, value), knob.tier, _runs(scene, runs)) for value in knob.values]
-    found = _told(workers.each(_answer, amplitudes, asked, len(asked)), len(asked), progress)
+    found = told(workers.each(_answer, amplitudes, asked, len(asked)), len(asked), progress)
     true, _ = next(found)
     for knob in knobs:
         truth = next(found)[0] if knob.against == "limit" else true
@@ -116,14 +117,6 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
         "cheapest": [_cheapest(lines, tol, own) for tol in TOLERANCES],
         **({"own_error": own} if own else {}),
     }
-
-
-def _told(found: Iterable, count: int, progress: Callable | None) -> Iterator:
-    """What is found, while ``progress`` is told how much of it there is."""
-    for done, one in enumerate(found, 1):
-        if progress:
-            progress(done / count)
-        yield one
 
 
 def cost(scene: Scene, runs: int = 2) -> Cost:

@@ -244,14 +244,14 @@ def _per_step(job: Job, count: float) -> tuple[float, int]:
         found = system.time_steps(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    with workers.one_way(workers.MANY):
+    with workers.one_way(workers.MANY), workers.keeping(None):
         cycles = time_steps(1, system.solver.cycles and 1)[0]  # also loads what the first steps load
         return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or cycles
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:
     """Seconds a sample that f(samples) takes by the back end of large requests, for as many as it takes to tell."""
-    with workers.one_way(workers.MANY):
+    with workers.one_way(workers.MANY), workers.keeping(None):
         f(samples)  # loads what the first call loads
         while True:
             start = time.process_time()

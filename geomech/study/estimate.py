@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech import workers
 from geomech.errors import named
 from geomech.gaits import Gait
 from geomech.reconstruct import displacement
@@ -53,7 +54,18 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
     with named(scene.name):
-        return tuple(np.concatenate(x) for x in zip(*(_direct(scene, gait, some, phases) for some in groups)))
+        return tuple(np.concatenate(x) for x in zip(*(_kept(scene, gait, some, phases) for some in groups)))
+
+
+def _kept(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
+    """As `_direct`; kept by itself, for the command that goes on, but for steps in time, whose pieces are."""
+    compute = lambda: _direct(scene, gait, amplitudes, phases)
+    if scene.system.steps:
+        return compute()
+    solver = getattr(scene.system, "solver", None)
+    return workers.known(
+        "direct", compute, lambda: (repr(solver), repr(gait), amplitudes, phases), bool(workers.settled_on())
+    )
 
 
 def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from geomech import workers
+from geomech.progress import told
 from geomech.scene.intruding import Intruding
 from geomech.study.cost import BASE, Cost
 
@@ -19,37 +22,49 @@ def study(scene: Intruding, progress: Callable | None = None, runs: int = 3) -> 
     """{"scene", "parts", "poses", "finest", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest":
     [{"tolerance", "elements", "error", "seconds"}]}, a line for the force and one for the moment; of a mesh "triangles"
     stands for "elements". Errors are rms over the motion against the finest of the scene's ladder, over the largest of it;
-    each setting is timed ``runs`` times, and the quickest counts."""
+    each setting is timed ``runs`` times, and the quickest counts. Seconds are of one thread's computing. Who computes:
+    `geomech.workers`."""
     *counts, finest = scene.ladder
-    truth, found, seconds = scene.run(finest), [], []
-    for done, count in enumerate(counts):
-        times = []
-        for _ in range(runs):
-            start = time.perf_counter()
-            run = scene.run(count)
-            times.append(time.perf_counter() - start)
-        found.append(run)
-        seconds.append(min(times))
-        if progress:
-            progress((done + 1) / len(counts))
+    asked = [(finest, 1), *((count, runs) for count in counts)]
+    answers = told(workers.each(_answer, scene, asked, len(asked), back_end=""), len(asked), progress)
+    (truth, _), *found = ((Answer(*loads), seconds) for *loads, seconds in answers)
     used = [scene.used(n) for n in counts]  # a shape may take more than it is asked for
-    lines = [_line(what, used, found, truth, scene.size, seconds, scene.order) for what in ("force", "moment")]
+    lines = [_line(what, used, found, truth, scene.size, scene.order) for what in ("force", "moment")]
     return {
         "scene": scene.name,
         "parts": scene.parts,
-        "poses": len(truth.t),
+        "poses": len(truth.force),
         "finest": scene.used(finest),
         "lines": lines,
         "cheapest": [_cheapest(lines, tolerance, scene.parts) for tolerance in TOLERANCES],
     }
 
 
-def _line(what: str, used, found, truth, size: float, seconds, order: int) -> dict:
-    """A moment that is nothing but rounding is compared to the force times the body's size."""
+class Answer(NamedTuple):
+    """Force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+
+def _answer(scene: Intruding, asked: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, float]:
+    """(force, moment, seconds) of so many parts; the quickest of so many runs counts."""
+    (count, runs), times = asked, []
+    for _ in range(runs):
+        start = time.thread_time()
+        found = scene.run(count)
+        times.append(time.thread_time() - start)
+    return found.force, found.moment, min(times)
+
+
+def _line(what: str, used, found, truth: Answer, size: float, order: int) -> dict:
+    """A moment that is nothing but rounding is compared to the force times the body's size. found: (answer, seconds) of the
+    settings."""
     exact, arm = getattr(truth, what), size if what == "moment" else 1.0
     largest, bound = np.abs(exact).max(), arm * np.abs(truth.force).max()
     largest = largest if largest > ROUNDING * bound else bound or 1.0
-    errors = [float(np.sqrt(np.mean((getattr(run, what) - exact) ** 2)) / largest) for run in found]
+    errors = [float(np.sqrt(np.mean((getattr(run, what) - exact) ** 2)) / largest) for run, _ in found]
+    seconds = [took for _, took in found]
     seen = np.array(errors) > ROUNDING
     slope = -np.polyfit(np.log(np.array(used)[seen]), np.log(np.array(errors)[seen]), 1)[0] if seen.sum() > 2 else None
     slope = None if slope is None else float(slope)

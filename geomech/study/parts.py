@@ -25,27 +25,35 @@ import numpy as np
 
 from geomech import __version__
 from geomech.kinds import code
+from geomech.scene.intruding import Intruding
 from geomech.scene.model import Scene
 from geomech.scene.read import inputs
+from geomech.scene.walker import WalkerScene
 from geomech.study import kept
-from geomech.workers.solving import SOLVER
+from geomech.workers.solving import SOLVER, settled_on
 
 LARGEST = 1_000_000_000  # bytes of a file; what is beyond is computed again
 BACK_ENDS = ("", "numpy", "numba")
-TUPLE, FLOAT, WHOLE, ARRAY = range(4)  # kinds of a result
+TUPLE, FLOAT, WHOLE, ARRAY, NOTHING = range(5)  # kinds of a result
 
 
-def asking(scene: Scene, **asked: Any) -> dict:
+def asking(scene: Scene | Intruding | WalkerScene, **asked: Any) -> dict:
     """All that the numbers of a request follow from: the code, the scene with the files that it names, and what is asked
     (JSON)."""
-    system = scene.system
-    of_system = {f.name: repr(getattr(system, f.name)) for f in dataclasses.fields(system) if f.name != "solver"}
-    numerics = f"{scene.numerics}, {system.solver}"
-    parts = {"system": system.kind, **of_system, "gait": repr(scene.gait), "numerics": numerics}
+    parts = _of_system(scene) if isinstance(scene, Scene) else _fields(scene, "name", "text", "files")
     own = {"own code": code()} if code() else {}
     files = [x for x in inputs(scene) if x != Path(scene.name) and x.is_file()]
     read = {"files": [hashlib.sha256(x.read_bytes()).hexdigest() for x in files]} if files else {}
     return {"geomech": __version__, "solver": SOLVER, **own, "scene": scene.text, **read, **parts, **asked}
+
+
+def _of_system(scene: Scene) -> dict[str, str]:
+    system, numerics = scene.system, f"{scene.numerics}, {scene.system.solver}"
+    return {"system": system.kind, **_fields(system, "solver"), "gait": repr(scene.gait), "numerics": numerics}
+
+
+def _fields(thing: Any, *but: str) -> dict[str, str]:
+    return {f.name: repr(getattr(thing, f.name)) for f in dataclasses.fields(thing) if f.name not in but}
 
 
 class Part(NamedTuple):
@@ -94,6 +102,10 @@ class Parts(kept.Kept):
         for number, found in enumerate(computed(_watched(items, marks)), done):
             self._add(which._replace(number=number, at=marks.popleft()), found)
             yield found
+
+    def in_turn(self, what: str, compute: Callable, start: Any) -> Any:
+        """What compute() gives, one by one (`rft.in_turn`): a part by itself."""
+        return next(self.each((what,), settled_on(), [start], 1, lambda rest: (compute() for _ in rest)))
 
     def _taken(self, part: Part) -> tuple | None:
         """(its result,) if that is kept."""
@@ -146,8 +158,11 @@ def _watched(items: Iterable, marks: deque) -> Iterator:
 
 
 def _numbers(found: Any) -> Iterator[np.ndarray]:
-    """A result as arrays of float, to be put one behind the other; TypeError for what is not made of numbers."""
-    if isinstance(found, tuple):
+    """A result as arrays of float, to be put one behind the other; TypeError for what is not made of numbers, or of tuples
+    that have names."""
+    if found is None:
+        yield np.array([NOTHING, 0.0])
+    elif type(found) is tuple:
         yield np.array([TUPLE, len(found)], float)
         for x in found:
             yield from _numbers(x)
@@ -180,6 +195,8 @@ def _result(values: np.ndarray) -> tuple[Any, np.ndarray]:
     count = _whole(x)
     if kind == WHOLE:
         return count, rest
+    if kind == NOTHING:
+        return None, rest
     if kind == TUPLE:
         found = []
         for _ in range(count):

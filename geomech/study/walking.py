@@ -14,15 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import __version__, workers
+from geomech import workers
 from geomech.errors import SceneError, named
+from geomech.progress import told
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
 from geomech.study import kept
 from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.kept import Rows
+from geomech.study.parts import asking
 from geomech.study.sweep import LARGEST, Points, changed, listed
-from rft import SOLVER
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 
@@ -176,14 +177,7 @@ def _part(at: _At, points: list) -> list[list[float]]:
 
 def question(scene: WalkerScene, values: Mapping) -> dict:
     """All that the numbers of a sweep follow from."""
-    parts = {f.name: repr(getattr(scene, f.name)) for f in dataclasses.fields(scene) if f.name not in ("text", "files")}
-    return {
-        "geomech": __version__,
-        "solver": SOLVER,
-        "walks": True,
-        **parts,
-        "over": [[k, list(v)] for k, v in values.items()],
-    }
+    return asking(scene, over=[[k, list(v)] for k, v in values.items()])
 
 
 def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
@@ -217,21 +211,17 @@ def partial(scene: WalkerScene, over: Mapping, output: Path) -> Path:
 
 def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
     """{"scene", "speed", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest"}: error of the speed,
-    m/s, against one as far refined as `FINEST`, for every knob."""
-    how, walkers = engine(scene.engine), [scene.walker]
-    walks = how.walk(walkers, scene.numerics, SETTLING)
-    again = lambda name, value: how.again(
-        walkers, dataclasses.replace(scene.numerics, **{name: value}), walks, SETTLING
-    )[0]
-    lines, total = [], sum(map(len, KNOBS.values()))
+    m/s, against one as far refined as `FINEST`, for every knob. Seconds are of one thread's computing. Who computes:
+    `geomech.workers`."""
+    (walk,) = engine(scene.engine).walk([scene.walker], scene.numerics, SETTLING)
+    asked = [(name, value) for name, settings in KNOBS.items() for value in (FINEST[name], *settings)]
+    common = scene.engine, scene.walker, scene.numerics, walk
+    found = told(workers.each(_answer, common, asked, len(asked), back_end=""), len(asked), progress)
+    lines = []
     for name, settings in KNOBS.items():
-        truth, errors, seconds = again(name, FINEST[name]).speed, [], []
-        for value in settings:
-            start = time.process_time()
-            errors.append(abs(again(name, value).speed - truth))
-            seconds.append(time.process_time() - start)
-            if progress:
-                progress((sum(len(x["value"]) for x in lines) + len(errors)) / total)
+        truth, _ = next(found)
+        speeds, seconds = zip(*(next(found) for _ in settings))
+        errors = [abs(speed - truth) for speed in speeds]
         slope = np.polyfit(np.log(settings), np.log(np.maximum(errors, 1e-15)), 1)[0] * (
             1 if name == "rounding" else -1
         )
@@ -241,16 +231,24 @@ def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
                 "order": ORDERS[name],
                 "value": list(settings),
                 "error": errors,
-                "seconds": seconds,
+                "seconds": list(seconds),
                 "slope": float(slope),
             }
         )
     return {
         "scene": scene.name,
-        "speed": walks[0].speed,
+        "speed": walk.speed,
         "lines": lines,
         "cheapest": [_cheapest(lines, t) for t in TOLERANCES],
     }
+
+
+def _answer(common: tuple, setting: tuple[str, float]) -> tuple[float, float]:
+    """(speed, seconds) of (engine, walker, numerics, its walk) with one knob at another value."""
+    (by, walker, numerics, walk), (name, value) = common, setting
+    start = time.thread_time()
+    (found,) = engine(by).again([walker], dataclasses.replace(numerics, **{name: value}), [walk], SETTLING)
+    return found.speed, time.thread_time() - start
 
 
 def _cheapest(lines, tolerance: float) -> dict:

@@ -19,9 +19,9 @@ from contextvars import ContextVar
 from typing import Any, Protocol
 
 from geomech.errors import Note, SceneError, number
-from geomech.workers.solving import at_hand, cores, settled, settled_on
+from geomech.workers.solving import at_hand, cores, in_turn, known, settled, settled_on
 
-__all__ = ["alone", "each", "far", "keeping", "one_way", "settle", "shared", "using"]
+__all__ = ["alone", "each", "far", "keeping", "known", "one_way", "settle", "settled_on", "shared", "using"]
 
 WORTH = 3.0  # s of computing, below which other processes are not worth their start: a second of each
 MANY = 4  # parts of a request, from which on "auto" takes compiled code at once, where it lies ready
@@ -48,6 +48,9 @@ class Keeper(Protocol):
 
     def each(self, call: tuple, back_end: str, items: Iterable, parts: int, computed: Callable) -> Iterator:
         """Those that are kept, then computed(the other items)."""
+
+    def in_turn(self, what: str, compute: Callable, start: Any) -> Any:
+        """One that is kept, or else compute(): `rft.in_turn.known`."""
 
 
 _crew: ContextVar[Crew | None] = ContextVar("crew", default=None)
@@ -90,11 +93,13 @@ def _called(count: int | None, scheduler: str | None) -> Crew | None:
 
 @contextlib.contextmanager
 def keeping(keeper: Keeper | None) -> Iterator[None]:
-    """In the body of the statement results of parts are kept (`geomech.study.parts`), or none. What is asked for in it is the
-    same, in the same order, each time that the same is to be taken up."""
+    """In the body of the statement results of parts are kept (`geomech.study.parts`), or none: those of `each`, and the pieces
+    of what is computed one after the other (`known`). What is asked for in it is the same, in the same order, each time that
+    the same is to be taken up."""
     token = _keeper.set(keeper)
     try:
-        yield
+        with in_turn.keeping(keeper and keeper.in_turn):
+            yield
     finally:
         _keeper.reset(token)
 

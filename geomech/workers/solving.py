@@ -6,13 +6,14 @@ import contextlib
 from collections.abc import Iterator
 
 from geomech import __version__
-from rft import SOLVER, backend
+from rft import SOLVER, backend, in_turn
 from rft.workers import cores, one_thread
 
-__all__ = ["SOLVER", "VERSION", "at_hand", "cores", "modestly", "settled", "settled_on"]
+__all__ = ["SOLVER", "VERSION", "at_hand", "cores", "in_turn", "known", "modestly", "settled", "settled_on"]
 
 VERSION = f"geomech {__version__}, solver {SOLVER}"
 at_hand, settled, settled_on = backend.at_hand, backend.settled, backend.settled_on
+known = in_turn.known
 
 
 @contextlib.contextmanager

@@ -96,6 +96,15 @@ class Process(Effect):
         """What is remembered after a step that ended with velocities v (3, n, B) of every contact's elements."""
         return state
 
+    def numbers(self, state) -> Any:
+        """What is remembered as numbers, arrays of them, None and tuples of these, to be kept; by default what is such
+        already. Of anything else nothing is kept."""
+        return state
+
+    def state(self, numbers) -> Any:
+        """The other way."""
+        return numbers
+
     def kicked(self, state, site: Site, change, drag) -> Any:
         """What is remembered as if the body had moved faster by ``change`` (3, B) at the last steps, of which that at ``site``
         was the last, with so much more drag (3, B), over the model's unit; the ground does not notice."""

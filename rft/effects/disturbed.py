@@ -60,6 +60,14 @@ class DisturbedGround(Process):
             state.mark(self._points(site), self.radius)
         return state
 
+    def numbers(self, state: Ground) -> tuple:
+        return state.value, state.owner.astype(float)  # 2^42 at most
+
+    def state(self, numbers: tuple) -> Ground:
+        ground = Ground(self.radius / CELLS, numbers[0].shape[1])
+        ground.value, ground.owner = numbers[0], numbers[1].astype(np.int64)
+        return ground
+
     def _points(self, site: Site) -> np.ndarray:
         """(k, n, B): points along every element, at most half a radius apart."""
         half = site.motions[SIDE].half

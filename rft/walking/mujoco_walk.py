@@ -16,6 +16,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from rft import in_turn
 from rft.limit_cycle import Approach
 from rft.spatial.extruded import Extruded
 from rft.spatial.law import Spatial
@@ -173,6 +174,16 @@ class Course:
 
     def stride(self, stride: int, rows: list, states: list) -> str:
         """The next one; how it ended, or ""."""
+        body = self.body
+        more, path, numbers = in_turn.known("stride", lambda: self._stride(stride), lambda: (stride, body.numbers()))
+        body.go_on(numbers)
+        rows += more.tolist()
+        states += list(path)
+        return self.ended()
+
+    def _stride(self, stride: int) -> tuple:
+        """(rows, states, what all to come follows from) of its steps, or of those to the robot's end."""
+        rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.segments:
             for k in range(steps):
@@ -180,9 +191,9 @@ class Course:
                 self.body.step((end - begin) / steps / f, (stride + (begin + end) / 2) / f)
                 rows.append(self.row())
                 states.append(data.qpos.copy())
-                if how := self.ended():
-                    return how
-        return ""
+                if self.ended():
+                    return np.array(rows), np.array(states), self.body.numbers()
+        return np.array(rows), np.array(states), self.body.numbers()
 
     def row(self) -> list[float]:
         """As `ROW` says, along the world's axes but for the rate, about the axis to the robot's left."""

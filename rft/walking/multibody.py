@@ -89,6 +89,18 @@ class Multibody:
         mujoco.mj_energyVel(self.model, self.data)
         return float(self.data.energy.sum())
 
+    def numbers(self) -> tuple:
+        """All that steps to come follow from."""
+        data, sums = self.data, (self.work, self.loss, self.residual, self.defect)
+        return data.time, data.qpos.copy(), data.qvel.copy(), *map(float, sums), self.unsolved, self.tries
+
+    def go_on(self, numbers: tuple) -> None:
+        """From where `numbers` were."""
+        data = self.data
+        data.time, data.qpos[:], data.qvel[:], self.work, self.loss, self.residual, self.defect, *counts = numbers
+        self.unsolved, self.tries = counts
+        mujoco.mj_fwdPosition(self.model, data)
+
     def step(self, h: float, of: float | None = None, halvings: int = HALVINGS) -> None:
         """On for h, s; the controls' rates those of the time ``of``, by default the middle of the step."""
         data = self.data

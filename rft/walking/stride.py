@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rft.in_turn import known
 from rft.walking.march import march
 from rft.walking.planar import GRAVITY, Robots, State
 from rft.walking.robot import Robot, Tripod
@@ -80,7 +81,8 @@ class Strides:
         """The next stride of these samples: (phases (S,), states (S, B) after each step); who is at an end stays there."""
         begin, phases = stride * self.period, stride * self.period + self.phases
         stop = lambda at, some: self.ended(at, which[some]) != ""
-        return phases[1:], march(self.robots, which, state, phases, self.of + begin, stop)
+        states = lambda: march(self.robots, which, state, phases, self.of + begin, stop).packed()
+        return phases[1:], State.unpacked(known("stride", states, lambda: (stride, which, state.packed())))
 
     def scaled(self, state: State, which) -> np.ndarray:
         """(n, B): what tells all that is to come, over what is large for these robots."""
