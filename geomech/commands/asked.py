@@ -13,6 +13,7 @@ from geomech.errors import Note, SceneError, check_angle, named
 
 WORTH_SAYING = 1.0  # s that a field takes
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
+MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
 
 
 def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
@@ -73,13 +74,19 @@ def loaded_walker(name: str):
     return scene
 
 
+def one_way(scene, cost) -> bool:
+    """Whether a request is computed by one back end from beginning to end, so that what is done of it one after the other can
+    be kept: no clock has a say in it, as the digits of results hang on it."""
+    return bool(scene.system.steps) or cost.balances >= MANY
+
+
 @contextlib.contextmanager
 def keeping(scene, output: Path | None, large: bool = True, one_way: bool = False, **asked) -> Iterator[None]:
     """In the body of the statement what is computed side by side, or piece after piece, is kept beside the output, a file or a
     folder, and is taken up where it was stopped; at its end nothing is kept any more. asked: all that it is asked for, but for
-    where the results go. Of what is only printed, None, it is kept in the current folder if it is ``large``. one_way: by one
-    back end from beginning to end, without which no steps in time are kept: "auto" may take another one the next time.
-    SceneError while another computation to the same output is under way."""
+    where the results go. Of what is only printed, None, it is kept in the current folder if it is ``large``. one_way: as the
+    function has it; else "auto" may take another back end the next time, and pieces are not kept. SceneError while another
+    computation to the same output is under way."""
     from geomech import workers
     from geomech.files import refuse_inputs
     from geomech.scene import inputs

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded
+from geomech.commands.asked import allow, keeping, loaded, one_way
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -52,14 +52,15 @@ def displacement(
         refuse_costless(scene)
     with terminal.progress(f"displacement of {scene.name}") as bar:
         more, study = cost.of_effort(scene, len(values)) if effort else [], Study(scene)
+        large = settled = True  # of a tolerance nobody knows before
         if tol is None:
             takes = study.cost(values, chosen or study.methods, more=more)
             allow(scene, takes, yes)
+            large, settled = not takes.small, one_way(scene, takes)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
-        large = tol is not None or not takes.small  # of a tolerance nobody knows before
         asked = {"command": "displacement", "amplitudes": values, "methods": chosen, "tol": tol, "cost": effort}
-        with keeping(scene, plot, large, large, **asked):
+        with keeping(scene, plot, large, settled, **asked):
             if tol is None:
                 table = study.study(values, chosen or study.methods, progress=bar)
             else:
@@ -67,7 +68,7 @@ def displacement(
                 table = cheapest(scene, values, tol, ask=ask)
             if effort:
                 add_effort(table)
-    if plot:
-        system, name = scene.system, type(scene.gait).__name__.lower()
-        plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)
+            if plot:
+                system, name = scene.system, type(scene.gait).__name__.lower()
+                plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded
+from geomech.commands.asked import allow, keeping, loaded, one_way
 from geomech.commands.names import scene_names
 from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
 from geomech.files import whole_folder
@@ -34,9 +34,10 @@ def run(
 
     scene = loaded(name, medium=medium)
     report.refuse_folder(scene, out, inputs(scene))
-    told = terminal.progress(f"field of {scene.name}")
-    with keeping(scene, out, command="run"), whole_folder(out, inputs(scene)) as folder, told as bar:
-        allow(scene, report.cost(scene), yes)
+    takes, told = report.cost(scene), terminal.progress(f"field of {scene.name}")
+    allow(scene, takes, yes)
+    kept = keeping(scene, out, one_way=one_way(scene, takes), command="run")
+    with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
         tables = report.write(Study(scene), folder, bar)
     for title, table in tables.items():
         print(report.text_table(title, table, scene))
