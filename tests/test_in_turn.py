@@ -15,6 +15,8 @@ from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech import terminal, workers
+from geomech.commands.asked import one_way
+from geomech.output import plots
 from geomech.study import cost, estimate, intrusion, motion, walking
 from geomech.study.parts import Parts, asking
 from rft import Backbone, DisturbedGround, Granular, Transient, backend, in_turn, time_steps
@@ -23,23 +25,22 @@ from rft.effects.base import Process
 from rft.premise import Premise
 from rft.time_stepping import _Steps
 
+VISCOUS = scenes.load("three-link-viscous")
 ASKED = {"geomech": "1", "solver": 1, "command": "test"}
 EFFECTS = {
     "transient": [Transient(travel=0.03)],
-    "heavy and disturbed": [Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1), DisturbedGround(0.05, 0.6)],
+    "heavy and disturbed": [Heavy(mass=0.4, frequency=0.7, length=0.3, drag=2.1), DisturbedGround(0.08, 0.6)],
 }
 BODY, LAW = Backbone(elements=5, length=1.4), Granular(C=1.6, gamma0=0.3)
 T = 2 * np.pi * np.arange(8) / 8
-ALPHA = np.cos(T[:, None] - 0.9 * np.arange(BODY.joints)) * np.array([0.2, -0.35])[:, None, None] + 0.05
-ALPHADOT = -np.sin(T[:, None] - 0.9 * np.arange(BODY.joints)) * np.array([0.2, -0.35])[:, None, None]
+ALPHA = np.cos(T[:, None] - 0.9 * np.arange(BODY.joints)) * np.array([0.5, -0.7])[:, None, None] + 0.05
+ALPHADOT = -np.sin(T[:, None] - 0.9 * np.arange(BODY.joints)) * np.array([0.5, -0.7])[:, None, None]
 
 
 @pytest.fixture(autouse=True)
 def step_by_step(monkeypatch):
-    """A piece for each step, and all of it by one back end."""
+    """A piece for each step."""
     monkeypatch.setattr(in_turn, "LONG_ENOUGH", -1.0)
-    with backend.settled("numpy"):
-        yield
 
 
 @contextlib.contextmanager
@@ -84,17 +85,18 @@ def same(a, b):
     return np.shape(a) == np.shape(b) and np.array(a).tobytes() == np.array(b).tobytes()
 
 
-def march(effects, cycles=None, back_end="auto"):
+def march(effects, cycles=None, back_end="numpy"):
     more = {"cycles": cycles, "backend": back_end, "pieces": 5}
     return tuple(time_steps(LAW, BODY, ALPHA, ALPHADOT, effects=effects, with_work=True, with_path=True, **more))
 
 
 @pytest.mark.parametrize("effects", EFFECTS)
-def test_a_march_goes_on_where_it_was(effects, tmp_path):
+def test_a_march_goes_on_where_it_was(effects, tmp_path, monkeypatch):
     """What the ground and the body remember, and the kicks towards the limit cycle, as if it had never been stopped."""
     cycles = None if effects == "transient" else 3
     ask = lambda: march(EFFECTS[effects], cycles)
-    with counted(_Steps, "next") as calls:
+    with counted(_Steps, "next") as calls, monkeypatch.context() as patch:
+        patch.setattr(in_turn, "LONG_ENOUGH", 60.0)
         whole = ask()
     for k, after in enumerate((1, 20)):
         said = stopped(tmp_path / str(k), after, ask)
@@ -126,10 +128,11 @@ def test_long_pieces_end_with_their_cycle(monkeypatch):
 
 def test_what_may_come_out_otherwise_is_not_kept(tmp_path):
     """ "auto" may take another back end the next time; one that is named, or settled, does not."""
-    with backend.settled(""):
-        assert stopped(tmp_path / "p", 12, lambda: march(EFFECTS["transient"])) == ""
-        assert stopped(tmp_path / "p", 12, lambda: march(EFFECTS["transient"], back_end="numpy")).startswith("12 of ")
-    assert {p.name for p in tmp_path.iterdir()} == {"p"}
+    ask = lambda: march(EFFECTS["transient"], back_end="auto")
+    assert stopped(tmp_path / "p", 12, ask) == "" and list(tmp_path.iterdir()) == []
+    with backend.settled("numpy"):
+        assert stopped(tmp_path / "p", 12, ask).startswith("12 of ")
+    assert stopped(tmp_path / "q", 12, lambda: march(EFFECTS["transient"])).startswith("12 of ")
 
 
 class Named(NamedTuple):
@@ -191,8 +194,10 @@ def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):
     monkeypatch.setattr(type(scene.system), "at_once", lambda self, phases: 1)
     ask = lambda: estimate.direct(scene, scene.gait, amplitudes, 32)
     whole, what = ask(), (estimate, "_direct")
-    stopped(tmp_path / "p", 2, ask, what)
-    found, groups = asked(tmp_path / "p", ask, what)
+    assert stopped(tmp_path / "p", 2, ask, what) == ""
+    with backend.settled("numpy"):
+        stopped(tmp_path / "p", 2, ask, what)
+        found, groups = asked(tmp_path / "p", ask, what)
     assert groups == 1 and same(found, whole)
 
 
@@ -201,7 +206,8 @@ def test_what_a_request_costs_is_no_part_of_it(tmp_path, monkeypatch):
     monkeypatch.setattr(cost, "FREE", 0.0)
     scene = scenes.parse(scenes.load("sandfish-transient").text.replace("100", "5"))
     with Parts(tmp_path / "p", ASKED) as some, workers.keeping(some):
-        motion.cost(scene)
+        with workers.one_way(workers.MANY):
+            motion.cost(scene)
         assert some.calls == 0
 
 
@@ -215,13 +221,11 @@ COMMANDS = {
     "trajectory": ["march.toml", "-o", "t.csv", "--cycles", "2"],
     "animate": ["march.toml", "-o", "f.png"],
     "walk": ["walk.toml", "-o", "w"],
-    "accuracy of a walk": ["walk.toml", "-o", "a"],
-    "accuracy of an intruder": ["rod.toml", "-o", "a"],
+    "accuracy": ["rod.toml", "-o", "a"],
 }
 COUNTED = {
     "walk": "rft.walking.stride.march",
-    "accuracy of a walk": "geomech.study.walking._answer",
-    "accuracy of an intruder": "geomech.study.intrusion._answer",
+    "accuracy": "geomech.study.intrusion._answer",
 }
 
 
@@ -231,8 +235,6 @@ def small(tmp_path, monkeypatch):
     monkeypatch.setattr(cost.Cost, "small", False)
     monkeypatch.setattr(cost, "FREE", 1e9)
     monkeypatch.setattr(walking, "PILOT", 0.0)
-    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 10), "elements": (4, 5), "rounding": (8e-3, 4e-3)})
-    monkeypatch.setattr(walking, "FINEST", {"steps": 11, "elements": 6, "rounding": 2e-3})
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
     for file, text in SMALL.items():
         (tmp_path / file).write_text(text)
@@ -244,8 +246,8 @@ def test_commands_go_on(command, small):
     """Each says what is kept, and where, and does it once."""
     of, _, name = COUNTED.get(command, "rft.time_stepping._Steps.next").rpartition(".")
     of = _Steps if of.endswith("_Steps") else importlib.import_module(of)
-    args = [command.split()[0], *COMMANDS[command]]
-    args += ["--workers", "1"] if args[0] in ("displacement", "accuracy") else []
+    args = [command, *COMMANDS[command]]
+    args += ["--workers", "1"] if command in ("displacement", "accuracy") else []
     parts = []
     for after in (2, 1):
         with counted(of, name, after):
@@ -267,8 +269,29 @@ def test_a_command_that_goes_on_leaves_its_results_and_nothing_else(small):
     assert {p.name for p in small.iterdir()} == {*SMALL, "t.csv", "whole.csv"}
 
 
+def test_what_a_picture_is_of_is_kept_until_it_is_saved(small):
+    args = ["displacement", "heavy.toml", "--amplitudes", "0.5", "--plot", "d.png"]
+    heavy = VISCOUS.text + "[numerics]\nphases = 32\ncycles = 1\n[[effects]]\nkind = 'body-inertia'\n"
+    (small / "heavy.toml").write_text(heavy + "mass = 0.1\nfrequency = 0.5\nlength = 0.3\ndrag = 2.1\n")
+    with counted(plots, "save", 0):
+        code, _, err = geomech(*args, cwd=small)
+    assert code == 143 and " parts so far are kept in .d.png.partial: " in err
+    with counted(_Steps, "next") as calls:
+        assert geomech(*args, cwd=small)[0] == 0
+    assert calls == [] and (small / "d.png").exists() and not (small / ".d.png.partial").exists()
+
+
+def test_one_back_end_is_no_matter_of_the_clock():
+    for seconds in (0.1, 100.0):
+        takes = cost.Cost(99_999, seconds, 0.0)
+        assert not one_way(VISCOUS, takes) and one_way(VISCOUS, takes._replace(balances=100_000))
+        assert one_way(scenes.load("sandfish-heavy"), takes)
+
+
 def test_an_accuracy_that_goes_on_is_that_of_one_go(small, tmp_path, monkeypatch):
-    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 10)})
+    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 9)})
+    monkeypatch.setattr(walking, "FINEST", {"steps": 10})
+    monkeypatch.setattr(walking, "SETTLING", 1)
     for name, study in (("walk", walking), ("rod", intrusion)):
         scene, what = scenes.load(small / f"{name}.toml"), (study, "_answer")
         ask = lambda study=study, scene=scene: [line["error"] for line in study.study(scene)["lines"]]

@@ -30,6 +30,7 @@ HARD = (
     (np.zeros((0, 3)), 0.1 + 0.2, 7),
     np.array(2.5),
     (),
+    None,
 )
 
 

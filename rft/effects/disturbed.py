@@ -61,11 +61,15 @@ class DisturbedGround(Process):
         return state
 
     def numbers(self, state: Ground) -> tuple:
-        return state.value, state.owner.astype(float)  # 2^42 at most
+        """Of the cells that were marked, which are few."""
+        some = np.flatnonzero(state.owner >= 0)
+        cells = np.stack([some, state.owner.ravel()[some], state.value.ravel()[some]])  # owners are 2^42 at most
+        return state.sample.size, cells
 
     def state(self, numbers: tuple) -> Ground:
-        ground = Ground(self.radius / CELLS, numbers[0].shape[1])
-        ground.value, ground.owner = numbers[0], numbers[1].astype(np.int64)
+        samples, (some, owner, value) = numbers
+        ground, some = Ground(self.radius / CELLS, samples), some.astype(np.int64)
+        ground.owner.ravel()[some], ground.value.ravel()[some] = owner.astype(np.int64), value
         return ground
 
     def _points(self, site: Site) -> np.ndarray:
