@@ -6,6 +6,7 @@ import _thread
 import contextlib
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from queue import SimpleQueue
@@ -13,6 +14,7 @@ from queue import SimpleQueue
 import numpy as np
 
 NEVER = threading.Event()
+AGAIN = 1e-3  # s after which one that is stopped looks whether its threads have ended
 LARGE_BLOCK = 2**24  # bytes; glibc learns from blocks of up to 32 MB
 
 
@@ -61,26 +63,27 @@ def each(f: Callable, shares: list) -> None:
     its threads to wait for ever."""
     if len(shares) == 1:
         return f(shares[0], NEVER)
-    stop, ended, left = threading.Event(), SimpleQueue(), 0
+    stop, ended, begun, over = threading.Event(), SimpleQueue(), 0, []
     try:
         for share in shares:
-            _thread.start_new_thread(_told, (f, share, stop, ended))
-            left += 1
-        while left:
+            _thread.start_new_thread(_told, (f, share, stop, ended, over))
+            begun += 1
+        for _ in shares:
             error = ended.get()
-            left -= 1
             if error is not None:
                 raise error
     except BaseException:
         stop.set()
-        for _ in range(left):
-            ended.get()
+        while len(over) < begun:  # a signal may have come between what a thread said and our hearing it
+            time.sleep(AGAIN)
         raise
 
 
-def _told(f: Callable, share, stop: threading.Event, ended: SimpleQueue) -> None:
+def _told(f: Callable, share, stop: threading.Event, ended: SimpleQueue, over: list) -> None:
     try:
         f(share, stop)
         ended.put(None)
     except BaseException as error:
         ended.put(error)
+    finally:
+        over.append(share)

@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from geomech.study import accuracy, sweep
 from geomech.study.bench import Study
 from geomech.workers import processes
 from rft import backend
+from rft import workers as threaded
 from rft.workers import cores
 from rft.workers import workers as threads
 
@@ -307,3 +309,18 @@ def test_a_signal_at_any_moment_leaves_no_lock_held(monkeypatch):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monkeypatch):
+    """Between what the thread says and our hearing it: a queue that was emptied has nothing more to say."""
+
+    class Deaf(queue.SimpleQueue):
+        def get(self):
+            super().get()
+            raise terminal.Stopped(signal.SIGINT)
+
+    ended = []
+    monkeypatch.setattr(threaded, "SimpleQueue", Deaf)
+    with pytest.raises(terminal.Stopped):
+        threaded.each(lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5])
+    assert ended == [0]  # the others were told to stop
