@@ -15,7 +15,7 @@ from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech import terminal, workers
-from geomech.commands.asked import one_way
+from geomech.commands.asked import keeping, one_way
 from geomech.output import plots
 from geomech.study import cost, estimate, intrusion, motion, walking
 from geomech.study.parts import Parts, asking
@@ -286,6 +286,15 @@ def test_one_back_end_is_no_matter_of_the_clock():
         takes = cost.Cost(99_999, seconds, 0.0)
         assert not one_way(VISCOUS, takes) and one_way(VISCOUS, takes._replace(balances=100_000))
         assert one_way(scenes.load("sandfish-heavy"), takes)
+
+
+def test_what_is_too_small_to_be_kept_is_by_one_back_end_too(tmp_path, monkeypatch):
+    """What is small hangs on the clock, digits do not."""
+    monkeypatch.chdir(tmp_path)
+    for large, output in ((False, None), (True, None), (False, tmp_path / "f.csv")):
+        with keeping(VISCOUS, output, large, one_way=True, command="test"):
+            assert workers.settled_on() == "numpy"
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_an_accuracy_that_goes_on_is_that_of_one_go(small, tmp_path, monkeypatch):

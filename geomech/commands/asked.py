@@ -102,12 +102,11 @@ def keeping(scene, output: Path | None, large: bool = True, one_way: bool = Fals
                 stack.enter_context(kept.alone(place, "computation"))
                 partial = kept.beside(place, question)
                 refuse_inputs([partial], inputs(scene))
-        if partial is None:
+        kept_in = (lambda: Parts(partial, question)) if partial else contextlib.nullcontext
+        with kept_in() as parts, workers.keeping(parts), workers.one_way(workers.MANY * one_way):
             yield
-            return
-        with Parts(partial, question) as parts, workers.keeping(parts), workers.one_way(workers.MANY * one_way):
-            yield
-        partial.unlink(missing_ok=True)
+        if partial:
+            partial.unlink(missing_ok=True)
 
 
 def field(
