@@ -146,8 +146,7 @@ def _round_and_round(steps: _Steps, phases: int, cycles: int | None, with_work: 
     status = np.where(periodic, "periodic", "not periodic" if cycles is None else "running")
     status = np.where(worst <= steps.limit, status, "unconverged")
     whole = np.concatenate([*path, pose[-1:]]) if with_path else None
-    work = Work(*work) if with_work else None
-    return TimeSteps(xi, pose, worst, status, drift, done, work, whole)
+    return TimeSteps(xi, pose, worst, status, drift, done, Work(*work) if with_work else None, whole)
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -194,8 +193,7 @@ class _Steps:
         if self.heavy:  # a heavy body moves while its joints pause
             self.scales = np.broadcast_to(usual, speed.shape)
         self.step, self.pose, self.xi = 0, np.zeros((3, samples)), []
-        self.v, self.states, self.site = {}, [], None
-        self.limit, self.kept = 0.0, []
+        self.v, self.states, self.site, self.limit, self.kept = {}, [], None, 0.0, []
 
     def foreseen(self):
         """(velocity, pose) at the step to come, the velocity by straight extrapolation."""
@@ -223,11 +221,10 @@ class _Steps:
         unless asked for]."""
         sure, pieces, left = self.balance.backend != "auto" or bool(settled_on()), [], self.phases
         while left:
-            some = lambda left=left: (self._some(left, with_work), self.numbers())
-            found, numbers = in_turn.known("steps", some, lambda left=left: (left, self.numbers()), sure)
+            some, start = lambda: (self._some(left, with_work), self.numbers()), lambda: (left, self.numbers())
+            found, numbers = in_turn.known("steps", some, start, sure)
             self.go_on(numbers)
-            pieces.append(found)
-            left -= len(found[0])
+            pieces, left = [*pieces, found], left - len(found[0])
         *plain, work = zip(*pieces)
         return [*map(np.concatenate, plain), tuple(map(np.concatenate, zip(*work)))]
 
