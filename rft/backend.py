@@ -14,6 +14,7 @@ import atexit
 import contextlib
 import functools
 import importlib.util
+import math
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -26,6 +27,7 @@ from rft.contact import Model
 from rft.effects.base import Effect, Site, folded, pieced, under_way
 from rft.media.base import require, shown
 from rft.numbers import foreign
+from rft.workers import is_one_thread
 
 BACKENDS = ("auto", "numpy", "numba")
 TO_LOAD, LONG = 0.5, 3.0  # s of NumPy's work after which the compiled code is loaded, and is made
@@ -101,23 +103,33 @@ def foreign_to(medium, body: Body, effects: Sequence[Effect], loads: str):
 
 def counted(backend: str):
     """Count NumPy's work in the body of the statement, so that "auto" knows when compiled code pays: its own, not what it
-    waits for on a busy machine."""
-    counts = backend == "auto" and not AUTO.is_ready and not _settled.get()
-    return _counted() if counts else contextlib.nullcontext()
+    waits for on a busy machine. By itself what it works because that is settled, of which what follows must not know, but
+    where compiled code would have served it is made for the next time."""
+    settled = _settled.get()
+    if backend != "auto" or AUTO.is_ready or AUTO.worked < 0 or settled == "numba" or (settled and is_one_thread()):
+        return contextlib.nullcontext()
+    return _counted(bool(settled))
 
 
 @contextlib.contextmanager
-def _counted():
+def _counted(settled: bool):
     start = time.process_time()
     yield
-    AUTO.worked += time.process_time() - start
+    took = time.process_time() - start
+    if not settled:
+        AUTO.worked += took
+        return
+    AUTO.bore += took
+    if AUTO.bore > LONG:
+        AUTO.make()
 
 
 class Auto:
-    """What "auto" knows in this process. worked: s of NumPy's work; below 0 no compiled code is taken."""
+    """What "auto" knows in this process. worked: s of NumPy's work; below 0 no compiled code is taken. bore: s of what is
+    settled to be NumPy's, till the next look at whether there is compiled code."""
 
     def __init__(self):
-        self.worked, self.maker, self.is_ready = 0.0, None, False
+        self.worked, self.bore, self.maker, self.is_ready = 0.0, 0.0, None, False
 
     def ready(self, ahead: float = 0.0) -> bool:
         """Whether compiled code lies ready, and has been worth loading, or is for what lies ahead, s."""
@@ -128,9 +140,18 @@ class Auto:
         from rft import compiled  # which takes half a second
 
         self.is_ready = compiled.made()
-        if not self.is_ready and self.maker is None and self.worked > LONG and not _is_child():
-            self.maker = _started()
+        if not self.is_ready and self.worked > LONG:
+            self.make()
         return self.is_ready
+
+    def make(self) -> None:
+        """Have compiled code made, once, if there is none."""
+        self.bore = -math.inf
+        if self.maker is None and installed() and not _is_child():
+            from rft import compiled
+
+            if not compiled.made():
+                self.maker = _started()
 
 
 AUTO = Auto()

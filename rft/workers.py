@@ -45,6 +45,11 @@ def one_thread() -> Iterator[None]:
         _one.reset(token)
 
 
+def is_one_thread() -> bool:
+    """Whether it is told to."""
+    return _one.get()
+
+
 def workers(threads: int | None, useful: int) -> int:
     """How many threads to take of those allowed, by default one a core."""
     return 1 if useful < 2 or _one.get() else max(1, min(threads or cores(), useful))

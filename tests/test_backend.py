@@ -22,6 +22,7 @@ from rft.contact import Model
 from rft.media.base import TermLaw
 from rft.newton import Balance
 from rft.samples import Jacobian
+from rft.workers import one_thread
 
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
@@ -276,6 +277,23 @@ def test_auto_waits_for_no_compilation(auto):
     assert seen.started == 1
     seen.made, seen.going = True, False
     assert backend.takes("auto", model)
+
+
+def test_what_is_settled_on_numpy_has_compiled_code_made_for_the_next_time(auto, monkeypatch):
+    """Once, if it takes long, and by the command itself: its workers are many."""
+    fresh, seen = auto
+    monkeypatch.setattr(backend, "LONG", -1.0)
+    with backend.settled("numba"), backend.counted("auto"):
+        pass
+    with backend.settled("numpy"), one_thread(), backend.counted("auto"):
+        pass
+    assert seen.started == 0
+    monkeypatch.setattr(backend, "LONG", 0.0)
+    with backend.settled("numpy"):
+        for _ in range(2):
+            with backend.counted("auto"):
+                sum(range(10_000))
+    assert seen.started == 1 and fresh.worked == 0.0
 
 
 def test_a_maker_that_fails_is_not_started_again(auto):
