@@ -19,18 +19,20 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from geomech import __version__
 from geomech.kinds import code
-from geomech.scene.intruding import Intruding
 from geomech.scene.model import Scene
 from geomech.scene.read import inputs
-from geomech.scene.walker import WalkerScene
 from geomech.study import kept
 from geomech.workers.solving import SOLVER, settled_on
+
+if TYPE_CHECKING:
+    from geomech.scene.intruding import Intruding
+    from geomech.scene.walker import WalkerScene
 
 LARGEST = 1_000_000_000  # bytes of a file; what is beyond is computed again
 BACK_ENDS = ("", "numpy", "numba")
