@@ -225,16 +225,8 @@ def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
         slope = np.polyfit(np.log(settings), np.log(np.maximum(errors, 1e-15)), 1)[0] * (
             1 if name == "rounding" else -1
         )
-        lines.append(
-            {
-                "label": name,
-                "order": ORDERS[name],
-                "value": list(settings),
-                "error": errors,
-                "seconds": list(seconds),
-                "slope": float(slope),
-            }
-        )
+        line = {"label": name, "order": ORDERS[name], "value": list(settings), "error": errors}
+        lines.append({**line, "seconds": list(seconds), "slope": float(slope)})
     return {
         "scene": scene.name,
         "speed": walk.speed,
