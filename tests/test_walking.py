@@ -22,6 +22,7 @@ from rft.walking.limit import Found, Limit, _late, _Search, limit_cycle
 from rft.walking.march import step
 from rft.walking.planar import GRAVITY, State
 from rft.walking.planar_walk import _speed, _strides, again, walk
+from rft.walking.robot import parts
 from rft.walking.stride import from_rest, still_to_come
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -322,6 +323,34 @@ def test_the_estimate_covers_the_error():
     one = walking.walked([sandbot], settling=True)[0]
     truth = again([sandbot.walker], dataclasses.replace(sandbot.numerics, elements=32), [one.walk], 2)[0].speed
     assert 0.08 * truth < abs(one.walk.speed - truth) < one.estimate < 0.2 * truth
+
+
+def test_a_short_stance_has_steps_enough():
+    """The legs of Xplorer turn slowly in a fortieth of the half cycle, in which one step was all there was; half of the steps
+    then told nothing of that."""
+    for duty, few in ((0.05, 4), (0.9, 4), (0.375, 6)):
+        gait = Tripod(2.0, duty)
+        counts, half, twice = ([n for *_, n in parts(gait.kinks, steps)] for steps in (32, 16, 64))
+        assert min(counts) == few
+        assert [2 * n for n in half[::2]] == counts[::2] == [n / 2 for n in twice[::2]]
+    scene = dataclasses.replace(XPLORER, gait=dataclasses.replace(XPLORER.gait, duty=0.05))
+    one = walking.walked([scene], settling=True)[0]
+    truth = again([scene.walker], dataclasses.replace(scene.numerics, steps=96), [one.walk], 2)[0].speed
+    assert abs(one.walk.speed - truth) < one.estimate < 0.1 * truth
+
+
+def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
+    """Of half and three quarters of the steps the larger change counts, and that with twice the elements besides."""
+    other = lambda numerics: {16: 0.0, 24: 0.3, 32: 0.02 if numerics.elements == 24 else 0.0}[numerics.steps]
+    walk = types.SimpleNamespace(speed=1.0, drift=0.001, off=0.0)
+    how = types.SimpleNamespace(
+        walk=lambda *args, **more: [walk],
+        again=lambda w, numerics, *rest: [types.SimpleNamespace(speed=1.0 + other(numerics))],
+    )
+    monkeypatch.setattr(walking, "engine", lambda name: how)
+    numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
+    (one,) = walking.walked([dataclasses.replace(XPLORER, numerics=numerics)])
+    assert one.estimate == pytest.approx(0.001 + 0.3 + walking.TO_COME * 0.02)
 
 
 def test_trends_of_figure_12():

@@ -51,8 +51,9 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)
 
 
 class Walked(NamedTuple):
-    """walk: as rft has it. estimate: error of its speed, m/s: what half the steps change, `TO_COME` times what twice the
-    elements change, what is left to the limit, and what steps that are not solved move."""
+    """walk: as rft has it. estimate: error of its speed, m/s: what half or three quarters of the steps change, the larger, for
+    one alone may be small by chance; `TO_COME` times what twice the elements change; what is left to the limit, and what
+    steps that are not solved move."""
 
     walk: Walk
     estimate: float
@@ -66,14 +67,18 @@ def walked(
     numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
     told = {"progress": lambda done: progress(WALKING * done)} if progress else {}
     walks = how.walk(walkers, numerics, SETTLING if settling else None, **told)
-    error = np.array([w.drift + w.off for w in walks])
-    fewer, more = max(8, numerics.steps // 2), min(1000, 2 * numerics.elements)
-    for name, other, share in (("steps", fewer, 1.0), ("elements", more, TO_COME)):
-        refined = dataclasses.replace(numerics, **{name: other})
-        there = how.again(walkers, refined, walks, SETTLING if settling else None)
-        error = error + share * np.abs([a.speed - b.speed for a, b in zip(there, walks)])
+    others = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
+    others += [("elements", min(1000, 2 * numerics.elements))]
+    changes = []
+    for k, (name, other) in enumerate(others):
+        there = how.again(
+            walkers, dataclasses.replace(numerics, **{name: other}), walks, SETTLING if settling else None
+        )
+        changes.append(np.abs([a.speed - b.speed for a, b in zip(there, walks)]))
         if progress:
-            progress((1.0 + WALKING) / 2 if name == "steps" else 1.0)
+            progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
+    half, most, finer = changes
+    error = np.array([w.drift + w.off for w in walks]) + np.maximum(half, most) + TO_COME * finer
     return [Walked(w, float(e)) for w, e in zip(walks, error)]
 
 
@@ -116,7 +121,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     cycles = SETTLING if settling else numerics.duration * scene.gait.frequency
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = cycles + vain if vain else min(cycles, 2 * LIMIT + _speeding_up(scene))
-    steps, batches = (cycles + 2 * LIMIT) * numerics.steps, -(-count // together)
+    steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
     seconds = each * steps * (batches + (count - batches) * MORE)
     return Steps(round(steps * count), seconds, BASE)

@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
@@ -25,7 +24,7 @@ from rft.walking.engines import Fineness, Walker
 from rft.walking.facets import Grains
 from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
-from rft.walking.robot import rounded
+from rft.walking.robot import parts, rounded
 from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk
 
 REPEATED = (
@@ -101,8 +100,7 @@ class Course:
             self.machine.model, self.machine.surfaces, Grains(law, weak, walker.flux, numerics.rounding), self.clock
         )
         self.clock.place(self.body)
-        kinks = self.clock.kinks()
-        self.segments = [(a, b, max(1, round(numerics.steps * (b - a)))) for a, b in pairwise(kinks)]
+        self.segments = parts(self.clock.kinks(), numerics.steps)
         facets, data, root = self.body.facets, self.body.data, self.machine.root
         away = np.linalg.norm(data.xpos[facets.bodies] - data.xpos[root], axis=1)
         legs = facets.bodies != root

@@ -7,7 +7,9 @@ pitch has the nose down, and a leg that points down and turns at a positive rate
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +22,7 @@ MOST_HIPS = 20
 MASSES = (1e-6, 1e4)  # kg
 INERTIAS = (1e-12, 1e5)  # kg m^2
 FREQUENCIES = (1e-3, 200.0)  # Hz
+LEAST_PART = 1 / 8  # of a cycle, as which a shorter part of it counts: a robot may be driven in that alone
 SMALLEST = 1e-7  # m/s, that a rounding may be
 CREEP = 0.05  # of the speed of the legs' ends, that it may be: above it legs sink as they stand, the more the slower
 
@@ -72,6 +75,12 @@ class Tripod:
     def rate(self, of) -> np.ndarray:
         """rad a cycle, at the phase ``of``."""
         return leg_rate(of, self.duty, self.sweep)
+
+
+def parts(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
+    """(begin, end, time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, an eighth of them at least
+    in each part, however short, so that half of the steps are half of them there, too."""
+    return [(a, b, max(1, round(steps * max(b - a, LEAST_PART)))) for a, b in pairwise(kinks)]
 
 
 def leg_angle(phase, of, duty, sweep, middle) -> np.ndarray:

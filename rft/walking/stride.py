@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from rft.in_turn import known
 from rft.walking.march import march
 from rft.walking.planar import GRAVITY, Robots, State
-from rft.walking.robot import Robot, Tripod
+from rft.walking.robot import Robot, Tripod, parts
 
 # What a cycle's start may differ from the last one's, and from all to come, for the cycle to be repeated: of the speed of the
 # legs' ends, or of that of a fall for a cycle if that is less.
@@ -73,9 +72,9 @@ class Strides:
         self.top = height / 2
         self.out_of_reach = self.reach + np.hypot(*np.abs(robots.hips)).max(1) + height
         kinks = gaits[0].kinks if self.cycle == 2 else _whole(gaits[0].kinks)
-        parts = [np.linspace(a, b, max(1, round(steps * (b - a))) + 1) for a, b in pairwise(kinks)]
-        self.phases = np.concatenate([[0.0], *(x[1:] for x in parts)])
-        self.of = np.concatenate([np.full(len(x) - 1, (x[0] + x[-1]) / 2) for x in parts])
+        spans = [np.linspace(a, b, count + 1) for a, b, count in parts(kinks, steps)]
+        self.phases = np.concatenate([[0.0], *(x[1:] for x in spans)])
+        self.of = np.concatenate([np.full(len(x) - 1, (x[0] + x[-1]) / 2) for x in spans])
 
     def run(self, state: State, stride: int, which: np.ndarray) -> tuple[np.ndarray, State]:
         """The next stride of these samples: (phases (S,), states (S, B) after each step); who is at an end stays there."""
