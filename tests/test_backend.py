@@ -42,7 +42,8 @@ def test_the_same_answers(name):
     """To 1e-10. A link of a millionth, or twelve that lie upon each other, make a balance so badly conditioned at the usual
     regularisation that its residual leaves the sixth digit open; there at a wider one."""
     body = (BODIES | STRANGE_BODIES)[name]
-    cases, alpha, alphadot = hard(body.joints)
+    some = slice(None, None, 1 if body.joints < 5 else 3)
+    cases, alpha, alphadot = (x[some] for x in hard(body.joints))
     for medium in MEDIA.values():
         for regularisation in (1e-6, 1e-3)[: 1 + (name in ILL_CONDITIONED)]:
             given = {"regularisation": regularisation}

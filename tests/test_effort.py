@@ -104,7 +104,6 @@ def test_errors_cover_four_times_as_many_phases():
     "effect",
     [
         BodyInertia(mass=1.5, frequency=1 / (2 * np.pi), length=1.0, drag=1.0),
-        Transient(0.05),
         DisturbedGround(0.1, 0.6),
     ],
     ids=lambda e: e.kind,
