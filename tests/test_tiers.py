@@ -179,10 +179,10 @@ def judged(estimates, errors):
 
 
 def test_direct_estimates_cover_the_truth(truths):
-    """240 random scenes against 2048 phases at a regularisation of 1e-9: covered in 95 %, ten times too large at most in
+    """160 random scenes against 2048 phases at a regularisation of 1e-9: covered in 95 %, ten times too large at most in
     the median; positions and headings."""
     rng, estimates, errors = np.random.default_rng(7), [], []
-    for _ in range(240):
+    for _ in range(160):
         some = random_scene(rng)
         loads = ("exact", "exact", "midpoint:20")[rng.integers(3)]
         coarse = some.with_numerics(loads=loads, regularisation=10.0 ** rng.uniform(-6, -3))
@@ -235,10 +235,10 @@ def test_no_estimate_is_below_rounding():
 
 
 def test_estimates_of_refinement_are_neither_short_nor_long():
-    """Where phases are all that is left, one error in twenty comes near its estimate: error over estimate, 50 random dry
+    """Where phases are all that is left, one error in twenty comes near its estimate: error over estimate, 30 random dry
     scenes at three amplitudes against eight times the phases."""
     rng, ratios = np.random.default_rng(21), []
-    while len(ratios) < 50:
+    while len(ratios) < 30:
         some = random_scene(rng).with_numerics(regularisation=1e-8)
         if some.system.linear:
             continue
