@@ -83,9 +83,9 @@ class BodyInertia(Process):
 class Momentum(PerSample):
     """The term inertia x unit x (M xi + held) at one step.
 
-    M: (3, 3, B), the mass matrix per unit mass, and held: (3, B), what the change of shape comes to with the frame held, by the
-    backward difference: momenta x rate (1/rad) - pasts, (3, n, B), what earlier ones contribute, over the ground. pose: (3, B),
-    from which they are seen.
+    The backward difference is rate (1/rad) x momenta - pasts, (3, n, B), what earlier ones contribute, over the ground; pose:
+    (3, B), from which they are seen. M: (3, 3, B), rate x the mass matrix, and held: (3, B), the difference with the frame
+    held, both per unit mass.
     """
 
     inertia: np.ndarray | float
