@@ -1,4 +1,4 @@
-"""The README's strip of pictures: the butterfly gait in loose glass, on the ground and on the CCF map."""
+"""A strip of pictures: the butterfly gait in loose glass, on the ground and on the CCF map."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ def test_the_command_prints_them_all_or_a_section(capsys):
 def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
     family = kinds.FAMILIES["geomech.media"].kinds
     monkeypatch.setattr(kinds, "_code", {})
-    section = (ROOT / "README.md").read_text().partition("## Laws, bodies")[2]
+    section = (ROOT / "geomech" / "scene" / "README.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"
     path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
     try:

@@ -30,7 +30,7 @@ from rft.contact import SIDE
 from rft.effects import Effect
 from rft.media.base import TermLaw, is_rate_independent
 
-README = (pathlib.Path(__file__).parents[1] / "README.md").read_text()
+PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
 
 
@@ -79,8 +79,8 @@ SCENE = """[medium]\nlaw = "thick"\nthickness = 3.0\n[body]\nkind = "chain"\nlen
 [gait]\nkind = "circle"\ncentre = [0.2, -0.1]\n[numerics]\ngrid = 7\nphases = 32\n"""
 
 
-def test_the_law_of_the_readme_runs_as_it_stands_there(tmp_path, capsys, monkeypatch):
-    section = README.partition("## Laws, bodies")[2].partition("\n## ")[0]
+def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, capsys, monkeypatch):
+    section = PAGE.partition("## Laws, bodies")[2].partition("\n## ")[0]
     (law,), scene = re.findall(r"```python\n(.*?)```", section, re.S), re.search(r"```toml\n(.*?)```", section, re.S)[1]
     assert len(law.splitlines()) == 15
     monkeypatch.chdir(tmp_path)

@@ -2,7 +2,6 @@
 
 import ast
 import pathlib
-import re
 
 import mutants
 
@@ -97,52 +96,3 @@ def test_mutants_are_programs_that_differ():
 def test_a_command_is_the_function_of_its_file():
     files = {p.stem for p in (ROOT / "geomech" / "commands").glob("*.py")} - {"__init__", "asked", "names", "options"}
     assert files == set(COMMANDS)
-
-
-PAGES = [ROOT / "README.md"] + sorted(p for top in ("rft", "geomech") for p in (ROOT / top).rglob("README.md"))
-
-
-def prose(page):
-    """Lines of a page outside of its blocks of code, without code within them."""
-    text = re.sub(r"(?ms)^```.*?^```$", "", page.read_text(encoding="utf-8"))
-    return re.sub(r"`[^`]*`", lambda code: code[0].strip("`") if "](" not in code[0] else "", text)
-
-
-def anchors(page):
-    """GitHub's anchors of the headings of a page; two headings of one name would have the same here."""
-    titles = re.findall(r"^#+ (.+)$", prose(page), re.M)
-    found = [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles]
-    assert len(set(found)) == len(found), page
-    return set(found)
-
-
-def links(page):
-    """Targets of the links and pictures of a page within the repository, as (file, anchor)."""
-    for target in re.findall(r"\]\(([^)]+)\)", prose(page)):
-        if not re.match(r"[a-z]+:", target):
-            path, _, anchor = target.partition("#")
-            yield (page.parent / path).resolve() if path else page, anchor
-
-
-def test_links_and_pictures_of_all_pages_lead_somewhere():
-    assert len(PAGES) > 13
-    headings = {page: anchors(page) for page in PAGES}
-    found = [(page, *link) for page in PAGES for link in links(page)]
-    assert len(found) > 80
-    broken = [(page.relative_to(ROOT), path, anchor) for page, path, anchor in found
-              if not path.is_file() or (anchor and anchor not in headings.get(path, ()))]  # fmt: skip
-    assert broken == []
-
-
-def test_the_readme_leads_to_every_page_and_each_leads_back():
-    assert set(PAGES[1:]) - {path for path, _ in links(PAGES[0])} == set()
-    assert [page for page in PAGES[1:] if (PAGES[0], "what-it-does") not in links(page)] == []
-
-
-def test_every_picture_is_shown_on_a_page_and_pages_are_no_wider_than_code():
-    shown = {path for page in PAGES for path, _ in links(page)}
-    assert set((ROOT / "figures").glob("*.png")) <= shown
-    wide = [(page.relative_to(ROOT), line) for page in PAGES for line in
-            re.sub(r"(?ms)^```.*?^```$", "", page.read_text(encoding="utf-8")).splitlines()
-            if len(line) > 120 and not line.startswith(("|", "!["))]  # fmt: skip
-    assert wide == []

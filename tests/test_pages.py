@@ -1,0 +1,174 @@
+"""The pages: README, CONTRIBUTING and those beside the code: links, pictures, commands and code, as they stand there."""
+
+import itertools
+import math
+import pathlib
+import re
+import shlex
+
+import pytest
+import typer
+
+from geomech import cli
+from geomech.commands import names
+from geomech.scene import parse
+from rft.media import CATALOGUE
+from rft.vertical import VERTICAL
+
+ROOT = pathlib.Path(__file__).parents[1]
+README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"
+PAGES = [README, CONTRIBUTING] + sorted(p for top in ("rft", "geomech") for p in (ROOT / top).rglob("README.md"))
+SHIPPED = {*names.scene_names(), *names.intruder_names(), *names.walker_names(), *CATALOGUE, *VERTICAL, "dem-rod-drag"}
+COMMANDS = typer.main.get_command(cli.app).commands
+NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
+
+
+def text(page):
+    return page.read_text(encoding="utf-8")
+
+
+def blocks(page, language=""):
+    """Blocks of code on a page whose first line is ```language."""
+    return [code for first, code in re.findall(r"(?ms)^```(\w*)\n(.*?)^```$", text(page)) if first == language]
+
+
+def prose(page):
+    """Lines of a page outside of its blocks of code, without code within them."""
+    outside = re.sub(r"(?ms)^```.*?^```$", "", text(page))
+    return re.sub(r"`[^`]*`", lambda code: code[0].strip("`") if "](" not in code[0] else "", outside)
+
+
+def anchors(page):
+    """GitHub's anchors of the headings of a page; two headings of one name would have the same here."""
+    titles = re.findall(r"^#+ (.+)$", prose(page), re.M)
+    found = [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles]
+    assert len(set(found)) == len(found), page
+    return set(found)
+
+
+def links(page):
+    """Targets of the links and pictures of a page within the repository, as (file, anchor)."""
+    for target in re.findall(r"\]\(([^)]+)\)", prose(page)):
+        if not re.match(r"[a-z]+:", target):
+            path, _, anchor = target.partition("#")
+            yield (page.parent / path).resolve() if path else page, anchor
+
+
+def commands(page):
+    """Command lines of geomech on a page, as words: of blocks, of tables and in sentences; templates with their brackets."""
+    code = [line for language in ("", "sh") for block in blocks(page, language) for line in block.splitlines()]
+    inline = re.findall(r"`([^`]+)`", re.sub(r"(?ms)^```.*?^```$", "", text(page)))
+    for line in code + [" ".join(x.split()).replace("\\|", "|") for x in inline]:
+        line = line.removeprefix("$ ")
+        if re.match(r"(\.venv/bin/)?geomech [a-z]+( |$)", line):
+            for one in re.split(r" && ", line):
+                yield shlex.split(one.partition(" > ")[0], comments=True)[1:]
+
+
+def test_links_and_pictures_of_all_pages_lead_somewhere():
+    assert len(PAGES) > 18
+    headings = {page: anchors(page) for page in PAGES}
+    found = [(page, *link) for page in PAGES for link in links(page)]
+    assert len(found) > 110
+    broken = [(page.relative_to(ROOT), path, anchor) for page, path, anchor in found
+              if not path.is_file() or (anchor and anchor not in headings.get(path, ()))]  # fmt: skip
+    assert broken == []
+
+
+def test_the_readme_leads_to_every_page_and_each_leads_back():
+    assert set(PAGES[1:]) - {path for path, _ in links(README)} == set()
+    assert [page for page in PAGES[1:] if (README, "pages") not in links(page)] == []
+
+
+def test_every_picture_is_shown_on_a_page_and_pages_are_no_wider_than_code():
+    shown = {path for page in PAGES for path, _ in links(page)}
+    assert set((ROOT / "figures").glob("*.png")) <= shown
+    wide = [(page.relative_to(ROOT), line) for page in PAGES for line in
+            re.sub(r"(?ms)^```.*?^```$", "", text(page)).splitlines()
+            if len(line) > 120 and not line.startswith(("|", "!["))]  # fmt: skip
+    assert wide == []
+
+
+def test_no_paragraph_and_no_row_stands_on_two_pages():
+    seen = {}
+    for page in PAGES:
+        for part in re.split(r"\n\n+|\n(?=\|)", text(page)):
+            if len(part) > 100 and not part.startswith("!["):
+                seen.setdefault(" ".join(part.split()), []).append(page.relative_to(ROOT))
+    assert [pages for pages in seen.values() if len(pages) > 1] == []
+
+
+def test_the_readme_is_short_and_begins_with_what_installs_and_what_tests():
+    assert len(text(README).splitlines()) <= 200
+    install, suite, tries = blocks(README, "sh")
+    assert "pip install -q . &&" in install and "geomech run -o results" in install
+    assert "pip install -q -e '.[test]' &&" in suite and suite.endswith("-m pytest -q\n")
+    assert len(install.splitlines()) == len(suite.splitlines()) == 1
+    assert [line.split()[1] for line in tries.splitlines()] == ["displacement", "ccf", "animate", "scenes"]
+
+
+def test_commands_on_all_pages_exist_with_their_options_and_names():
+    found = [(page.relative_to(ROOT), line) for page in PAGES for line in commands(page)]
+    assert len(found) > 80
+    assert {line[0] for _, line in found} == set(COMMANDS)
+    for page, (name, *words) in found:
+        options = {option for x in COMMANDS[name].params for option in x.opts + x.secondary_opts} | {"--plugin"}
+        for word in words:
+            for option in re.findall(r"(?:^|(?<=[\[|]))--?[a-z][\w-]*", word):
+                assert option in options, (page, name, word)
+        if words and re.fullmatch(r"[a-z][\w-]+", words[0]) and COMMANDS[name].params[0].name in ("scene", "medium"):
+            assert words[0] in SHIPPED, (page, name, words)
+
+
+def ran(capsys, *argv):
+    with pytest.raises(SystemExit) as left:
+        cli.main(list(argv))
+    return left.value.code, *capsys.readouterr()
+
+
+# They draw for seconds each: test_cli.py runs them; their options and names are looked up above.
+DRAWN = {"run", "ccf", "animate"}
+TYPED = [line for line in commands(README) if len(line) > 1 and line[0] not in DRAWN
+         and not any(re.search(r"\b[A-Z]{3,}\b", word) for word in line)]  # fmt: skip
+
+
+def test_most_of_what_the_readme_says_to_type_is_run():
+    some = {"displacement", "calibrate", "connection", "optimize", "symbolic", "intrude", "walk", "explain", "sweep"}
+    assert len(TYPED) > 11 and some <= {line[0] for line in TYPED}
+
+
+@pytest.mark.parametrize("line", TYPED, ids=" ".join)
+def test_what_the_readme_says_to_type_runs(line, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = ran(capsys, *line)
+    assert code == 0, err
+    files = {word for option, word in itertools.pairwise(line) if option in ("-o", "--plot")}
+    assert (out or files) and files == {p.name for p in tmp_path.iterdir()}
+
+
+def test_the_scene_of_the_readme_runs(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (scene,) = blocks(README, "toml")
+    assert len([line for line in scene.splitlines() if line]) <= 10
+    parse(scene)
+    (tmp_path / "mine.toml").write_text(scene)
+    code, out, _ = ran(capsys, "displacement", "mine.toml", "--amplitudes", "1", "--methods", "direct")
+    assert code == 0
+    assert "speed (BL/s) at 0.5 Hz" in out
+
+
+WITH_PYTHON = {page.parent.relative_to(ROOT).as_posix(): page for page in PAGES if blocks(page, "python")}
+
+
+@pytest.mark.parametrize("page", WITH_PYTHON.values(), ids=WITH_PYTHON)
+def test_python_on_all_pages_runs(page, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for code in blocks(page, "python"):
+        exec(code, {"__name__": "page"})
+    if page == README:
+        (said,) = blocks(page)
+        out = capsys.readouterr().out
+        assert re.sub(NUMBER, "#", out) == re.sub(NUMBER, "#", said)
+        for ours, theirs in zip(re.findall(NUMBER, out), re.findall(NUMBER, said)):
+            assert math.isclose(float(ours), float(theirs), rel_tol=1e-4), (ours, theirs)
+        assert (tmp_path / "swimmer.png").stat().st_size > 10_000
