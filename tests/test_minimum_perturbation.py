@@ -204,7 +204,7 @@ def test_its_file_and_pictures(tmp_path):
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert (pose.units, file.frame) == (b"m (x, y), rad (theta)", b"minimum-perturbation")
-    fig = plots.frame_figure(scene.system.field.field, "m")
+    fig = plots.frame_figure(scene.system.field.field)
     assert [ax.get_ylabel() for ax in fig.axes[3:]] == ["x (m)", "y (m)", "heading (rad)"]
     for k, ax in enumerate(fig.axes[:3]):
         drawn = np.reshape(np.ma.getdata(ax.collections[0].get_array()), (15, 15)).T

@@ -63,7 +63,8 @@ def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
     count, how = tier.directions(system, numerics), (system.halved, system.singularity)
-    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how)
+    more = {"unit": system.unit, "length": system.length}
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how, **more)
 
 
 def shapes(system, numerics, directions: int = 0) -> int:
