@@ -12,6 +12,7 @@ from geomech.field import Field
 from geomech.gaits import Ellipse
 from geomech.output import plots, sweeps
 from geomech.output.plots.precision import KNOBS as PRECISION
+from geomech.output.plots.precision import PANELS
 from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
 from geomech.tiers import TIERS
@@ -281,6 +282,20 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     many["units"] = {"estimate": "BL"}
     drawn = [sweeps.draw(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
     assert drawn == ["o", "None"]
+
+
+def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
+    """As of systems that no setting approximates: warnings are errors here."""
+    line = {"tier": "direct", "knob": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
+    for against, title in PANELS.items():
+        for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
+            fig = plots.work_precision_figure(
+                {"lines": [{**line, "error": error, "against": against}], "amplitudes": [1.0]}
+            )
+            plots.save(fig, tmp_path / "a.png")
+            (ax,) = fig.axes
+            assert (ax.get_title(), ax.get_ylabel(), ax.get_yscale()) == (*title, "log")
+            np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
 
 
 def test_the_work_precision_diagram_says_what_its_lines_are():
