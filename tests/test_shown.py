@@ -22,7 +22,7 @@ from geomech.study import sweep
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
-from geomech.systems import NoSlipSnake, Swimmer
+from geomech.systems import NoSlipSnake, Plain, Swimmer
 from rft.media import CATALOGUE
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
@@ -234,9 +234,8 @@ def test_what_leaves_the_library_has_one_unit_and_says_it(length):
     assert every.to_xarray().estimate.units == every.to_xarray().length.units == "m"
 
 
-@pytest.mark.parametrize("length", [0.42, 7.5])
-def test_fields_carry_their_unit_and_figures_take_it_from_them(length):
-    made, _ = of_length(length)
+def test_fields_carry_their_unit_and_figures_take_it_from_them():
+    made, length = of_length(0.42)[0], 0.42
     fitted, frame = made.fitted, made.in_frame("minimum-perturbation")
     for value in (
         fitted, fitted.field, fitted.half(0), made.curvature, made.curvature_error, made.two_form.field, frame.fitted,
@@ -257,6 +256,24 @@ def test_fields_carry_their_unit_and_figures_take_it_from_them(length):
     data = fitted.to_xarray()
     assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
     assert made.curvature.to_xarray().units == "m rad-2 (x, y), rad rad-2 (theta)"
+
+
+class Kept(Plain):
+    """A system of a user's own that keeps a connection, of which it alone says the unit."""
+
+    kind, joints, length = "kept", 2, 0.42
+
+    def stored(self, name):
+        axes = connection.grid(2, 7, 1.0)
+        return connection.fit(self.velocity, axes) if name == "connection" else None
+
+    def velocity(self, alpha, alphadot):
+        return 0.1 * alphadot[..., :1] * [1.0, 0.5, 0.2] + np.sin(alpha[..., :1]) * alphadot[..., 1:] * [0.1, 0.3, 0.5]
+
+
+def test_a_kept_connection_has_the_unit_of_its_system():
+    kept = Study(Scene(Kept(), Circle(amplitude=0.5), Numerics(phases=16)))
+    assert (kept.fitted.unit, kept.fitted.length, kept.curvature.unit) == ("m", 0.42, "m")
 
 
 def test_no_unit_is_made_up():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -117,7 +118,7 @@ class Path(Tier):
 
     def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
-            return own
+            return own if own.length else replace(own, unit=system.unit, length=system.length)
         return system.fitted(
             axes(system, numerics), self.directions(system, numerics), numerics.interpolation, progress
         )
