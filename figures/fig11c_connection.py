@@ -15,13 +15,13 @@ def compute(scene: str = "three-link-glass", **numerics) -> dict:
     loaded = load(scene).with_numerics(**numerics)
     fitted = Study(loaded).fitted
     misfit = np.sqrt((fitted.residual**2).mean((1, 2)) / (fitted.speed**2).mean((1, 2)))
-    return {"connection": fitted, "misfit": misfit, "gait": loaded.gait, "unit": loaded.system.unit}
+    return {"connection": fitted, "misfit": misfit, "gait": loaded.gait}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(4.2, 3.4)
-    ax = plots.vector_field(numbers["connection"], 0, numbers["unit"], axes[0, 0])
+    ax = plots.vector_field(numbers["connection"], 0, ax=axes[0, 0])
     plots.draw_gait(numbers["gait"], ax, color="#D55E00")
     return fig
 

@@ -14,13 +14,13 @@ def compute(scene: str = "three-link-glass", **numerics) -> dict:
     loaded = load(scene).with_numerics(**numerics)
     study = Study(loaded)
     fields = {"ccf": study.curvature, "error": study.curvature_error}
-    return {**fields, "gaits": [loaded.gait, Butterfly()], "unit": loaded.system.unit}
+    return {**fields, "gaits": [loaded.gait, Butterfly()]}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(4.2, 3.4)
-    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], numbers["unit"], axes[0, 0], numbers["error"])
+    plots.ccf_map(numbers["ccf"], 0, numbers["gaits"], ax=axes[0, 0], error=numbers["error"])
     return fig
 
 

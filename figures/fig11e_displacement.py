@@ -20,14 +20,14 @@ def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> 
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
     study = Study(loaded)
     tables = {name: study.study(a, METHODS, GAITS[name]) for name, a in amplitudes.items()}
-    return {"tables": tables, "unit": loaded.system.unit}
+    return {"tables": tables}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(7.2, 3.9, len(numbers["tables"]))
     for ax, (name, table) in zip(axes[0], numbers["tables"].items()):
-        plots.displacement(table, numbers["unit"], ax, gait=GAITS[name], errors=False)
+        plots.displacement(table, ax=ax, gait=GAITS[name], errors=False)
     return fig
 
 

@@ -57,9 +57,9 @@ def reach(gait) -> float:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.0, 3.3, len(numbers))
     for ax, (medium, found) in zip(axes[0], numbers.items()):
-        plots.ccf_map(found["ccf"], 0, (), "BL", ax)
+        plots.ccf_map(found["ccf"], ax=ax)
         ax.set_title(medium)
-        ax.collections[0].colorbar.set_label(r"CCF (BL/rad$^2$)")
+        ax.collections[0].colorbar.set_label(rf"CCF ({found['ccf'].unit}/rad$^2$)")
         for aim, colour in AIMS.items():
             best = found[aim].best
             net = float(np.hypot(*best.displacement[:2]))

@@ -14,9 +14,9 @@ def compute() -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(10.8, 3.7, 3)
     field, study = numbers["map"], numbers["tables"]
-    plots.ccf_map(field["ccf"], 0, field["gaits"], field["unit"], axes[0, 0], field["error"])
+    plots.ccf_map(field["ccf"], 0, field["gaits"], ax=axes[0, 0], error=field["error"])
     for ax, (name, table) in zip(axes[0, 1:], study["tables"].items()):
-        plots.displacement(table, study["unit"], ax, gait=fig11e_displacement.GAITS[name], errors=False)
+        plots.displacement(table, ax=ax, gait=fig11e_displacement.GAITS[name], errors=False)
     return fig
 
 

@@ -7,7 +7,7 @@ table from an experiment. It should be odd and homogeneous in alphadot, so that 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from geomech import summary, workers
 from geomech.errors import is_whole, number, real_array, short
-from geomech.field import Field, as_axes, half_of
+from geomech.field import UNTOLD, Field, as_axes, half_of
 from geomech.images import Image, images, to_solve
 from geomech.velocity import Telling, Velocity, evaluate, tried
 
@@ -24,22 +24,26 @@ EVEN = 1e-6  # of the largest velocity: a solver's rounding is below it
 SAMPLES_TOGETHER = 25_000  # velocities asked for in one call: enough to fill the solver, few enough to share out
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Connection:
-    """A on a grid. A: (3, d, N_1, ..., N_d), xi = + A alphadot, in the velocity's units and frame.
+    """A on a grid. A: (3, d, N_1, ..., N_d), xi = + A alphadot, in the velocity's frame.
     residual: (3, N_1, ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1;
     speed: (3, N_1, ..., N_d), rms of xi itself. degree: of the interpolating spline. All are nan at grid points that are
-    singular, or have a neighbour beyond singular shapes."""
+    singular, or have a neighbour beyond singular shapes. unit: of lengths, "BL" (body lengths) or "m". length: of the body in
+    that unit; None where nothing says it."""
 
     axes: tuple[np.ndarray, ...]
     A: np.ndarray
     residual: np.ndarray
     speed: np.ndarray
     degree: int = 3
+    _: KW_ONLY
+    unit: str = UNTOLD
+    length: float | None = None
 
     def __repr__(self) -> str:
         gone = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
-        size = f"A {summary.spans(self.A)}; {summary.left(self.residual, self.speed)}"
+        size = f"A {summary.spans(self.A)}; {summary.left(self.residual, self.speed)}{summary.lengths(**self.size)}"
         return f"Connection({summary.grid(self.axes)}{gone}; {size})"
 
     def _repr_html_(self) -> str:
@@ -47,17 +51,21 @@ class Connection:
 
         return display.connection(self)
 
-    def to_xarray(self, unit: str = "BL", shapes: Sequence[str] = ()):
-        """A Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`. unit: of lengths, "BL"
-        or "m". shapes: names of the shape variables, where these are no joint angles. ImportError without the package
-        xarray."""
+    def to_xarray(self, *, shapes: Sequence[str] = ()):
+        """A Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`. shapes: names of the
+        shape variables, where these are no joint angles. ImportError without the package xarray."""
         from geomech.output import datasets
 
-        return datasets.connection(self, unit, shapes)
+        return datasets.connection(self, shapes)
+
+    @property
+    def size(self) -> dict:
+        """Its unit and length, as arguments of another connection or of a field."""
+        return {"unit": self.unit, "length": self.length}
 
     @cached_property
     def field(self) -> Field:
-        return Field(self.axes, self.A, self.degree)
+        return Field(self.axes, self.A, self.degree, **self.size)
 
     def __call__(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes alpha (..., d); ValueError outside the grid."""
@@ -70,7 +78,7 @@ class Connection:
     def half(self, first: int) -> Connection:
         """The connection on every second point of each axis from ``first``, and on both ends (`field.half_of`)."""
         axes, arrays, degree = half_of(self.axes, (self.A, self.residual, self.speed), self.degree, first)
-        return Connection(axes, *arrays, degree)
+        return Connection(axes, *arrays, degree, **self.size)
 
     @classmethod
     def load(cls, path: str | Path, sign: str = "", order: str = "") -> Connection:
@@ -239,6 +247,8 @@ def fit(
     singularity: Callable | None = None,
     trusted: bool = False,
     reversible: bool = False,
+    unit: str = UNTOLD,
+    length: float | None = None,
 ) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
@@ -250,15 +260,16 @@ def fit(
 
     A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
+    unit, length: of lengths in the velocity, and of the body, as `Connection` keeps them.
     """
     axes = as_axes(axes)
     check_knobs(degree, progress)
-    unit = directions(len(axes), count)
+    rates = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
         velocity = tried(velocity, axes, singularity is not None)
-    keep = least_squares(unit)
-    known = mirror, singularity, reversible
-    return Connection(axes, *sampled(velocity, axes, unit, keep, degree, progress, *known), degree)
+    keep, known = least_squares(rates), (mirror, singularity, reversible)
+    found = sampled(velocity, axes, rates, keep, degree, progress, *known)
+    return Connection(axes, *found, degree, unit=unit, length=length)
 
 
 def fitted_at(velocity: Velocity, joints: int, count: int, degree_one: bool = False) -> Callable:

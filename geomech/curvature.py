@@ -10,6 +10,8 @@ much, so that no sign is read into noise.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from geomech.connection import Connection
@@ -49,9 +51,9 @@ def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
     if isinstance(connection, Tube) and connection.field.joints == 2:
         known = connection.known.ccf if (i, j) == (0, 1) else lambda shapes: -connection.known.ccf(shapes)
-        return Field(connection.axes, connection.at_grid(known), connection.degree)
+        return Field(connection.axes, connection.at_grid(known), connection.degree, **connection.size)
     values = exterior_derivative(connection, i, j) + lie_bracket(connection, i, j)
-    return Field(connection.axes, values, connection.degree)
+    return Field(connection.axes, values, connection.degree, **connection.size)
 
 
 def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
@@ -67,13 +69,13 @@ def error(connection: Connection, i: int = 0, j: int = 1) -> Field:
 
     whole = ccf(connection, i, j)  # refuses what has none
     if isinstance(connection, Tube) and connection.field.joints == 2:
-        return Field(connection.axes, connection.at_grid(connection.known.ccf_error), connection.degree)
+        return replace(whole, values=connection.at_grid(connection.known.ccf_error))
     if whole.masked:
         return _at_halves(connection, whole, i, j)
     shapes = np.stack(np.meshgrid(*connection.axes, indexing="ij"), -1)
     halves = (np.moveaxis(ccf(connection.half(first), i, j)(shapes), -1, 0) for first in (0, 1))
     apart = np.maximum(*(np.abs(half - whole.values) for half in halves))
-    return Field(connection.axes, maximum_filter(apart, (1, *(3,) * len(connection.axes))), connection.degree)
+    return replace(whole, values=maximum_filter(apart, (1, *(3,) * len(connection.axes))))
 
 
 def _at_halves(connection: Connection, whole: Field, i: int, j: int) -> Field:
@@ -86,4 +88,4 @@ def _at_halves(connection: Connection, whole: Field, i: int, j: int) -> Field:
         off = np.abs(ccf(connection.half(first), i, j).values - whole.values[picks])
         apart[picks] = np.fmax(apart[picks], off)
     worst = maximum_filter(apart, (1, *(3,) * len(connection.axes)))
-    return Field(connection.axes, np.where(np.isnan(whole.values), np.nan, worst), connection.degree)
+    return replace(whole, values=np.where(np.isnan(whole.values), np.nan, worst))

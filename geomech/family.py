@@ -30,7 +30,7 @@ from geomech.reconstruct import displacement, turning
 from rft import se2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Family:
     """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending, 0 among them. xi: (M, N, 3),
     body velocity with respect to phase at N equally spaced phases. Either side of 0 has a spline of its own: rates that

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,19 +12,25 @@ import numpy as np
 from geomech import summary
 from geomech.errors import number, real_array, short
 
+UNTOLD = "length"  # stands for the unit of lengths where nothing says it
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Field:
     """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
     components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
 
     degree: of the spline through them; interpolation is of order degree + 1 in the spacing where the function is
-    smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection.
+    smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection. unit: of the lengths among
+    the values, "BL" (body lengths) or "m". length: of the body in that unit; None where nothing says it.
     """
 
     axes: tuple[np.ndarray, ...]
     values: np.ndarray
     degree: int = 3
+    _: KW_ONLY
+    unit: str = UNTOLD
+    length: float | None = None
 
     def __post_init__(self):
         object.__setattr__(self, "axes", as_axes(self.axes))
@@ -41,19 +47,25 @@ class Field:
         flat = self.values.reshape(-1, *self.values.shape[len(lead) :])
         size = summary.spans(self.values) if lead == (3,) else summary.span(self.values)
         what = "x".join(map(str, lead)) or "one"
-        return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; values {size})"
+        told = f"values {size}{summary.lengths(**self.size)}"
+        return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; {told})"
 
     def _repr_html_(self) -> str:
         from geomech.output import display
 
         return display.field(self)
 
-    def to_xarray(self, name: str = "ccf", unit: str = "BL", shapes: Sequence[str] = ()):
-        """A DataArray; of three components it is taken for a CCF, with its units. unit: of lengths, "BL" or "m". shapes: names
-        of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+    def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()):
+        """A DataArray; of three components it is taken for a CCF, with its units. shapes: names of the shape variables, where
+        these are no joint angles. ImportError without the package xarray."""
         from geomech.output import datasets
 
-        return datasets.field(self, name, unit, shapes)
+        return datasets.field(self, name, shapes)
+
+    @property
+    def size(self) -> dict:
+        """Its unit and length, as arguments of another field."""
+        return {"unit": self.unit, "length": self.length}
 
     @property
     def joints(self) -> int:

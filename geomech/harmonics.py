@@ -31,7 +31,7 @@ from geomech.field import Field, as_axes, half_of
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Harmonics:
     """Coefficients on a grid. coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in the
     velocity's units and frame; of more joints (3, terms, N_1, ..., N_d), of `powers`. residual: (3, N_1, ..., N_d), rms over

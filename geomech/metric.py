@@ -30,7 +30,7 @@ from geomech.gaits.base import checked_gait
 Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Metric:
     """M on a grid. M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline."""
 
@@ -53,7 +53,7 @@ class Metric:
         return _indicatrix(self, alpha, count)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Finsler:
     """F on a grid, for two joints, by its even harmonics in the direction of alphadot. coefficients: (K + 1, N_1, N_2),
     the mean, then cosine and sine of 2 beta, 4 beta ... K beta. residual: (N_1, N_2), rms over directions of what is left."""

@@ -28,7 +28,7 @@ ROUNDING = 1e-10  # of A^theta: above what the linear solve leaves of a gradient
 TOLERANCE, STEPS = 1e-12, 1000  # of conjugate gradients: residual over the right side; some twenty steps are usual
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """A body frame in another one, over shape space. field: values (3, N_1, ..., N_d), its pose h = (x, y, theta), in the
     unit of length of the connection it was made for and rad. residual: of the linear systems, over their right sides."""

@@ -12,7 +12,7 @@ import numpy as np
 from geomech.connection import Connection, Velocity, as_axes, directions, least_squares, sampled_on
 from geomech.curvature import ccf, error
 from geomech.errors import is_whole, real_array, short
-from geomech.field import Field
+from geomech.field import UNTOLD, Field
 from geomech.gaits import Gait
 from geomech.images import mirrored
 from geomech.tube import Tube
@@ -20,7 +20,7 @@ from geomech.tube import Tube
 IN_PLANE = 1e-9  # rad that the joints which are held may move
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plane:
     """pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape that it goes through, rad. connection:
     of these two joints, columns of the least-squares A of all d."""
@@ -45,7 +45,7 @@ class Plane:
         return [k for k in range(len(self.at)) if k not in self.pair]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """A gait of many joints as it is seen on a plane, along the joints that are held there."""
 
@@ -83,6 +83,9 @@ def plane(
     progress: Callable | None = None,
     mirror: bool = False,
     singularity: Callable | None = None,
+    *,
+    unit: str = UNTOLD,
+    length: float | None = None,
 ) -> Plane:
     """The plane of two joints, ``axes`` of each, through the shape ``at`` (d,). Other arguments as in `connection.fit`, whose A
     it has: fitted over all directions of alphadot, the others' too."""
@@ -92,10 +95,11 @@ def plane(
     pair = checked_pair(pair, len(at))
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
     alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
-    unit = directions(len(at), count)
+    rates = directions(len(at), count)
     alike = mirrored(alpha.reshape(-1, len(at)), count) if mirror else ()
-    A, residual, speed = sampled_on(velocity, alpha, unit, least_squares(unit), progress, alike, singularity)
-    return Plane(pair, tuple(at.tolist()), Connection(axes, A[:, list(pair)], residual, speed, degree))
+    A, residual, speed = sampled_on(velocity, alpha, rates, least_squares(rates), progress, alike, singularity)
+    found = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
+    return Plane(pair, tuple(at.tolist()), found)
 
 
 def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
@@ -119,4 +123,4 @@ def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
         for x in (fitted.residual, fitted.speed)
     ]
     residual, speed = (np.moveaxis(f(alpha)[..., :3], -1, 0) for f in left)
-    return Plane(pair, tuple(at.tolist()), Connection(axes, A, residual, speed, fitted.degree))
+    return Plane(pair, tuple(at.tolist()), Connection(axes, A, residual, speed, fitted.degree, **fitted.size))

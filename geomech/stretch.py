@@ -22,7 +22,7 @@ STEPS, TOLERANCE = 200, 1e-12  # of the least squares; relative change of the su
 NODES = np.polynomial.legendre.leggauss(3)  # along an edge
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stretch:
     """u over shape space. field: values (2, N_1, N_2), in units of path length, 0 in the middle of the grid and turned by
     nothing on the whole. distortion: (N_1, N_2), rms of |du| / F - 1 over the edges at each shape; rms, largest: of all

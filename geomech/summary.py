@@ -52,6 +52,13 @@ def _percent(x: float) -> str:
     return f"{100 * x:.2g} %" if x > 1e-8 else "0 %"
 
 
+def lengths(unit: str, length: float | None) -> str:
+    """The unit of lengths and the body's length, to be added; empty where nothing says them."""
+    if length is None:
+        return ""
+    return f"; lengths in {unit}" + (f", the body's {length:g}" if unit != "BL" else "")
+
+
 def poses(values) -> str:
     """The ranges of x, y and theta of poses or velocities (..., 3)."""
     return spans(np.moveaxis(np.round(np.asarray(values, float).reshape(-1, 3), 12) + 0.0, -1, 0))

@@ -287,11 +287,13 @@ def grid_of(known: Known, points: int) -> tuple[np.ndarray, ...]:
     return tuple(np.linspace(a, b, points) for a, b in zip(low, high))
 
 
-def tube(known: Known, axes: Sequence[np.ndarray], residual: np.ndarray) -> Tube:
-    """On a grid, nan where the data do not reach. residual: (3,), what the fit leaves of xi for |alphadot| = 1."""
+def tube(known: Known, axes: Sequence[np.ndarray], residual: np.ndarray, unit: str, length: float) -> Tube:
+    """On a grid, nan where the data do not reach. residual: (3,), what the fit leaves of xi for |alphadot| = 1. unit, length:
+    as of `Connection`."""
     axes = tuple(axes)
     shapes = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     A = np.moveaxis(known.reached(shapes), (-2, -1), (0, 1))
     masked = np.isnan(A[:, 0])
     left = np.where(masked, np.nan, residual.reshape(3, *[1] * len(axes)))
-    return Tube(axes, A, left, np.sqrt((A**2).mean(1) + left**2), min(3, min(map(len, axes)) - 1), known)
+    speed, degree = np.sqrt((A**2).mean(1) + left**2), min(3, min(map(len, axes)) - 1)
+    return Tube(axes, A, left, speed, degree, known, unit=unit, length=length)

@@ -16,7 +16,7 @@ grid of 2,401 with quintic splines 11 %; within 1.2 rad 0.5 to 1 %, and 0.1 to 0
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ from rft import se2
 RADII = 6  # nodes of Gauss's rule along a cone
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TwoForm:
     """CCF_ij of all pairs i < j. field: values (pairs, 3, N_1, ..., N_d). pairs: of joints, from 0, in the field's order."""
 
@@ -50,7 +50,7 @@ class TwoForm:
             raise ValueError(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
         sign = 1.0 if i < j else -1.0
         values = sign * self.field.values[self.pairs.index((min(i, j), max(i, j)))]
-        return Field(self.field.axes, values, self.field.degree)
+        return replace(self.field, values=values)
 
     def slice(self, i: int, j: int, at) -> Field:
         """CCF_ij over the plane of joints i and j through the shape ``at`` (d,): a field of two joints, to be drawn."""
@@ -58,7 +58,7 @@ class TwoForm:
         axes = self.field.axes[i], self.field.axes[j]
         shapes = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
         shapes[..., i], shapes[..., j] = np.meshgrid(*axes, indexing="ij")
-        return Field(axes, np.moveaxis(self.pair(i, j)(shapes), -1, 0), self.field.degree)
+        return replace(self.field, axes=axes, values=np.moveaxis(self.pair(i, j)(shapes), -1, 0))
 
     @property
     def joints(self) -> int:
@@ -90,7 +90,7 @@ def _of_pairs(made: Callable, connection: Connection) -> TwoForm:
     if not pairs:
         raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
     values = np.stack([made(connection, i, j).values for i, j in pairs])
-    return TwoForm(Field(connection.axes, values, connection.degree), pairs)
+    return TwoForm(replace(connection.field, values=values), pairs)
 
 
 class Spanned(NamedTuple):

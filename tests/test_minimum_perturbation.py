@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from test_cli import geomech
 
 from geomech import connection, coordinates, curvature
 from geomech import scene as scenes
@@ -181,6 +182,29 @@ def test_a_scene_in_it(law):
     assert scene.system.with_solver(tolerance=1e-8).inner.solver.tolerance == 1e-8
 
 
+def test_it_stands_wherever_any_frame_stands(tmp_path):
+    """Above all tables, in [body], in [system] and its body; two that contradict each other are refused."""
+    above = SCENE.format(law="viscous", numbers=LAWS["viscous"]).replace("grid = 15", "grid = 7")
+    line, _, bare = above.partition("\n")
+    scene = scenes.parse(above)
+    within = bare.replace('kind = "chain"', f'kind = "chain"\n{line}')
+    for text in (within, above.replace('kind = "chain"', f'kind = "chain"\n{line}')):
+        found = scenes.parse(text)
+        assert found == scene and found.frame == "minimum-perturbation" and scenes.parse(scenes.toml(found)) == scene
+    nested = within.replace("[medium]", "[system.medium]").replace("[body]", "[system.body]")
+    assert scenes.parse('[system]\nkind = "swimmer"\n' + nested) == scene
+    afloat = '[system]\nkind = "floating-chain"\n{}\n[gait]\nkind = "circle"\n[numerics]\ngrid = 7\n'
+    assert scenes.parse(afloat.format(line)) == scenes.parse(f"{line}\n{afloat.format('')}")
+    for frame in ("mean", "link-2"):
+        with pytest.raises(
+            SceneError, match=rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'"
+        ):
+            scenes.parse(f'frame = "{frame}"\n{within}')
+    (tmp_path / "a.toml").write_text(within)
+    code, out, err = geomech("explain", "a.toml", cwd=tmp_path)
+    assert (code, err) == (0, "") and "seen from its minimum-perturbation frame" in out
+
+
 def test_no_such_frame_where_there_is_none():
     for extra, said in (
         ('[[effects]]\nkind = "transient"\ntravel = 0.1\n', "transient"),
@@ -204,7 +228,7 @@ def test_its_file_and_pictures(tmp_path):
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)
         assert (pose.units, file.frame) == (b"m (x, y), rad (theta)", b"minimum-perturbation")
-    fig = plots.frame_figure(scene.system.field.field, "m")
+    fig = plots.frame_figure(scene.system.field.field)
     assert [ax.get_ylabel() for ax in fig.axes[3:]] == ["x (m)", "y (m)", "heading (rad)"]
     for k, ax in enumerate(fig.axes[:3]):
         drawn = np.reshape(np.ma.getdata(ax.collections[0].get_array()), (15, 15)).T

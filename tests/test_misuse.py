@@ -1,7 +1,11 @@
 """Slips that are likely: of unit, sign and size, and what a velocity of one's own lacks."""
 
+import copy
+import dataclasses
+import importlib
 import json
 import math
+import pkgutil
 import warnings
 
 import numpy as np
@@ -9,20 +13,50 @@ import pytest
 from registry import MEDIA
 from test_cli import geomech
 
+import geomech as geomech_package
 from geomech import connection, curvature
 from geomech import scene as scenes
 from geomech.errors import SceneError, UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.output.explain import explain
-from geomech.scene import Scene
+from geomech.scene import Numerics, Scene
+from geomech.stretch import stretch
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.systems import NoSlipSnake, Swimmer
-from rft import Backbone, Chain, Coulomb, Serpenoid, Viscous
+from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 
-VISCOUS = scenes.load("three-link-viscous")
+VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
 PLAIN = '[medium]\nlaw = "granular"\nC = 1.8\ngamma0_deg = 13.8\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n'
 DIRECT = ["--methods", "direct", "--json"]
+
+
+def test_effects_in_a_list_are_those_in_a_tuple():
+    """Tables are kept under the system, by its hash."""
+    listed, made = (Swimmer(GLASS, Chain(), effects=kind([EndCaps(0.06)])) for kind in (list, tuple))
+    assert listed == made and hash(listed) == hash(made) and listed.effects == (EndCaps(0.06),)
+    found = [
+        Study(Scene(s, Circle(), Numerics(grid=7, phases=16))).study([0.5], ["path", "direct"]) for s in (listed, made)
+    ]
+    assert found[0]["path"] == found[1]["path"] and found[0]["direct"] == found[1]["direct"]
+
+
+def test_results_are_equal_to_themselves_alone_and_have_a_hash():
+    """Those that hold arrays, of which == is no single answer."""
+    study = Study(VISCOUS.with_numerics(grid=7, phases=16))
+    glass = Study(scenes.load("three-link-glass").with_numerics(grid=7, phases=16, harmonics=3, curves=4))
+    for value in (
+        study.fitted, study.curvature, study.two_form, study.plane((0, 1)), study.metric, glass.metric, stretch(study.metric),
+        glass.table("harmonic"), glass.table("adapted"), study.in_frame("minimum-perturbation").scene.system.field,
+    ):  # fmt: skip
+        same, other = copy.copy(value), copy.deepcopy(value)
+        assert (value == value) is True and (value == same) is False and (value != other) is True
+        assert len({value, same, value}) == 2
+    for module in pkgutil.walk_packages(geomech_package.__path__, "geomech."):
+        if not module.name.endswith("__main__"):
+            for kind in vars(importlib.import_module(module.name)).values():
+                if dataclasses.is_dataclass(kind) and any("ndarray" in str(f.type) for f in dataclasses.fields(kind)):
+                    assert kind.__eq__ is object.__eq__, kind
 
 
 def scene(folder, text, name="s.toml"):

@@ -12,6 +12,7 @@ from geomech.field import Field
 from geomech.gaits import Ellipse
 from geomech.output import plots, sweeps
 from geomech.output.plots.precision import KNOBS as PRECISION
+from geomech.output.plots.precision import PANELS
 from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
 from geomech.tiers import TIERS
@@ -43,8 +44,8 @@ def label_of(ax):
 @pytest.mark.parametrize("component", [0, 1, 2])
 def test_arrows_are_the_row_asked_for(component):
     A = np.random.default_rng(0).normal(size=(3, 2, 11, 9))
-    found = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]))
-    ax = plots.vector_field(found, component, "m", every=2)
+    found = Connection(AXES, A, np.abs(A[:, 0]), np.abs(A[:, 0]), unit="m")
+    ax = plots.vector_field(found, component, every=2)
     arrows = only(ax, Quiver)
     x, y = (s[1::2, 1::2] for s in SHAPES)
     np.testing.assert_allclose(arrows.get_offsets(), np.stack([x.ravel(), y.ravel()], -1))
@@ -57,11 +58,11 @@ def test_arrows_are_the_row_asked_for(component):
 def test_the_map_of_a_field_lies_as_the_field(component):
     """Mesh, line of zeros, hatching and gait of a field that is no mirror image of itself."""
     plane = SHAPES[0] + 2 * SHAPES[1]
-    field = Field(AXES, np.stack([plane, 3 * plane, -plane]))
+    field = Field(AXES, np.stack([plane, 3 * plane, -plane]), unit="m")
     error = Field(AXES, np.where(SHAPES[1] > 1.2, 50.0, 1e-3) * np.ones((3, 1, 1)))
     gait = Ellipse(centre=(0.2, 0.5), semi_axes=(0.6, 0.2), tilt=0.4)
-    plain = plots.ccf_map(field, component, unit="m")
-    ax = plots.ccf_map(field, component, [gait], "m", error=error)
+    plain = plots.ccf_map(field, component)
+    ax = plots.ccf_map(field, component, [gait], error=error)
     x, y, values = mesh(ax)
     np.testing.assert_allclose(values, (1, 3, -1)[component] * (x + 2 * y))
     assert only(ax, QuadMesh).get_clim() == pytest.approx((-np.abs(values).max(), np.abs(values).max()))
@@ -181,10 +182,10 @@ def test_modes_are_named_on_the_axes():
     fitted = Connection(AXES, np.ones((3, 2, 11, 9)), SHAPES[0], SHAPES[0])
     for axes, bar in (
         (plots.ccf_figure(field, labels=system.shape_labels).axes[:3], None),
-        (plots.ccf_figure(field, labels=labels).axes[:3], "(BL/(deg m))"),
+        (plots.ccf_figure(field, labels=labels).axes[:3], "(length/(deg m))"),
         (
             plots.connection_figure(fitted, labels=labels).axes[:3],
-            "(BL/deg)",
+            "(length/deg)",
         ),
     ):
         expected = names if bar is None else ["bend (deg)", "roll (m)"]
@@ -210,8 +211,14 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
     label, direct, area, error = LINES[quantity]
     table = {"amplitude": [0.5, 1.0], "direct": [[-0.3, 0.4, 0.1], [0.6, 0.8, 9.0]], "area": [[0.0, 1.0, 0], [2, 0, 0]]}
     both = lambda x: {"direct": [x, x], "area": [x, x]}
-    table |= {"estimate": both(0.25), "estimate_heading": both(0.3), "medium_error_of": {quantity: [0.2, 0.4]}}
-    ax = plots.displacement(table, "m", gait=Ellipse(), quantity=quantity, length=2.0)
+    table |= {
+        "units": dict.fromkeys(("x", "y", "net_distance"), "m"),
+        "body_length": 2.0,
+        "estimate": both(0.5),
+        "estimate_heading": both(0.3),
+        "medium_error_of": {quantity: [0.2, 0.4]},
+    }
+    ax = plots.displacement(table, gait=Ellipse(), quantity=quantity)
     lines = {line.get_label(): line for line in ax.lines}
     for tier, values in (("direct", direct), ("area", area)):
         np.testing.assert_allclose(lines[TIERS[tier].label].get_xydata(), np.transpose([[0.5, 1.0], values]))
@@ -227,7 +234,7 @@ def test_lines_of_displacement_are_a_quantity_of_each_tier(quantity):
 def test_four_quantities_and_the_speed():
     glass = scenes.load("three-link-viscous").changed(gait=Ellipse(frequency=2.5))
     table = Study(glass).study([0.5, 1.0], ["direct"])
-    fig = plots.displacement_figure({"ellipse": table}, "BL", [glass.gait])
+    fig = plots.displacement_figure({"ellipse": table}, [glass.gait])
     assert [ax.get_ylabel() for ax in fig.axes] == [f"{q} per cycle ({u})" for q, u in (
         ("x", "BL"), ("y", "BL"), ("heading", "rad"), ("net distance", "BL"))]  # fmt: skip
     (right,) = fig.axes[3].child_axes
@@ -248,6 +255,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     moved[..., 0] = [[1, -2], [3, 4], [5, 6]]
     errors = np.ones((3, 2)), np.ones((3, 2))
     results = {"over": over, "displacement": moved, "estimate": errors[0], "estimate_heading": errors[1]}
+    results["units"] = {"estimate": "m"}
     ax = sweeps.draw(scene, results).axes[0]
     x, y, values = mesh(ax)
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
@@ -261,7 +269,8 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     np.testing.assert_allclose(x[0], [0.5, 1.0, 1.5])
     np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
     np.testing.assert_allclose(values, np.array([[4, 3], [6, 5], [-2, 1]]).T)
-    one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.1, 0.2])}
+    one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.2, 1.0])}
+    one["units"] = {"estimate": "m"}
     ax = sweeps.draw(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
     np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]])  # m
@@ -270,8 +279,23 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 3], [5, -8]])
     assert ax.get_ylabel() == "speed (m/s), backwards < 0"
     many = {"over": {"medium.C": np.arange(60.0)}, "displacement": np.ones((60, 3)), "estimate": np.ones(60)}
+    many["units"] = {"estimate": "BL"}
     drawn = [sweeps.draw(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
     assert drawn == ["o", "None"]
+
+
+def test_a_work_precision_diagram_has_no_empty_axes_and_takes_errors_of_0(tmp_path):
+    """As of systems that no setting approximates: warnings are errors here."""
+    line = {"tier": "direct", "knob": "phases", "value": [16, 64, 128], "seconds": [0.1, 0.3, 0.5], "slope": None}
+    for against, title in PANELS.items():
+        for error in ([1e-3, 1e-5, 0.0], [0.0, 0.0, 0.0]):
+            fig = plots.work_precision_figure(
+                {"lines": [{**line, "error": error, "against": against}], "amplitudes": [1.0]}
+            )
+            plots.save(fig, tmp_path / "a.png")
+            (ax,) = fig.axes
+            assert (ax.get_title(), ax.get_ylabel(), ax.get_yscale()) == (*title, "log")
+            np.testing.assert_array_equal(ax.lines[0].get_ydata(), np.maximum(error, 1e-17))
 
 
 def test_the_work_precision_diagram_says_what_its_lines_are():
@@ -381,7 +405,7 @@ def test_a_row_of_rounding_has_no_arrows():
 def test_what_is_nothing_but_rounding_is_drawn_as_nothing(name, rows):
     """No patterns of 1e-16, no hatching over them; the strip of a motion shows what there is."""
     study = Study(scenes.load(name).with_numerics(grid=9, phases=16))
-    made = plots.ccf_figure(study.curvature, [study.scene.gait], "BL", study.curvature_error)
+    made = plots.ccf_figure(study.curvature, [study.scene.gait], error=study.curvature_error)
     for k in range(3):
         colours = np.asarray(made.axes[k].collections[0].get_array())
         assert (np.abs(colours).max() > 1e-3) == (k in rows)

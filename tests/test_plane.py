@@ -120,7 +120,7 @@ def test_the_area_of_three_joints_is_the_integral_over_a_surface():
     assert (spread > 1e-4).all() and turned.max() < 1e-12
     assert (np.array(table["estimate"]["area"]) >= spread).all()
     off = np.array(table["area"]) - table["direct"]
-    np.testing.assert_allclose(table["estimate"]["area"], np.hypot(*off[:, :2].T) / 0.5, rtol=1e-6)
+    np.testing.assert_allclose(table["estimate"]["area"], np.hypot(*off[:, :2].T), rtol=1e-6)
     np.testing.assert_allclose(off[:, 2], 0.0, atol=1e-12)
     small = study.study([0.05, 0.1], ["area"])["estimate"]["area"]
     assert np.log2(small[1] / small[0]) == pytest.approx(3.0, abs=0.15)
@@ -140,7 +140,7 @@ def test_the_spread_is_that_of_another_surface():
             for i, j in ((0, 1), (0, 2), (1, 2)):
                 total += (system.ccf(where, i, j) * (u[:, i] * v[:, j] - u[:, j] * v[:, i])[:, None]).mean(0)
         found.append(se2.exp(2 * np.pi * total / 40))
-    apart = max(np.hypot(*(x - found[-1])[:2]) for x in found) / 0.5
+    apart = max(np.hypot(*(x - found[-1])[:2]) for x in found)
     assert study.choice("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
     np.testing.assert_allclose(study.displacement("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
 
@@ -150,13 +150,13 @@ def test_commands_tell_the_surface_and_draw_slices(tmp_path):
     args = ("displacement", "s.toml", "--amplitudes", "0.5,1", "--methods")
     code, out, err = geomech(*args, "area,direct", "--json", cwd=tmp_path)
     table = json.loads(out)
-    assert (code, err) == (0, "") and table["units"]["surface_spread"] == "BL"
+    assert (code, err) == (0, "") and table["units"]["surface_spread"] == "m"
     spread = table["surface_spread"]["area"]
     assert 0 < spread[0] < spread[1] < table["estimate"]["area"][1]
     lines = geomech(*args, "area", cwd=tmp_path)[1].splitlines()
     at = next(k for k, line in enumerate(lines) if line.startswith("area: over a cone from the loop's mean shape"))
     assert lines[at + 1].split()[:3] == ["amplitude", "position", "(m)"]
-    assert float(lines[at + 3].split()[1]) == pytest.approx(0.5 * spread[1], rel=0.06)
+    assert float(lines[at + 3].split()[1]) == pytest.approx(spread[1], rel=0.06)
     code, _, err = geomech("ccf", "s.toml", "--plot", "a.svg", "--pair", "3,1", "--slice", "20deg", cwd=tmp_path)
     assert (code, err) == (0, "") and "0.349 rad" in (tmp_path / "a.svg").read_text()
     code, _, err = geomech("connection", "s.toml", "-o", "a.nc", "--plot", "b.svg", "--pair", "2,3", cwd=tmp_path)
@@ -350,7 +350,7 @@ def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatc
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
     monkeypatch.setattr(report, "_save", lambda fig, stem: drawn.update({stem.name: fig}))
     for name in ("plane_connection_figure", "planes_figure"):
-        monkeypatch.setattr(report.plots, name, lambda planes, *told: [one.pair for one in planes])
+        monkeypatch.setattr(report.plots, name, lambda planes, *gait, labels: [one.pair for one in planes])
     monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told: [*tables])
     found = report.write(Study(scene), tmp_path, None)
     pairs = [(0, 1), (0, 2), (1, 2)]

@@ -42,7 +42,7 @@ def test_a_study_has_every_tier_its_errors_and_times(name):
     table = study.study(amplitudes, study.methods)
     named = ["x", "y", "heading", "net_distance"]
     errors = ["estimate", "estimate_heading"]
-    assert [*table] == ["amplitude", *study.methods, *errors, *named, "units", "seconds", "kept"]
+    assert [*table] == ["amplitude", *study.methods, *errors, *named, "body_length", "units", "seconds", "kept"]
     assert table["amplitude"] == amplitudes
     for method in study.methods:
         np.testing.assert_allclose(table[method], study.displacement(method, None, amplitudes), atol=1e-9)

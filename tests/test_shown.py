@@ -2,6 +2,7 @@
 
 import base64
 import builtins
+import inspect
 import json
 import pickle
 import re
@@ -13,6 +14,7 @@ import xarray
 from registry import SYSTEMS
 
 import rft
+from geomech import connection, curvature
 from geomech.gaits import Circle, Ellipse
 from geomech.output import netcdf, plots, sweeps
 from geomech.scene import Numerics, Scene, load
@@ -20,7 +22,7 @@ from geomech.study import sweep
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
-from geomech.systems import NoSlipSnake, Swimmer
+from geomech.systems import NoSlipSnake, Plain, Swimmer
 from rft.media import CATALOGUE
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
@@ -129,14 +131,14 @@ def test_results_remain_dicts(study, table, swept):
     assert isinstance(table, dict) and json.loads(json.dumps(table)) == dict(table)
     again = pickle.loads(pickle.dumps(table))
     assert again == table and again.scene == study.scene
-    assert set(swept) == {"over", "displacement", "estimate", "estimate_heading"}
+    assert set(swept) == {"over", "displacement", "estimate", "estimate_heading", "length", "units"}
 
 
 def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
     netcdf.save_connection(tmp_path / "a.nc", study)
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         xarray.testing.assert_identical(study.to_xarray(), data.load())
-        for mine in (study.fitted.to_xarray("m"), study.curvature.to_xarray(unit="m").to_dataset()):
+        for mine in (study.fitted.to_xarray(), study.curvature.to_xarray().to_dataset()):
             assert {"A", "fit_residual", "speed"} == set(mine) or {"ccf"} == set(mine)
             for name in mine:
                 xarray.testing.assert_identical(mine[name], data[name])
@@ -161,11 +163,136 @@ def test_displacements_as_a_data_set(study, table):
     assert data.displacement.sel(tier="area", amplitude=1.0, component="y") == table["area"][1][1]
     np.testing.assert_array_equal(data.estimate.sel(tier="direct"), table["estimate"]["direct"])
     np.testing.assert_array_equal(data.estimate_heading.sel(tier="area"), table["estimate_heading"]["area"])
-    assert data.displacement.units == "m (x, y), rad (theta)" and data.estimate.units == "body length"
+    assert data.displacement.units == "m (x, y), rad (theta)" and data.estimate.units == "m"
     assert data.amplitude.long_name == GAIT.amplitude_label and data.attrs["frame"] == "link-1"
     one = cheapest(study.scene, [0.5, 1.0], 1e-2)
     assert one.to_xarray().tier.values == [one["tier"]]
     assert "displacement per cycle" in repr(one) and one["tier"] in one._repr_html_()
+
+
+def of_length(length):
+    """Studies and their tables, of the same swimmer and gait with a frequency in an uncertain medium, but for its length."""
+    sand = rft.Granular(C=1.5, gamma0=0.22, covariance=((0.02, 0.001), (0.001, 0.002)))
+    gait = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2), frequency=2.5)
+    body = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=length)
+    made = Study(Scene(Swimmer(sand, body), gait, Numerics(grid=7, extent=2.0, phases=32)))
+    return made, made.study([0.5, 1.0], ["area", "path", "direct"])
+
+
+def law_of_units(values, units, plain, length, key=""):
+    """values (...) in ``units`` are those of a body of length 1 times its length, once for each m; the rest are the same."""
+    if isinstance(values, dict):
+        assert values.keys() == plain.keys()
+        for name, x in values.items():
+            law_of_units(x, units, plain[name], length, name)
+        return
+    times = [length if u.partition("/")[0] == "m" else 1.0 for u in np.atleast_1d(units)]
+    tolerance = 1e-6 if key != "direct" else 1e-9
+    np.testing.assert_allclose(values, np.array(plain) * (times if len(times) > 1 else times[0]), tolerance, 1e-13)
+
+
+@pytest.mark.parametrize("length", [0.42, 7.5])
+def test_what_leaves_the_library_has_one_unit_and_says_it(length):
+    """Of a body of another length than 1: every number of a table, of a sweep and of their data sets is in the unit that is
+    told beside it, and these units are one, but for speeds in body lengths; so are pictures and what a notebook shows."""
+    (one, plain), (made, table) = of_length(1.0), of_length(length)
+    units, no_units = table["units"], {"units", "seconds", "kept", "medium_error_rule", "area", "path", "direct"}
+    lengths = {u for u in units.values() if "m" in u.split("/")[0].split() or "BL" in u}
+    assert lengths == {"m", "m/s", "BL/s"} and [k for k, u in units.items() if u == "BL/s"] == ["speed_body_lengths"]
+    assert table["body_length"] == length and plain["units"]["estimate"] == "BL"
+    for key in set(table) - no_units - {"medium_error_of", "amplitude"}:
+        law_of_units(table[key], units[key], plain[key], length)
+    for key in ("area", "path", "direct"):
+        law_of_units(table[key], ["m", "m", "rad"], plain[key], length)
+    for key in ("x", "y", "net_distance", "heading"):
+        law_of_units(table["medium_error_of"][key], units[key], plain["medium_error_of"][key], length)
+
+    data = table.to_xarray()
+    assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
+    assert {v.units for v in data.data_vars.values()} == {
+        "m", "rad", "m (x, y), rad (theta)", "m s-1", "body length s-1", "rad s-1"
+    }  # fmt: skip
+    cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", table._repr_html_())
+    assert cells[2:8] == ["x (m)", "y (m)", "heading (rad)", "error (m)", "error of heading (rad)", "medium (m)"]
+    assert float(cells[15]) == pytest.approx(table["estimate"]["area"][0], rel=0.06)
+
+    drawn = plots.displacement_figure({"ellipse": table}, [made.scene.gait]).axes[0]
+    bars = [c for c in drawn.collections if hasattr(c, "get_segments")]
+    halves = [[np.ptp(s[:, 1]) / 2 for s in c.get_segments()] for c in bars]
+    np.testing.assert_allclose(halves, [table["estimate"][tier] for tier in ("area", "path", "direct")], rtol=1e-6)
+    assert drawn.get_ylabel() == "x per cycle (m)"
+
+    over = {"gait.amplitude": [0.5, 1.0], "medium.C": [1.5]}
+    swept, unswept = (sweep.sweep(s.scene, over) for s in (made, one))
+    assert swept["units"]["estimate"] == "m" and (swept["length"] == length).all() and "m, rad" in repr(swept)
+    for key, unit in swept["units"].items():
+        law_of_units(swept[key], unit, unswept[key], length)
+    every = sweep.sweep(one.scene, {"body.length": [1.0, length], "gait.amplitude": [0.5]})
+    assert every["units"]["displacement"] == ["m", "m", "rad"]  # though the scene itself has no size
+    np.testing.assert_allclose(every["estimate"][1], swept["estimate"][:1, 0], rtol=1e-6)
+    np.testing.assert_array_equal(every["length"], [[1.0], [length]])
+    assert every.to_xarray().estimate.units == every.to_xarray().length.units == "m"
+
+
+def test_fields_carry_their_unit_and_figures_take_it_from_them():
+    made, length = of_length(0.42)[0], 0.42
+    fitted, frame = made.fitted, made.in_frame("minimum-perturbation")
+    for value in (
+        fitted, fitted.field, fitted.half(0), made.curvature, made.curvature_error, made.two_form.field, frame.fitted,
+        frame.curvature, frame.scene.system.field.field, made.plane((0, 1)).connection, made.plane((1, 0)).ccf,
+        made.two_form.slice(0, 1, [0.1, 0.2]), pickle.loads(pickle.dumps(fitted)),
+    ):  # fmt: skip
+        assert (value.unit, value.length) == ("m", length)
+        assert repr(value).endswith(f"; lengths in m, the body's {length:g})")
+    labels = [ax.get_ylabel() for ax in plots.ccf_figure(made.curvature).axes[3:]]
+    assert [x.partition("(")[2] for x in labels] == ["m/rad$^2$)", "m/rad$^2$)", "rad/rad$^2$)"]
+    labels = [ax.get_ylabel() for ax in plots.connection_figure(fitted).axes[3:]]
+    assert [x.partition("(")[2] for x in labels] == ["m/rad)", "m/rad)", "rad/rad)"]
+    for draw in (plots.ccf_map, plots.ccf_contours, plots.ccf_surface):
+        ax = draw(made.curvature)
+        told = [ax.get_title(), *(x.get_ylabel() for x in ax.figure.axes), getattr(ax, "get_zlabel", str)()]
+        assert sum("(m/rad$^2$)" in x for x in told) == 1, told
+    assert "(m)" in plots.frame_figure(frame.scene.system.field.field).axes[3].get_ylabel()
+    data = fitted.to_xarray()
+    assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
+    assert made.curvature.to_xarray().units == "m rad-2 (x, y), rad rad-2 (theta)"
+
+
+class Kept(Plain):
+    """A system of a user's own that keeps a connection, of which it alone says the unit."""
+
+    kind, joints, length = "kept", 2, 0.42
+
+    def stored(self, name):
+        axes = connection.grid(2, 7, 1.0)
+        return connection.fit(self.velocity, axes) if name == "connection" else None
+
+    def velocity(self, alpha, alphadot):
+        return 0.1 * alphadot[..., :1] * [1.0, 0.5, 0.2] + np.sin(alpha[..., :1]) * alphadot[..., 1:] * [0.1, 0.3, 0.5]
+
+
+def test_a_kept_connection_has_the_unit_of_its_system():
+    kept = Study(Scene(Kept(), Circle(amplitude=0.5), Numerics(phases=16)))
+    assert (kept.fitted.unit, kept.fitted.length, kept.curvature.unit) == ("m", 0.42, "m")
+
+
+def test_no_unit_is_made_up():
+    """Of a velocity of one's own nobody says it: it is told as a length until it is said."""
+    own = lambda alpha, alphadot: (
+        alphadot[..., :1] * np.array([0.2, 0.1, 0.0]) + np.sin(alpha[..., 1:]) * alphadot[..., 1:]
+    )
+    axes = connection.grid(2, 7, 1.0)
+    bare, said = connection.fit(own, axes), connection.fit(own, axes, unit="m", length=0.42)
+    assert (bare.unit, bare.length) == ("length", None) and "lengths" not in repr(bare)
+    data = bare.to_xarray()
+    assert data.A.units == "length rad-1 (x, y), rad rad-1 (theta)" and "length_unit" not in data.attrs
+    for fitted, unit in ((bare, "length"), (said, "m")):
+        assert plots.ccf_map(curvature.ccf(fitted)).figure.axes[1].get_ylabel() == f"CCF$_{{x}}$ ({unit}/rad$^2$)"
+    told = {"amplitude": [0.5, 1.0], "direct": [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]}
+    assert plots.displacement(told).get_ylabel() == "x per cycle (length)"
+    public = [getattr(plots, name) for name in plots.__all__]
+    named = {name for f in public if callable(f) for name in inspect.signature(f).parameters}
+    assert not named & {"unit", "length"} - set(inspect.signature(plots.quantity).parameters)
 
 
 def test_without_xarray_it_is_said(study, monkeypatch):
@@ -214,11 +341,11 @@ def test_speeds_and_what_the_medium_does_are_shown_too():
     data = made.to_xarray()
     for key, units in (
         ("speed", "m s-1"), ("speed_body_lengths", "body length s-1"), ("turning_rate", "rad s-1"),
-        ("medium_error", "body length"), ("medium_error_heading", "rad"),
+        ("medium_error", "m"), ("medium_error_heading", "rad"),
     ):  # fmt: skip
         np.testing.assert_array_equal(data[key].sel(tier="direct"), made[key]["direct"])
         assert data[key].units == units and (data[key] != 0).all()
     assert data.attrs["frequency"] == 2.5
     cells = re.findall(r"<t[hd]>(.*?)</t[hd]>", made._repr_html_())
-    assert cells[7:10] == ["medium (BL)", "medium, heading (rad)", "speed (m/s)"]
+    assert cells[7:10] == ["medium (m)", "medium, heading (rad)", "speed (m/s)"]
     assert float(cells[19]) == pytest.approx(made["speed"]["direct"][0], rel=1e-3)

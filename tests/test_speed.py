@@ -102,7 +102,7 @@ def test_every_displacement_is_a_speed():
         np.testing.assert_allclose(table["turning_rate"][tier], 2.5 * poses[:, 2])
     assert table["units"] == {
         "amplitude": "amplitude of the ellipse (scale)", "x": "m", "y": "m", "net_distance": "m", "heading": "rad",
-        "estimate": "BL", "estimate_heading": "rad", "seconds": "s",
+        "estimate": "m", "estimate_heading": "rad", "body_length": "m", "seconds": "s",
         "frequency": "Hz", "speed": "m/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s",
     }  # fmt: skip
     plain = Study(scenes.parse(CHAIN.replace("frequency = 2.5", ""))).study(amplitudes, ["area", "direct"])
@@ -117,7 +117,7 @@ def test_every_displacement_is_a_speed():
         (at,) = [k for k, x in enumerate(lines) if x.startswith(f"s: speed ({unit}/s) at 2.5 Hz")]
         a, *_, direct, error = lines[at + 3].split()
         assert (float(a), float(direct)) == (1.0, pytest.approx(table["speed"]["direct"][1] / length, abs=1e-6))
-        assert error == f"+-{table['estimate']['direct'][1] * 0.3 * 2.5 / length:.1e}"
+        assert error == f"+-{table['estimate']['direct'][1] * 2.5 / length:.1e}"
 
 
 def test_tables_have_one_unit_a_row():
@@ -130,7 +130,7 @@ def test_tables_have_one_unit_a_row():
             found[head] = [float(x.removeprefix("+-")) for x in row.split()[1:]]
     x, y, heading = table["direct"][0]
     estimate, turned = table["estimate"]["direct"][0], table["estimate_heading"]["direct"][0]
-    wanted = [(v, 0.3 * estimate) for v in (np.hypot(x, y), x, y)] + [(heading, turned)]
+    wanted = [(v, estimate) for v in (np.hypot(x, y), x, y)] + [(heading, turned)]
     for (head, row), (value, error), unit in zip(found.items(), wanted, ["(m)", "(m)", "(m)", "(rad)"]):
         assert row == [pytest.approx(value, abs=1e-6), pytest.approx(error, rel=0.05)]
         assert unit in head

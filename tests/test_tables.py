@@ -26,6 +26,7 @@ from geomech.scene import Numerics, Scene
 from geomech.study import accuracy, choose, estimate
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
+from geomech.systems.table import LENGTHS
 from rft.media import CATALOGUE
 
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
@@ -48,6 +49,7 @@ def made(tmp_path_factory):
 
 def same(a: Connection, b: Connection):
     assert len(a.axes) == len(b.axes) and a.degree == b.degree
+    assert a.size == b.size
     for x, y in zip((*a.axes, a.A, a.residual, a.speed), (*b.axes, b.A, b.residual, b.speed)):
         np.testing.assert_array_equal(x, y)
 
@@ -247,25 +249,23 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
     (netcdf if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
     table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
-    ratios, length = [], source.scene.system.length
+    ratios, length = [], source.scene.system.length  # of the body, m in one of them
     for gait in GAITS:
         amplitudes = [0.3, 0.8, 1.2]
         true = source.displacement("direct", gait, amplitudes)
         told = table.study(amplitudes, ["area", "path", "harmonic", "direct"], gait)
         for tier in ("area", "path", "harmonic", "direct"):
             off = np.array(told[tier]) - true
-            assert (np.hypot(*off.T[:2]) / length <= np.array(told["estimate"][tier]) + 1e-12).all(), (tier, gait)
+            assert (np.hypot(*off.T[:2]) <= np.array(told["estimate"][tier]) + 1e-12).all(), (tier, gait)
             assert (np.abs(off[:, 2]) <= np.array(told["estimate_heading"][tier]) + 1e-12).all(), (tier, gait)
-        ratios += list(
-            np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]) * length
-        )
+        ratios += list(np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]))
         for tier in ("area", "path"):  # of the same connection
             np.testing.assert_allclose(
                 told[tier], source.turned(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
             )
     assert np.median(ratios) < 60  # honest, not helpless
     if ending == ".nc" and medium.dry:
-        assert max(told["estimate"]["direct"]) < 0.02  # by its harmonics: of A alone it is 0.1 or more
+        assert max(told["estimate"]["direct"]) < 0.02 * length  # by its harmonics: of A alone it is 0.1 or more
 
 
 def random_scene(rng):
@@ -407,6 +407,35 @@ def test_a_table_is_told_its_unit_once(made, tmp_path):
     np.testing.assert_allclose(thirds.velocity([0.2, 0.4], [1.0, -0.5]), xi / [3, 3, 1], rtol=1e-13)
     with pytest.raises(ValueError, match="has the frame it was made in"):
         ones.in_frame("mean")
+
+
+def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path, capsys):
+    """As the sign that is made out; nothing is noted of what the scene or the file says."""
+    folder, s = made
+    plain_mat(tmp_path / "a.mat", s.fitted)
+    with netcdf_file(folder / "a.nc", mmap=False) as data:
+        assert data.length_unit == b"m"
+    raw = (folder / "a.nc").read_bytes().replace(b"length_unit", b"length_UNIT").replace(b"body_length", b"body_LENGTH")
+    (tmp_path / "a.nc").write_bytes(raw)
+    for ending in ("mat", "nc"):
+        file = tmp_path / f"a.{ending}"
+        bare = Table(file)
+        told = [line for line in bare.assumed if "body_length" in line]
+        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in bare.told()
+        assert (bare.unit, bare.length) == ("BL", 1.0)
+        assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
+        assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
+        for length in (1.0, 3.0):
+            said = Table(file, body_length=length)
+            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in said.told()
+            np.testing.assert_allclose(said.held.connection.A[0] * length, bare.held.connection.A[0], rtol=1e-13)
+    for file in ("a.nc", "a.mat"):
+        whole = Table(folder / file)
+        assert whole.assumed == () and (whole.held.connection.unit, whole.held.connection.length) == ("m", 0.3)
+    (tmp_path / "a.toml").write_text('[system]\nkind = "table"\nfile = "a.mat"\n[gait]\nkind = "circle"\n')
+    assert scenes.load(tmp_path / "a.toml").system.body_length is None
+    noted = capsys.readouterr().err.splitlines()
+    assert [("sign" in line, LENGTHS in line) for line in noted] == [(True, False), (False, True)]
 
 
 def altered(raw, **changes):

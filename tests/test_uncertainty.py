@@ -119,14 +119,14 @@ def test_every_tier_has_it_beside_its_own_error():
     table = Study(sand).study([0.5, 1.0], ["area", "direct"])
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
     for tier in ("area", "direct"):
-        np.testing.assert_allclose(table["medium_error"][tier], told["position"] / 0.3)
+        np.testing.assert_allclose(table["medium_error"][tier], told["position"])
         np.testing.assert_allclose(table["medium_error_heading"][tier], told["heading"])
     assert {q: table["medium_error_of"][q] for q in QUANTITIES} == {q: told[q].tolist() for q in QUANTITIES}
     plain = Study(sand.changed(medium=Granular(1.49, 0.22))).study([0.5, 1.0], ["area", "direct"])
     assert {k: plain[k] for k in ("area", "direct", "x")} == {k: table[k] for k in ("area", "direct", "x")}
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
-    np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"] / 0.3)
+    np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
     text = report.text_table("sand", table, sand).splitlines()
     row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
     assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
@@ -187,23 +187,23 @@ def test_sweeps_have_it(tmp_path):
     over = {"body.length": [0.3, 0.6], "gait.amplitude": [0.5, 1.0]}
     found = sweep.sweep(sand, over)
     told = uncertainty.of_medium(sand, GAIT, np.array([0.5, 1.0]))
-    np.testing.assert_allclose(found["medium_error"], [told["position"] / 0.3] * 2, rtol=1e-6)
+    np.testing.assert_allclose(found["medium_error"], [told["position"], 2 * told["position"]], rtol=1e-6)
     np.testing.assert_allclose(found["medium_error_heading"], [told["heading"]] * 2, rtol=1e-6)
     again = sweep.sweep(sand, {"gait.tilt": [0.4, 0.5], "gait.amplitude": [1.0]})  # two gaits in one batch
-    np.testing.assert_allclose(again["medium_error"][0, 0], told["position"][1] / 0.3, rtol=1e-6)
+    np.testing.assert_allclose(again["medium_error"][0, 0], told["position"][1], rtol=1e-6)
     turned = dataclasses.replace(GAIT, tilt=0.5)
-    told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"] / 0.3
+    told = uncertainty.of_medium(sand, turned, np.array([1.0]))["position"]
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
     many = sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})  # more than go together
     np.testing.assert_allclose(many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6)
     sweeps.save(tmp_path / "s.nc", sand, found)
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         np.testing.assert_allclose(data.medium_error, found["medium_error"])
-        assert data.medium_error.attrs["units"] == "body length"
+        assert data.medium_error.attrs["units"] == "m"
     one = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
     (_, band) = sweeps.draw(sand, one).axes[0].collections
     net, _, medium, _ = sweeps.drawn(sand, one)
-    np.testing.assert_allclose(medium, 0.3 * one["frequency"] * one["medium_error"])
+    np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (pytest.approx((net - medium).min()), pytest.approx((net + medium).max()))
     assert "medium_error" not in sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})

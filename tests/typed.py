@@ -53,7 +53,7 @@ def geometry() -> list[Any]:
     fitted = connection.fit(velocity, connection.grid(joints=2, points=5))
     ccf = curvature.ccf(fitted)
     figure, axes = geomech.plots.figure(3.0, 3.0)
-    plots.displacement({"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, "BL", axes[0, 0])
+    plots.displacement({"amplitude": [0.5, 1.0], "area": np.zeros((2, 3))}, ax=axes[0, 0])
     plots.ccf_figure(ccf, [Circle()])
     nets: list[Array] = [area(ccf, Circle(), [0.5]), path(fitted, Circle(), [0.5]), direct(velocity, Circle(), [0.5])]
     table = family.fit(velocity, Circle(), 1.0, 6)

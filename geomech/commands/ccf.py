@@ -67,7 +67,7 @@ def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | No
     """The figure of the CCF of two joints that a field has."""
     from geomech.output import plots
 
-    system, told = study.scene.system, {"gaits": [study.scene.gait], "unit": study.scene.system.unit}
+    system, told = study.scene.system, {"gaits": [study.scene.gait]}
     told |= {"error": study.curvature_error, "labels": system.shape_labels}
     if stretch:
         from geomech.stretch import stretch as redrawn
@@ -87,7 +87,7 @@ def _slices(scene, style: str, asked: tuple, beside: str | None, yes: bool):
     from geomech.study.bench import Study
 
     study, system = Study(scene), scene.system
-    found, told = planes(study, *asked, yes), {"unit": system.unit, "labels": system.shape_labels, "style": style}
+    found, told = planes(study, *asked, yes), {"labels": system.shape_labels, "style": style}
     if beside is not None:
         if len(found) > 1:
             raise SceneError("--beside draws one pair of joints: say which with --pair")

@@ -74,11 +74,10 @@ def connection(
             if not sign:
                 note(f"{out} has {SIGNS['+']}; --sign - gives the other")
         if plot:
-            system = study.scene.system
-            told = {"labels": system.shape_labels, "style": style or "quiver"}
+            told = {"labels": study.scene.system.shape_labels, "style": style or "quiver"}
             if sliced:
-                plots.save(plots.plane_connection_figure(found, system.unit, **told), plot)
+                plots.save(plots.plane_connection_figure(found, **told), plot)
                 return
             if beside is not None:
                 told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
-            plots.save(plots.connection_figure(study.fitted, system.unit, **told), plot)
+            plots.save(plots.connection_figure(study.fitted, **told), plot)

@@ -69,6 +69,6 @@ def displacement(
             if effort:
                 add_effort(table)
             if plot:
-                system, name = scene.system, type(scene.gait).__name__.lower()
-                plots.save(plots.displacement_figure({name: table}, system.unit, [scene.gait], system.length), plot)
+                tables = {type(scene.gait).__name__.lower(): table}
+                plots.save(plots.displacement_figure(tables, [scene.gait]), plot)
     print(json.dumps(table) if as_json else report.text_table(scene.name, table, scene))

@@ -79,8 +79,8 @@ def sweep(
     if walks:
         print(f"{sweeps.told(results)}, in {out}")
         return
-    net = of_pose(results["displacement"])["net_distance"]
-    told = f"{net.size} points, net distance per cycle {net.min():.6g} to {net.max():.6g} {scene.system.unit}"
+    net, unit = of_pose(results["displacement"])["net_distance"], results["units"]["estimate"]
+    told = f"{net.size} points, net distance per cycle {net.min():.6g} to {net.max():.6g} {unit}"
     if (speed := results.get("speed")) is not None:
-        told += f", speed {speed.min():.6g} to {speed.max():.6g} {scene.system.unit}/s"
+        told += f", speed {speed.min():.6g} to {speed.max():.6g} {unit}/s"
     print(f"{told}, in {out}")

@@ -25,10 +25,11 @@ def velocity(
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
     with named(scene.name):
         out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
-    if as_json:
-        print(json.dumps({k: v for k, v in out.items() if k != "iterations"}))
-        return
     unit = scene.system.unit
+    if as_json:
+        told = {k: v for k, v in out.items() if k != "iterations"}
+        print(json.dumps({**told, "units": {"xi": [unit, unit, "rad"]}}))
+        return
     print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{unit}, {unit}, rad per unit time")
     steps = f", {out['iterations']} iterations" if "iterations" in out else ""
     residual = "unknown" if out["residual"] is None else f"{out['residual']:.1e}"

@@ -81,7 +81,7 @@ class Fitted:
         joints = len(self.log.joints)
         most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
-        return tube(self.known, grid_of(self.known, points), self.residual)
+        return tube(self.known, grid_of(self.known, points), self.residual, self.unit, self.length)
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """(A (T, 3, d) at phases t of the mean gait, half widths of its interval)."""

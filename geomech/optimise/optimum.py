@@ -13,7 +13,7 @@ from geomech.scene.model import Scene
 from geomech.scene.write import gait_table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Told:
     """A gait by the direct tier. value, error: of the aim. heading: error of the net turn, rad. displacement: (3,), in the
     frame at the start, the system's unit. length: of the path, work: of a cycle at a rad of phase per unit of time, in body
@@ -31,7 +31,7 @@ class Told:
     limits: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """What `optimise` found. best, start: told by the direct tier. active: limits that the best touches. answers: value and
     number of starts of every different loop found, best first. seconds: it took."""
@@ -59,8 +59,9 @@ class Optimum:
         return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(reach)))
 
     def numbers(self) -> dict:
-        """As JSON has them."""
-        b = self.best
+        """As JSON has them; the value of a distance is over the body's length, the displacement is not."""
+        b, system = self.best, self.scene.system
+        aim, unit = self.request.aim.unit, system.unit
         return {
             "objective": self.request.aim.name,
             "value": b.value,
@@ -73,4 +74,11 @@ class Optimum:
             "seconds": self.seconds,
             "active": list(self.active),
             "estimate": b.error,
+            "body_length": float(system.length),
+            "units": {
+                **dict.fromkeys(("value", "start_value", "estimate"), aim),
+                "displacement": [unit, unit, "rad"],
+                "body_length": unit,
+                "seconds": "s",
+            },
         }

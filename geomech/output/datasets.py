@@ -12,13 +12,13 @@ from geomech.field import Field
 from geomech.output import sweeps
 from geomech.output.netcdf import (
     COMPONENTS,
-    UNITS,
     Variable,
     angles_of,
     attributes,
     of_ccf,
     of_connection,
     shapes,
+    units_of,
     variables,
 )
 from geomech.study.bench import Study
@@ -64,16 +64,22 @@ def of_study(study: Study):
     return dataset(variables(study), coordinates, attributes(study))
 
 
-def connection(fitted: Connection, unit: str, names: Sequence[str] = ()):
-    """A, its fit residual and the rms of xi. unit: of lengths, "BL" or "m"."""
-    return dataset(of_connection(fitted, unit), _called(fitted.axes, names), {"sign_of_A": "xi = + A alphadot"})
+def connection(fitted: Connection, names: Sequence[str] = ()):
+    """A, its fit residual and the rms of xi."""
+    told = {"sign_of_A": "xi = + A alphadot", **_sized(fitted.unit, fitted.length)}
+    return dataset(of_connection(fitted), _called(fitted.axes, names), told)
 
 
-def field(values: Field, name: str, unit: str, names: Sequence[str] = ()):
+def _sized(unit: str, length: float | None) -> dict:
+    """The body's length and its unit, as attributes; none where nothing says them."""
+    return {} if length is None else {"body_length": float(length), "length_unit": units_of(unit)}
+
+
+def field(values: Field, name: str, names: Sequence[str] = ()):
     """A DataArray; with rows x, y and theta it is a CCF, in its units."""
     lead = values.values.shape[: -values.joints]
     if lead == (3,):
-        return dataset([of_ccf(values, unit, name)], _called(values.axes, names))[name]
+        return dataset([of_ccf(values, name)], _called(values.axes, names))[name]
     dimensions = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
     return dataset([Variable(name, dimensions, values.values, "", "")], _called(values.axes, names))[name]
 
@@ -81,7 +87,8 @@ def field(values: Field, name: str, unit: str, names: Sequence[str] = ()):
 def displacements(table: Displacements):
     """displacement (tier, amplitude, component) and its errors (tier, amplitude); where there is a frequency speeds, and
     where the medium is uncertain what that does, alike."""
-    names, unit = table.tiers, UNITS[table.scene.system.unit]
+    names, system = table.tiers, table.scene.system
+    unit = units_of(system.unit)
     each = lambda key: np.array([table.errors(key)[name] for name in names])
     poses = np.array([table[name] for name in names], float).reshape(len(names), len(table["amplitude"]), 3)
     over = ("tier", "amplitude")
@@ -89,13 +96,14 @@ def displacements(table: Displacements):
         Variable(
             "displacement", (*over, "component"), poses, f"{unit} (x, y), rad (theta)", "net displacement per cycle"
         ),
-        Variable("estimate", over, each("estimate"), "body length", "estimated error of the position"),
+        Variable("estimate", over, each("estimate"), unit, "estimated error of the position"),
         Variable("estimate_heading", over, each("estimate_heading"), "rad", "estimated error of the heading"),
     ]
     found += [Variable(key, over, each(key), units, said) for key, units, said in _besides(unit) if key in table]
     amplitude = np.array(table["amplitude"], float), {"long_name": table.gait.amplitude_label}
     coordinates = {"tier": (names, {}), "amplitude": amplitude, "component": (list(COMPONENTS), {})}
     attrs = {"title": f"Net displacement per cycle of the scene {table.scene.name}", "frame": table.scene.frame}
+    attrs |= _sized(system.unit, system.length)
     if "frequency" in table:
         attrs |= {"frequency": float(table["frequency"]), "frequency_unit": "Hz"}
     return dataset(found, coordinates, attrs)
@@ -107,7 +115,7 @@ def _besides(unit: str) -> list[tuple[str, str, str]]:
         ("speed", f"{unit} s-1", "net distance times frequency"),
         ("speed_body_lengths", "body length s-1", "net distance in body lengths times frequency"),
         ("turning_rate", "rad s-1", "heading times frequency"),
-        ("medium_error", "body length", "one standard deviation of the position by the medium's covariance"),
+        ("medium_error", unit, "one standard deviation of the position by the medium's covariance"),
         ("medium_error_heading", "rad", "one standard deviation of the heading by the medium's covariance"),
     ]
 

@@ -46,13 +46,13 @@ def _encoded(picture) -> str:
 
 def connection(fitted: Connection) -> str:
     """Its rows as arrows over shape space, or its line where shape space is no plane."""
-    return page(repr(fitted), picture=plots.connection_figure(fitted, "length") if len(fitted.axes) == 2 else None)
+    return page(repr(fitted), picture=plots.connection_figure(fitted) if len(fitted.axes) == 2 else None)
 
 
 def field(values: Field) -> str:
     """Its components as colours over shape space, as those of a CCF; its line for any other."""
     drawn = values.joints == 2 and values.values.shape[0] == 3 and values.values.ndim == 3
-    return page(repr(values), picture=plots.ccf_figure(values, unit="length") if drawn else None)
+    return page(repr(values), picture=plots.ccf_figure(values) if drawn else None)
 
 
 def study(bench: Study) -> str:
@@ -66,14 +66,18 @@ def study(bench: Study) -> str:
         ("computed", ", ".join(sorted(held)) or "nothing yet"),
     ]
     drawn = {"ccf", "error of the ccf"} <= held and scene.system.joints == 2
-    maps = lambda: plots.ccf_figure(bench.curvature, [scene.gait], scene.system.unit, bench.curvature_error)
+    maps = lambda: plots.ccf_figure(bench.curvature, [scene.gait], error=bench.curvature_error)
     return page(f"Study of {scene.name}", (), rows, maps() if drawn else None)
 
 
 def displacements(table: Displacements) -> str:
     """A row an amplitude and tier."""
     unit, rows = table.scene.system.unit, []
-    told = {"estimate": "error (BL)", "estimate_heading": "error of heading (rad)", "medium_error": "medium (BL)"}
+    told = {
+        "estimate": f"error ({unit})",
+        "estimate_heading": "error of heading (rad)",
+        "medium_error": f"medium ({unit})",
+    }
     told |= {"medium_error_heading": "medium, heading (rad)", "speed": f"speed ({unit}/s)"}
     there = {key: name for key, name in told.items() if key in table}
     each = [(table.errors(key), ".4g" if key == "speed" else ".1e") for key in there]

@@ -12,13 +12,13 @@ from geomech.curvature import error as curvature_error
 from geomech.measured.fit import SHOWN, Fitted
 from geomech.output.netcdf import (
     INTERVAL_OF_CCF,
-    UNITS,
     angles_of,
     of_ccf,
     of_connection,
     of_error,
     of_known,
     of_reach,
+    units_of,
     write,
 )
 from geomech.scene.write import gait_table, table
@@ -52,7 +52,7 @@ def numbers(fit: Fitted) -> dict:
     (net, off), (mean, mean_off) = fit.displacement, fit.mean
     t = 2 * np.pi * np.arange(SHOWN) / SHOWN
     A, error = fit.along(t)
-    apart = fit.measured - fit.predicted
+    apart, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
     return {
         "log": fit.log.name,
         "rows": len(fit.log.t),
@@ -80,8 +80,9 @@ def numbers(fit: Fitted) -> dict:
             "predicted": fit.predicted.tolist(),
             "rms": np.sqrt((apart**2).mean(0)).tolist(),
         },
+        "body_length": fit.length,
         "units": {"displacement": [fit.unit, fit.unit, "rad"], "frequency": "cycles per unit of t", "phase_residual": "rad",
-                  "residual": [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"], "reach": "rad"},
+                  "residual": rates, "misfit": rates, "A": rates, "reach": "rad", "body_length": fit.unit},
         "status": status(fit),
     }  # fmt: skip
 
@@ -119,9 +120,9 @@ def save_field(path: str | Path, fit: Fitted) -> None:
     NetCDF that `Connection.load` and [system] kind = "table" read."""
     tube, unit = fit.tube, fit.unit
     error = of_error(tube.at_grid(tube.known.of_error), unit)
-    found = [*of_connection(tube, unit), error, *of_known(tube.known, unit), of_reach(tube)]
+    found = [*of_connection(tube), error, *of_known(tube.known, unit), of_reach(tube)]
     if len(tube.axes) == 2:
-        found += [of_ccf(ccf(tube), unit), of_ccf(curvature_error(tube), unit, "ccf_error", INTERVAL_OF_CCF)]
+        found += [of_ccf(ccf(tube)), of_ccf(curvature_error(tube), "ccf_error", INTERVAL_OF_CCF)]
     labels = tuple((name, "rad") for name in angles_of(tube.axes))
     write(path, _about(fit), tube.axes, labels, found)
 
@@ -135,7 +136,7 @@ def _about(fit: Fitted) -> dict:
         "frame": "that of the log",
         "frame_meaning": "body frame: the one whose x, y and heading were logged",
         "body_length": float(fit.length),
-        "length_unit": UNITS[fit.unit],
+        "length_unit": units_of(fit.unit),
         "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

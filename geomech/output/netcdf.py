@@ -84,19 +84,19 @@ def attributes(study: Study) -> dict:
 def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
     unit, lookups = study.scene.system.unit, study.lookups
-    found = of_connection(study.fitted, unit)
+    found = of_connection(study.fitted)
     if (error := study.scene.system.stored("A_error")) is not None:
         found.append(of_error(error, unit))
     if isinstance(study.fitted, Tube):
         found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
-        found.append(of_ccf(study.curvature, unit))
+        found.append(of_ccf(study.curvature))
         what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
-        found.append(of_ccf(study.curvature_error, unit, "ccf_error", what))
+        found.append(of_ccf(study.curvature_error, "ccf_error", what))
     elif len(study.fitted.axes) > 2:
-        found += of_pairs(study.two_form, two_form.error(study.fitted), unit)
+        found += of_pairs(study.two_form, two_form.error(study.fitted))
     if study.scene.system.carried:
-        found.append(of_frame(study.scene.system.field.field, unit))
+        found.append(of_frame(study.scene.system.field.field))
     if not effort.why_none(study.scene.system):
         found += of_metric(
             study.metric, study.scene.system.cost is None
@@ -104,16 +104,16 @@ def variables(study: Study) -> list[Variable]:
     if "harmonic" in lookups:
         found += of_harmonics(study.table("harmonic"), unit)
     if (even := study.even_part) is not None:
-        units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+        units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
         found.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
     return found
 
 
-def of_connection(fitted: Connection, unit: str) -> list[Variable]:
-    """A, what its fit leaves, and the rms of xi. unit: of lengths, "BL" or "m"."""
+def of_connection(fitted: Connection) -> list[Variable]:
+    """A, what its fit leaves, and the rms of xi."""
     angles = angles_of(fitted.axes)
-    units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{units_of(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
     left = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
@@ -125,7 +125,7 @@ def of_connection(fitted: Connection, unit: str) -> list[Variable]:
 
 def of_error(error: np.ndarray, unit: str) -> Variable:
     """Half widths (3, d, N_1, ...) of intervals of A."""
-    units, over = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)", angles_of(error.shape[2:])
+    units, over = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)", angles_of(error.shape[2:])
     return Variable("A_error", ("component", "joint", *over), error, units, "half width of the interval of A")
 
 
@@ -139,7 +139,7 @@ def of_reach(tube: Tube) -> Variable:
 def of_known(known: Known, unit: str) -> list[Variable]:
     """What a connection near one gait is looked up in (`geomech.tube`)."""
     units, order = (
-        f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)",
+        f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
     )
     lead, row = ("component", "joint"), "harmonic_of_A"
@@ -159,7 +159,7 @@ def of_known(known: Known, unit: str) -> list[Variable]:
             "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
         ),
         Variable(
-            "gait_beyond", ("component",), known.beyond, f"{UNITS[unit]} (x, y), rad (theta)",
+            "gait_beyond", ("component",), known.beyond, f"{units_of(unit)} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
@@ -169,16 +169,16 @@ def of_known(known: Known, unit: str) -> list[Variable]:
     ]  # fmt: skip
 
 
-def of_ccf(field: Field, unit: str, name: str = "ccf", said: str = "") -> Variable:
+def of_ccf(field: Field, name: str = "ccf", said: str = "") -> Variable:
     """A CCF, or its error."""
-    units = f"{UNITS[unit]} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{units_of(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     said = said or "curvature constraint function of joints 1 and 2"
     return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
 
 
-def of_pairs(form: TwoForm, error: TwoForm, unit: str) -> list[Variable]:
+def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """The CCF of all pairs of joints, its error, and the pairs."""
-    units = f"{UNITS[unit]} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{units_of(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
     told = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
     said = f"curvature constraint function of joints {told}, in this order"
@@ -189,9 +189,9 @@ def of_pairs(form: TwoForm, error: TwoForm, unit: str) -> list[Variable]:
     ]
 
 
-def of_frame(pose: Field, unit: str) -> Variable:
+def of_frame(pose: Field) -> Variable:
     """The pose of a minimum-perturbation frame in the frame that it was made from."""
-    units = f"{UNITS[unit]} (x, y), rad (theta)"
+    units = f"{units_of(pose.unit)} (x, y), rad (theta)"
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
 
@@ -199,7 +199,7 @@ def of_frame(pose: Field, unit: str) -> Variable:
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Coefficients of the odd harmonics of xi, and what they leave."""
     angles = angles_of(table.axes)
-    units = f"{UNITS[unit]} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     left = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
@@ -229,6 +229,11 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
     ]
 
 
+def units_of(unit: str) -> str:
+    """A unit of lengths as files name it."""
+    return UNITS.get(unit, unit)
+
+
 def angles_of(axes) -> tuple[str, ...]:
     """Names of the axes of shape space."""
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
@@ -255,7 +260,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": UNITS[system.unit],
+        "length_unit": units_of(system.unit),
         **system.about(),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

@@ -53,8 +53,7 @@ def _holds(path: Path, text: str) -> bool:
 
 def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
     """Compute everything and write it; returns the displacement tables by gait."""
-    scene, unit = study.scene, study.scene.system.unit
-    gaits = _gaits(scene)
+    scene, gaits = study.scene, _gaits(study.scene)
     amplitudes = [reachable(scene, gait) for gait in gaits]
     mapped = {2: "path", 3: "area"}.get(scene.system.joints) in study.methods  # of more: `geomech ccf --pair`
     if mapped:
@@ -68,7 +67,7 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
             table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
             if gait is not scene.gait:
                 table["note"] = ADDED
-        _save(plots.displacement_figure(tables, unit, gaits, scene.system.length), folder / "displacement")
+        _save(plots.displacement_figure(tables, gaits), folder / "displacement")
     (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
     return tables
@@ -76,16 +75,17 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
 
 def _maps(study: Study, folder: Path, gaits: list[Gait]) -> None:
     """Pictures of the connection and of the CCF, of three joints for every pair."""
-    scene, unit, labels = study.scene, study.scene.system.unit, study.scene.system.shape_labels
+    scene, labels = study.scene, study.scene.system.shape_labels
     if scene.system.joints == 3:
         planes = [study.plane(pair) for pair in combinations(range(3), 2)]
-        _save(plots.plane_connection_figure(planes, unit, labels), folder / "connection")
-        _save(plots.planes_figure(planes, scene.gait, unit, labels), folder / "ccf")
+        _save(plots.plane_connection_figure(planes, labels=labels), folder / "connection")
+        _save(plots.planes_figure(planes, scene.gait, labels=labels), folder / "ccf")
         return
-    _save(plots.connection_figure(study.fitted, unit, labels), folder / "connection")
+    _save(plots.connection_figure(study.fitted, labels=labels), folder / "connection")
     if scene.system.carried:
-        _save(plots.frame_figure(scene.system.field.field, unit, labels), folder / "frame")
-    _save(plots.ccf_figure(study.curvature, gaits, unit, study.curvature_error, labels), folder / "ccf")
+        _save(plots.frame_figure(scene.system.field.field, labels=labels), folder / "frame")
+    maps = plots.ccf_figure(study.curvature, gaits, error=study.curvature_error, labels=labels)
+    _save(maps, folder / "ccf")
 
 
 def cost(scene: Scene) -> Cost:
@@ -163,7 +163,7 @@ def text_table(title: str, table: dict, scene: Scene) -> str:
         medium = np.array(table["medium_error_of"][quantity]) * by if "medium_error_of" in table else None
         lines.append("amplitude" + "".join(f"{m:>{places + 15}}" for m in tiers) + "     medium" * (medium is not None))
         values = [np.round(by * tables.of_pose(table[m])[quantity], places) + 0.0 for m in tiers]  # no -0.000
-        errors = [by * tables.error_of(table, quantity, m, length) for m in tiers]
+        errors = [by * tables.error_of(table, quantity, m) for m in tiers]
         for k, a in enumerate(table["amplitude"]):
             row = (f"{x[k]:{places + 6}.{places}f} +-{e[k]:7.1e}" for x, e in zip(values, errors))
             lines.append(f"{a:9.6g}" + "".join(row) + (f"  +-{medium[k]:7.1e}" if medium is not None else ""))
@@ -188,7 +188,7 @@ def _surfaces(table: dict, scene: Scene) -> list[str]:
         )
         lines.append(f"amplitude position ({scene.system.unit})  heading (rad)")
         turned = table["surface_spread_heading"][m]
-        rows = zip(table["amplitude"], np.array(spread) * scene.system.length, turned)
+        rows = zip(table["amplitude"], spread, turned)
         lines += [f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows]
     return lines
 

@@ -10,10 +10,10 @@ import numpy as np
 from geomech.errors import SceneError
 from geomech.files import whole_file
 from geomech.output import plots
-from geomech.output.netcdf import COMPONENTS, UNITS, Variable, attribute
+from geomech.output.netcdf import COMPONENTS, Variable, attribute, units_of
 from geomech.scene import write as written
 from geomech.scene.model import Scene
-from geomech.study.sweep import AMPLITUDE, LENGTHS, at_points
+from geomech.study.sweep import AMPLITUDE
 
 PARAMETERS = {  # units of parameters, by the last part of their names; the others have none
     "gamma0": "rad", "length": "m", "frequency": "Hz", "mass": "kg", "drag": "N", "depth": "m", "radius": "BL",
@@ -58,11 +58,12 @@ def parameters(results: dict) -> list[tuple[str, str, np.ndarray]]:
 
 def variables(scene: Scene, results: dict) -> list[Variable]:
     """Of a file of a sweep, without its coordinates."""
-    names, unit = tuple(name for name, *_ in parameters(results)), UNITS[scene.system.unit]
+    names, unit = tuple(name for name, *_ in parameters(results)), units_of(results["units"]["estimate"])
     found = [
         Variable("displacement", (*names, "component"), results["displacement"], f"{unit} (x, y), rad (theta)", ""),
-        Variable("estimate", names, results["estimate"], "body length", ""),
+        Variable("estimate", names, results["estimate"], unit, ""),
         Variable("estimate_heading", names, results["estimate_heading"], "rad", ""),
+        Variable("length", names, results["length"], unit, ""),
     ]
     if "speed" in results:
         found += [
@@ -71,7 +72,7 @@ def variables(scene: Scene, results: dict) -> list[Variable]:
         ]
     if "medium_error" in results:
         found += [
-            Variable("medium_error", names, results["medium_error"], "body length", ""),
+            Variable("medium_error", names, results["medium_error"], unit, ""),
             Variable("medium_error_heading", names, results["medium_error_heading"], "rad", ""),
         ]
     return found
@@ -99,12 +100,10 @@ def drawn(scene: Scene, results: dict):
     """(values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs from
     point to point, the speed; negative where it is backwards."""
     net, frequency = plots.net(results["displacement"]), results.get("frequency")
-    factor = at_points(results["over"], LENGTHS, scene.system.length)
-    unit = "BL" if np.all(factor == 1.0) else "m"
-    timed = frequency is not None and np.ptp(frequency) > 0
-    if timed:
-        net, factor = net * frequency, factor * frequency
+    unit, timed = results["units"]["estimate"], frequency is not None and np.ptp(frequency) > 0
+    factor = frequency if timed else 1.0
     medium = results["medium_error"] * factor if "medium_error" in results else None
+    net = net * factor
     label = f"speed ({unit}/s)" if timed else f"net distance per cycle ({unit})"
     return net, results["estimate"] * factor, medium, label + ", backwards < 0" * bool((net < 0).any())
 

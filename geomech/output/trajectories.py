@@ -40,7 +40,8 @@ def about(motion: Motion) -> list[str]:
     lines = [
         f"motion of {name}, {type(scene.gait).__name__.lower()} of amplitude {scene.gait.amplitude:g}",
         "phase (rad): of the gait, 2 pi a cycle" + ("; time (s)" if "time" in columns else ""),
-        f"x ({unit}), y ({unit}), theta (rad): pose of the frame {scene.frame}, seen from where it is at phase 0",
+        f"x ({unit}), y ({unit}), theta (rad): pose of the frame {scene.frame}, seen from where it is at phase 0"
+        f"; the body's length: {system.length:g} {unit}",
         shapes + (" ..." if len(system.shape_labels) > 8 else ""),
     ]
     if "end_0_x" in columns:

@@ -27,8 +27,8 @@ GROUPS = {
     "system": "systems",
 }  # of FAMILIES
 FRAME = (
-    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation': the one in which the "
-    "connection is smallest"
+    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "
+    "which the connection is smallest"
 )
 FILE = (
     "TOML of a medium, as geomech calibrate writes it, with no key beside it; or, beside law = 'table', CSV of a table"

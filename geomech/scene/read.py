@@ -147,8 +147,8 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     for table, value in tables.items():
         if table not in ("effects", "frame") and not isinstance(value, dict):
             raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
-    seen = tables.get("frame")
-    tables, files = with_files({k: v for k, v in tables.items() if (k, v) != ("frame", FITTED)}, name)
+    tables, fitted = _without_fitted(tables, name)
+    tables, files = with_files(tables, name)
     sizes = Sizes(name, tables)
     gait = _of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
     kind, parts = _system(tables, name, sizes)
@@ -164,13 +164,32 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     with named(name):
         system = kind(**parts)
         return Scene(
-            system=framed(system, finely) if seen == FITTED else system,
+            system=framed(system, finely) if fitted else system,
             gait=gait,
             numerics=finely,
             name=name,
             text=text,
             files=files,
         )
+
+
+def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
+    """The tables without the frame that is fitted to the whole system on the grid, and whether one asks for it: it stands
+    above all tables, in [body] or in [system], as any other."""
+    own, places = tables.get("frame"), []
+
+    def plain(place: str, table):
+        if not isinstance(table, Mapping) or table.get("frame") != FITTED:
+            return table
+        places.append(place)
+        return {k: v for k, v in table.items() if k != "frame"}
+
+    tables = {k: plain(k, v) if k in ("body", "system") else v for k, v in plain("", tables).items()}
+    if "body" in tables.get("system", {}):
+        tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
+    if places and own not in (None, FITTED):
+        raise SceneError(f"{name}: [{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}: keep one")
+    return tables, bool(places)
 
 
 def _system(tables: Mapping, name: str, sizes: Sizes) -> tuple[type, dict]:

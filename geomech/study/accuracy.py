@@ -93,8 +93,8 @@ KNOBS = (
 
 def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict:
     """{"scene", "amplitudes", "lines": [{"label", "tier", "knob", "order", "against", "value", "error", "seconds",
-    "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}]}; of a system whose velocity is not
-    exact besides {"own_error": body lengths}, the largest that no setting takes away: errors of the cheapest include it.
+    "slope"}], "cheapest": [{"tolerance", "tier", "knob", "value", "error", "seconds"}], "units"}; of a system whose velocity
+    is not exact besides {"own_error": body lengths}, the largest that no setting takes away: errors of the cheapest include it.
 
     runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell.
     Seconds are of one thread's computing. Who computes: `geomech.workers`."""
@@ -115,6 +115,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
         "amplitudes": amplitudes.tolist(),
         "lines": lines,
         "cheapest": [_cheapest(lines, tol, own) for tol in TOLERANCES],
+        "units": {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"},
         **({"own_error": own} if own else {}),
     }
 

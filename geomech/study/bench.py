@@ -196,8 +196,8 @@ class Study:
             return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
 
     def choice(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
-        """(B, 2), body lengths and rad: how far `displacement` hangs on a choice of the tier's own, such as a surface that the
-        loop spans; None without one. Part of every estimate."""
+        """(B, 2), the system's unit and rad: how far `displacement` hangs on a choice of the tier's own, such as a surface
+        that the loop spans; None without one. Part of every estimate."""
         s, tier, gait = self.scene, TIERS[method], self.scene.gait if gait is None else gait
         table = self.table(method, gait, amplitudes) if self._looked_up(tier) else None
         return tier.choice(table, s.system, gait, amplitudes, s.numerics)
@@ -224,7 +224,7 @@ class Study:
         """A table (`geomech.study.tables.table`) of the net poses by tiers of METHODS, with their errors, and besides
         {"seconds": {...}, "kept": [...]}.
 
-        estimate, estimate_heading: errors, body lengths and rad (`geomech.study.estimate`).
+        estimate, estimate_heading: errors (`geomech.study.estimate`), in the unit of the poses, and rad.
         seconds: what building each table took, by its name ("field", "harmonic table" ...), whenever that was, and what each
         tier took from there, the direct one with its errors; "errors" of the others, where it is not asked for; "medium" of
         the errors of an uncertain one. kept: the tables that were there before, whose seconds are not of this call.
@@ -235,6 +235,7 @@ class Study:
         if medium:
             seconds["medium"] = took
         poses, errors, choices, reference = {}, {}, {}, None
+        size = [self.scene.system.length, 1.0]  # estimates are in body lengths
         for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
             if chosen[method].is_direct(self.scene.system):
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
@@ -245,7 +246,7 @@ class Study:
                 check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
                 errors[method], took = timed(check)
                 if (choice := self.choice(method, gait, amplitudes)) is not None:
-                    choices[method], errors[method] = choice, np.maximum(errors[method], choice)
+                    choices[method], errors[method] = choice, np.maximum(errors[method], choice / size)
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))

@@ -73,7 +73,7 @@ def cheapest(
             poses = study.displacement(method, gait, amplitudes)
             error, choice = against_direct(scene, poses, gait, amplitudes), study.choice(method, gait, amplitudes)
             if choice is not None:
-                error = np.maximum(error, choice)
+                error = np.maximum(error, choice / [system.length, 1.0])
             if error[:, 0].max() <= tol:
                 return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)

@@ -61,8 +61,9 @@ class Swept(dict):
 
     def __repr__(self) -> str:
         over = " x ".join(f"{name} ({len(v)}: {summary.span(v)})" for name, v in self["over"].items())
-        worst = f"estimated error up to {np.max(self['estimate'], initial=0.0):.1e} BL"
-        return f"Swept({self.scene.name} over {over}; net {summary.poses(self['displacement'])}; {worst})"
+        unit = self["units"]["estimate"]
+        worst = f"estimated error up to {np.max(self['estimate'], initial=0.0):.1e} {unit}"
+        return f"Swept({self.scene.name} over {over}; net {summary.poses(self['displacement'])} ({unit}, rad); {worst})"
 
     def _repr_html_(self) -> str:
         from geomech.output import display

@@ -29,7 +29,6 @@ MOST_BATCHES = 10  # that are taken for nothing in a forecast
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 AMPLITUDE = "gait.amplitude"
 FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
-LENGTHS = "body", "physical", "system", "length"
 
 
 def changed(tables: dict, parameter: str, value: float) -> dict:
@@ -73,9 +72,10 @@ def sweep(
     seconds: float | None = None,
 ) -> dict:
     """{"over": {parameter: values}, "displacement": (N_1, ..., 3), "estimate": (N_1, ...), "estimate_heading": (N_1, ...)}
-    by the direct tier; estimates as in `estimate.direct`. Where the swimmer has a frequency also {"frequency": (N_1, ...),
-    Hz, "speed": (N_1, ...)}, the net distance times it; where the medium is uncertain {"medium_error": (N_1, ...), of the
-    position, body lengths, "medium_error_heading": (N_1, ...), rad} (`geomech.study.uncertainty`).
+    by the direct tier; estimates as in `estimate.direct`, in the unit of the displacement and rad. "length": (N_1, ...), of
+    the body, and "units": {key: unit}. Where the swimmer has a frequency also {"frequency": (N_1, ...), Hz, "speed":
+    (N_1, ...)}, the net distance times it; where the medium is uncertain {"medium_error": (N_1, ...), of the position,
+    "medium_error_heading": (N_1, ...), rad} (`geomech.study.uncertainty`).
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
     solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
@@ -101,11 +101,35 @@ def sweep(
     flat = np.broadcast_to(flat, (*shape, flat.shape[-1]))
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
-    errors = {"estimate": flat[..., 3], "estimate_heading": flat[..., 4]}
+    length, over = lengths(at, values, over), {k: values[k] for k in over}
+    errors = {"estimate": length * flat[..., 3], "estimate_heading": flat[..., 4], "length": length}
     if doubtful:
-        errors |= {"medium_error": flat[..., 5], "medium_error_heading": flat[..., 6]}
-    results = {"over": {k: values[k] for k in over}, "displacement": flat[..., :3], **errors}
-    return Swept({**results, **_speeds(scene, results)}, scene)
+        errors |= {"medium_error": length * flat[..., 5], "medium_error_heading": flat[..., 6]}
+    results = {"over": over, "displacement": flat[..., :3], **errors}
+    results |= _speeds(scene, results)
+    return Swept({**results, "units": _units(scene, results)}, scene)
+
+
+def lengths(at: _At, values: Mapping[str, list[float]], names: Iterable[str]) -> np.ndarray:
+    """The body's length (N_1, ...) at the points of a sweep over these parameters, of which each multiplies it or does not."""
+    first = {name: x[0] for name, x in values.items()}
+    of = lambda name, x: at([*{**first, name: x}.values()]).system.length
+    length = at([*first.values()]).system.length
+    found = np.array(length)
+    for name in names:
+        other = next((x for x in values[name] if x != first[name]), first[name])
+        fixed = name == AMPLITUDE or of(name, other) == length
+        along = np.ones(len(values[name])) if fixed else np.array([of(name, x) for x in values[name]]) / length
+        found = found[..., None] * along
+    return found
+
+
+def _units(scene: Scene, results: Mapping) -> dict:
+    """Of what a sweep has, by key. Lengths are in body lengths where no point has a size."""
+    unit = scene.system.unit if np.all(results["length"] == scene.system.length) else "m"
+    every = {"displacement": [unit, unit, "rad"], "estimate": unit, "estimate_heading": "rad", "length": unit}
+    every |= {"frequency": "Hz", "speed": f"{unit}/s", "medium_error": unit, "medium_error_heading": "rad"}
+    return {key: told for key, told in every.items() if key in results}
 
 
 def _idle(scene: Scene, names: Iterable[str]) -> list[str]:
@@ -257,8 +281,8 @@ def _part(at: _At, part: tuple) -> np.ndarray:
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:
-    """[[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, those that fit into one batch
-    together."""
+    """[[x, y, theta, error, error of theta], ...] for all amplitudes of every scene, those that fit into one batch together;
+    errors in body lengths and rad."""
     solve = lambda joined: np.column_stack(estimate.direct(joined, joined.gait, None, joined.numerics.phases))
     return _together(scenes, amplitudes, solve)
 

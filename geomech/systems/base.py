@@ -206,6 +206,7 @@ class Plain:
     def fitted(self, axes, count: int, degree: int, progress: Callable | None = None) -> Connection:
         """The least-squares connection on a grid, from so many directions; other arguments as in `connection.fit`."""
         known = {"singularity": self.singularity, "trusted": True, "reversible": self.reversible}
+        known |= {"unit": self.unit, "length": self.length}
         return fit(self.velocity, axes, count, degree, progress, self.halved, **known)
 
     def images(self, alpha, alphadot) -> Around:

@@ -63,13 +63,14 @@ class Framed:
         alike = {"mirror": self.inner.halved, "reversible": self.inner.reversible}
         A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, **alike)
         nothing = np.zeros_like(A[:, 0])
-        frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree))
+        size = {"unit": self.unit, "length": self.length}
+        frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree, **size))
         h, dh = np.moveaxis(frame.field.values, 0, -1), frame.grid_slopes
         seen = np.stack([change_velocity(np.moveaxis(x, 0, -1), h, dh @ u) for x, u in zip(xi, unit)])
         A = np.einsum("jc,c...i->ij...", inverse, seen)
         left = seen - np.einsum("ij...,cj->c...i", A, unit)
         rms = [np.moveaxis(np.sqrt((x**2).mean(0)), -1, 0) for x in (left, seen)]
-        return frame, Connection(axes, A, *rms, self.degree)
+        return frame, Connection(axes, A, *rms, self.degree, **size)
 
     @property
     def field(self) -> Frame:

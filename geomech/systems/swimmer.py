@@ -50,6 +50,7 @@ class Swimmer(Said, Plain):
         checked_body(self.body)
         refuse_mutable(self.medium, self.body)
         rft.effects.broken(self.effects)
+        object.__setattr__(self, "effects", tuple(self.effects))  # a list has no hash, by which tables are kept
         if not isinstance(self.solver, Solver):
             raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
         try:

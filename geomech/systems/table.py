@@ -20,6 +20,10 @@ from geomech.reconstruct import displacement, trajectory
 from geomech.systems.base import Plain
 from geomech.tube import BEYOND, Tube
 
+LENGTHS = (
+    "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
+)
+
 
 @dataclass(frozen=True)
 class Table(Plain):
@@ -28,7 +32,8 @@ class Table(Plain):
     file (-): in a scene from a file relative to that file's folder, else to the current one. sign (-): "+" or "-" for
     xi = + or - A alphadot in the file; order (-): "ndgrid" or "meshgrid"; if left out as the file says or shows
     (`tables.load`). body_length (the file's unit): of the body, where the file does not say it; results are then
-    in body lengths. sha256 (-): of the file, filled in if left out; given, the file must have it.
+    in body lengths, as which, with a note, its lengths are taken if left out. sha256 (-): of the file, filled in if left out;
+    given, the file must have it.
 
     A file of `geomech fit` holds A near a mean gait alone: gaits that leave the data are refused, and there is no area tier.
 
@@ -39,7 +44,7 @@ class Table(Plain):
     file: str
     sign: str = ""
     order: str = ""
-    body_length: float = 1.0
+    body_length: float | None = None
     sha256: str = ""
 
     kind = "table"
@@ -53,19 +58,20 @@ class Table(Plain):
         for name in ("sign", "order", "sha256"):
             if not isinstance(getattr(self, name), str):
                 raise ValueError(f"{name} must be text, got {short(getattr(self, name))}")
-        number("body_length", self.body_length, 1e-9, 1e9)
+        if self.body_length is not None:
+            number("body_length", self.body_length, 1e-9, 1e9)
         held = tables.load(self.file, self.sign, self.order)
         if self.sha256.lower() not in ("", held.sha256):
             raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")
         if held.connection.field.masked and not isinstance(held.connection, Tube):
             cure = "" if held.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
             raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
-        if self.body_length != 1.0 and (held.unit, held.length) != ("BL", 1.0):
+        if self.body_length is not None and (held.unit, held.length) != ("BL", 1.0):
             raise ValueError(
                 f"{self.file} says the body's length itself, {held.length:g} {held.unit}: drop body_length"
             )
         object.__setattr__(self, "sha256", held.sha256)
-        object.__setattr__(self, "held", tables.scaled(held, 1.0 / self.body_length))
+        object.__setattr__(self, "held", tables.scaled(held, 1.0 / (self.body_length or 1.0)))
 
     def __reduce__(self):
         return Table, (self.file, self.sign, self.order, self.body_length, self.sha256)
@@ -173,8 +179,13 @@ class Table(Plain):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the file leaves open, and how it is taken."""
-        return tuple(f"{self.file}: {line}" for line in self.held.said)
+        """What the file leaves open, and how it is taken, in notes."""
+        return tuple(f"{self.file}: {line}" for line in self._open)
+
+    @property
+    def _open(self) -> tuple[str, ...]:
+        """The lines of `assumed`, without the file's name."""
+        return self.held.said if self.held.sized or self.body_length is not None else (*self.held.said, LENGTHS)
 
     def told(self) -> list[str]:
         held = self.held
@@ -198,7 +209,7 @@ class Table(Plain):
         )
         return [
             *lines,
-            *held.said,
+            *self._open,
             "its field has the grid of the file; [numerics] grid, extent and directions say nothing",
         ]
 

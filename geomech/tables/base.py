@@ -25,9 +25,10 @@ LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 ORDERS = ("ndgrid", "meshgrid")
 ROWS = ("x", "y", "theta")
+ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stored:
     """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
 
@@ -36,7 +37,8 @@ class Stored:
     lengths, power being its norm to power_degree. length: of the body, in ``unit``, "BL" or "m".
     frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
     the file. shapes: names of the shape variables, alpha_k where none are told. A_error: (3, d, N_1, ...), half widths of
-    intervals of A, which cover it in a share ``level`` of cases, where the file has them."""
+    intervals of A, which cover it in a share ``level`` of cases, where the file has them. sized: whether the file says length
+    and unit; body lengths are assumed where it does not."""
 
     connection: Connection
     harmonics: Harmonics | None = None
@@ -53,6 +55,7 @@ class Stored:
     power_degree: float | None = None
     A_error: np.ndarray | None = None
     level: float | None = None
+    sized: bool = True
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -111,14 +114,15 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
 
 
 def scaled(held: Stored, factor: float) -> Stored:
-    """The same with all lengths times ``factor``."""
-    if factor == 1.0:
+    """The same with all lengths times ``factor``, then in the unit that ``held`` has."""
+    if factor == 1.0 and held.sized:
         return held
     by = np.array([factor, factor, 1.0])
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
     c, h = held.connection, held.harmonics
-    near = {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
-    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **near)
+    more = {"unit": held.unit, "length": held.length}
+    more |= {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
+    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
     return replace(held, connection=c, harmonics=h, even=even, A_error=error)
@@ -202,7 +206,8 @@ def detected_sign(connection: Connection) -> str:
     centre = tuple(float(a[0] + a[-1]) / 2 for a in connection.axes)
     alpha, alphadot = Circle(centre=centre).cycle(64, [0.3 * half, 0.5 * half])
     xi = connection.velocity(alpha, alphadot)
+    least = ROUNDING * np.abs(xi).max(initial=0.0)
     for sign, value in (("+", 1.0), ("-", -1.0)):
-        if (displacement(value * xi)[:, 0] < 0).all() and (displacement(-value * xi)[:, 0] > 0).all():
+        if (displacement(value * xi)[:, 0] < -least).all() and (displacement(-value * xi)[:, 0] > least).all():
             return sign
     raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")

@@ -10,6 +10,7 @@ import functools
 import io
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,18 +48,19 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
-    plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree)
+    sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
+    length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
+    size = {"unit": unit, "length": length} if sized else {}
+    plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
     said = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
     if not sign and about.get("sign") not in SIGNS:
         said += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
     sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
-    stated = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
-    own = (about["length"], about["unit"]) if stated else (1.0, "BL")
     frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
-    turned = plain if sign == "+" else Connection(axes, -A, residual, plain.speed, degree)
+    turned = plain if sign == "+" else replace(plain, A=-A)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
-    known = {"A_error": error, "level": checked_level(about)}
-    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256, shapes, **known)
+    known = {"A_error": error, "level": checked_level(about), "sized": sized}
+    return Stored(turned, None, None, length, unit, frame[:60], sign, order, said, sha256, shapes, **known)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:

@@ -85,6 +85,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     unknown = np.isnan(residual).all() and not masked.all()
     masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
     speed = pick("speed", "component") if "speed" in found else rms(A, residual)
+    sized = "length_unit" in told
     length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))
     length = float(length) if np.ndim(length) == 0 and np.asarray(length).dtype.kind in "iuf" else np.nan
     if unit is None or not 0 < length < 1e9:
@@ -102,9 +103,10 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
         if rows.shape[0] != 3 or left.shape[0] != 3 or rows.shape[1] % 2 or not rows.size:
             raise ValueError(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
         harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
-    connection = Connection(axes, turn * A, residual, speed, degree)
+    size = {"unit": unit, "length": length} if sized else {}
+    connection = Connection(axes, turn * A, residual, speed, degree, **size)
     if "gait" in found:
-        connection = Tube(axes, turn * A, residual, speed, degree, _known(found, told, turn))
+        connection = Tube(axes, turn * A, residual, speed, degree, _known(found, told, turn), **size)
     frame = _text(told.get("frame", b"that of the table"))
     even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
     if even is not None and even.shape[0] != 3:
@@ -115,7 +117,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     error = checked_error("A_error", pick("A_error", "component", "joint"), A, told) if has_error else None
     return Stored(
         connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power,
-        A_error=error, level=checked_level(told),
+        A_error=error, level=checked_level(told), sized=sized,
     )  # fmt: skip
 
 

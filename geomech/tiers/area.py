@@ -73,7 +73,7 @@ class Area(Path):
     def choice(self, table, system, gait, amplitudes, numerics) -> np.ndarray | None:
         if system.joints == 2:
             return None
-        return self._spanned(table, system, gait, amplitudes, numerics, TIPS).spread / [system.length, 1.0]
+        return self._spanned(table, system, gait, amplitudes, numerics, TIPS).spread
 
     def along(self, system, numerics, count, phases) -> int:
         shapes = 2 * phases + (2 + TIPS) * RADII * AROUND  # for the displacement, and once more with its spread

@@ -129,7 +129,7 @@ class Tier:
         raise NotImplementedError
 
     def choice(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray | None:
-        """(B, 2), body lengths and rad: how far positions and headings at amplitudes (B,) hang on what is no part of the
+        """(B, 2), the system's unit and rad: how far positions and headings at amplitudes (B,) hang on what is no part of the
         question, as a spanning surface; None where there is nothing to choose."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,8 @@ def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
     count, how = tier.directions(system, numerics), (system.halved, system.singularity)
-    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how)
+    more = {"unit": system.unit, "length": system.length}
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how, **more)
 
 
 def shapes(system, numerics, directions: int = 0) -> int:
@@ -116,7 +118,7 @@ class Path(Tier):
 
     def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
-            return own
+            return own if own.length else replace(own, unit=system.unit, length=system.length)
         return system.fitted(
             axes(system, numerics), self.directions(system, numerics), numerics.interpolation, progress
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.output.plots.style import axes_of, figure, styled
-from geomech.study.tables import ERRORS, QUANTITIES, error_of, of_pose
+from geomech.study.tables import ERRORS, QUANTITIES, error_of, of_pose, unit_of
 from geomech.tiers import TIERS
 
 LEAST = 1e-3  # body lengths or rad: an axis spans no less, so that rounding is not drawn as motion
@@ -18,12 +18,12 @@ BARS = 15  # error bars on a line, at most
 
 @styled
 def displacement(
-    table: Mapping, unit: str = "BL", ax=None, label: str = "", gait: Gait | None = None, quantity: str = "x",
-    legend: bool = True, length: float = 1.0, errors: bool = True, **style,
+    table: Mapping, *, ax=None, label: str = "", gait: Gait | None = None, quantity: str = "x", legend: bool = True,
+    errors: bool = True, **style,
 ):  # fmt: skip
     """One of QUANTITIES per cycle against amplitude, a line a tier; ``table`` as `Study.study` gives it.
 
-    errors: with their bars. length: of the body in ``unit``, which turns errors from body lengths into it."""
+    errors: with their bars. The table's own units are those of the axis."""
     ax, amplitudes = axes_of(ax), np.asarray(table["amplitude"], float)
     for name, tier in TIERS.items():
         if name in table:
@@ -33,13 +33,13 @@ def displacement(
             if errors and all(key in table for key in ERRORS):
                 bars = {"fmt": "none", "ecolor": tier.colour, "elinewidth": 0.7, "zorder": line.get_zorder() - 0.5}
                 every = max(1, -(-len(amplitudes) // BARS))
-                ax.errorbar(amplitudes, values, error_of(table, quantity, name, length), **bars, errorevery=every)
+                ax.errorbar(amplitudes, values, error_of(table, quantity, name), **bars, errorevery=every)
     _band(ax, table, quantity, amplitudes)
     ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
-    _widen(ax, LEAST * (1.0 if quantity == "heading" else length))
+    _widen(ax, LEAST * (1.0 if quantity == "heading" else table.get("body_length", 1.0)))
     what = quantity.replace("_", " ")
     ax.set(xlabel=gait.amplitude_label if gait else "amplitude")
-    ax.set_ylabel(f"{what} per cycle ({'rad' if quantity == 'heading' else unit})")
+    ax.set_ylabel(f"{what} per cycle ({unit_of(table, quantity)})")
     if legend:
         ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1)
     return ax
@@ -69,15 +69,15 @@ def _widen(ax, least: float) -> None:
 
 
 @styled
-def displacement_figure(tables: Mapping[str, Mapping], unit: str, gaits: Sequence[Gait], length: float = 1.0):
+def displacement_figure(tables: Mapping[str, Mapping], gaits: Sequence[Gait]):
     """QUANTITIES side by side, a row for each gait's table."""
     fig, axes = figure(10.8, 0.5 + 2.5 * len(tables), len(QUANTITIES), len(tables))
     for row, (name, table), gait in zip(axes, tables.items(), gaits):
         for ax, quantity in zip(row, QUANTITIES):
-            displacement(table, unit, ax, gait=gait, quantity=quantity, legend=False, length=length, marker="o")
+            displacement(table, ax=ax, gait=gait, quantity=quantity, legend=False, marker="o")
         row[0].set_title(f"{name} (not in the scene)" if "note" in table else name, loc="left")
         if table.get("frequency"):
-            _speed_axis(row[-1], table["frequency"], unit)
+            _speed_axis(row[-1], table["frequency"], unit_of(table, "x"))
     handles = {label: line for ax in axes[:, 0] for line, label in zip(*ax.get_legend_handles_labels())}
     fig.get_layout_engine().set(rect=(0.0, 0.0, 0.985, 1.0))  # the last labels are wider than their axes
     fig.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=len(handles))

@@ -30,7 +30,7 @@ SHADOW = "dashed: the gait, seen along the joints that are held here"
 
 @styled
 def connection_figure(
-    connection: Connection, unit: str = "BL", labels: Labels = ANGLES, style: str = "quiver",
+    connection: Connection, *, labels: Labels = ANGLES, style: str = "quiver",
     beside: Connection | None = None, names: Sequence[str] = (),
 ):  # fmt: skip
     """All three rows of A side by side, as arrows ("quiver") or "streamlines". beside: the connection in another body frame,
@@ -42,15 +42,13 @@ def connection_figure(
         sizes = [largest(np.hypot(*c.A[component])) for c in rows]
         top = None if beside is None else max(sizes)
         for c, ax in zip(rows, axes[:, component]):
-            draw(c, component, unit, ax, labels=labels, top=top)
+            draw(c, component, ax=ax, labels=labels, top=top)
     _name(axes, names)
     return fig
 
 
 @styled
-def pairs_figure(
-    form: TwoForm, at: Sequence[float], component: int = 0, unit: str = "BL", labels: Labels | None = None
-):
+def pairs_figure(form: TwoForm, at: Sequence[float], component: int = 0, *, labels: Labels | None = None):
     """The CCF of all pairs of joints on the planes through the shape ``at`` (d,), one component, on one scale. labels: (name,
     unit) of each shape variable."""
     labels = labels or [(f"alpha_{k + 1}", "rad") for k in range(form.field.joints)]
@@ -60,7 +58,7 @@ def pairs_figure(
     fig, axes = figure(3.6 * columns, 3.2 * rows, columns, rows, layout="compressed")
     top = max(largest(f.values[component]) for f in fields)
     for (i, j), field, ax in zip(form.pairs, fields, axes.ravel()):
-        ccf_map(field, component, (), unit, ax, None, (labels[i], labels[j]), top=top)
+        ccf_map(field, component, ax=ax, labels=(labels[i], labels[j]), top=top)
         rest = ", ".join(
             f"{quantity(labels[k][0])} = {at[k]:g}".replace("-", MINUS_SIGN)
             for k in range(len(labels))
@@ -84,7 +82,7 @@ class Row(NamedTuple):
 
 @styled
 def ccf_figure(
-    field: Field, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None, labels: Labels = ANGLES,
+    field: Field, gaits: Sequence[Gait] = (), *, error: Field | None = None, labels: Labels = ANGLES,
     style: str = "map", metric: Metric | Finsler | None = None, beside: tuple[Field, Field | None] | None = None,
     names: Sequence[str] = (),
 ):  # fmt: skip
@@ -92,12 +90,12 @@ def ccf_figure(
     metric: its rings on a map. beside: (CCF, error) in another body frame, drawn below on the same scales. names: of the two
     frames."""
     rows = [Row(field, error, gaits, labels)] + ([] if beside is None else [Row(*beside, gaits, labels)])
-    return _ccf_rows(rows, unit, style, metric, names, same=True)
+    return _ccf_rows(rows, style, metric, names, same=True)
 
 
 @styled
 def planes_figure(
-    planes: Sequence[Plane], gait: Gait | None = None, unit: str = "BL", labels: Labels | None = None, style: str = "map",
+    planes: Sequence[Plane], gait: Gait | None = None, *, labels: Labels | None = None, style: str = "map",
     beside: Plane | None = None, names: Sequence[str] = (),
 ):  # fmt: skip
     """The CCF of pairs of joints on planes of shape space, a row a pair, as `ccf_figure`. gait: of all joints; where it leaves
@@ -109,13 +107,11 @@ def planes_figure(
         on, off = ([x for x in seen if x.lies == lies] for lies in (True, False))
         rows.append(Row(one.ccf, one.error, on, [labels[k] for k in one.pair], off))
     told = [f"{told_at(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
-    return _ccf_rows(rows, unit, style, None, told or [told_at(one, labels) for one in planes], same=beside is not None)
+    return _ccf_rows(rows, style, None, told or [told_at(one, labels) for one in planes], same=beside is not None)
 
 
 @styled
-def plane_connection_figure(
-    planes: Sequence[Plane], unit: str = "BL", labels: Labels | None = None, style: str = "quiver"
-):
+def plane_connection_figure(planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver"):
     """The rows of A on planes of shape space, a row a pair of joints, as `connection_figure`: of the two that move. labels: as
     for `planes_figure`."""
     draw = {"quiver": vector_field, "streamlines": streamlines}[choose("style", style, CONNECTION_STYLES)]
@@ -123,7 +119,7 @@ def plane_connection_figure(
     fig, axes = figure(10.8, 3.0 + 2.7 * (len(planes) - 1), 3, len(planes), layout="compressed")
     for one, row in zip(planes, axes):
         for component, ax in enumerate(row):
-            draw(one.connection, component, unit, ax, labels=[labels[k] for k in one.pair])
+            draw(one.connection, component, ax=ax, labels=[labels[k] for k in one.pair])
     _name(axes, [told_at(one, labels) for one in planes])
     return fig
 
@@ -139,7 +135,7 @@ def told_at(plane: Plane, labels: Labels) -> str:
     return f"{told} {labels[plane.held[0]][1]}" if plane.held else ""
 
 
-def _ccf_rows(rows: Sequence[Row], unit: str, style: str, metric, names: Sequence[str], same: bool):
+def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):
     """Maps of the three components, a line of them for each row. same: on the same scales."""
     if choose("style", style, CCF_STYLES) == "surface":
         fig = blank(11.8, 3.6 * len(rows))
@@ -152,7 +148,7 @@ def _ccf_rows(rows: Sequence[Row], unit: str, style: str, metric, names: Sequenc
     for component in range(len(TITLES)):
         top = max(largest(r.field.values[component]) for r in rows) if same and len(rows) > 1 else None
         for r, ax in zip(rows, axes[:, component]):
-            draw(r.field, component, r.gaits, unit, ax, r.error, r.labels, top=top, **more)
+            draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
             for shadow in r.shadows:
                 if style == "surface":
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)

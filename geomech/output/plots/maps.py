@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def shape_space(ax, axes: Sequence[np.ndarray], labels: Labels = ANGLES):
 def vector_field(
     connection: Connection,
     component: int = 0,
-    unit: str = "BL",
+    *,
     ax=None,
     every: int | None = None,
     labels: Labels = ANGLES,
@@ -65,15 +66,15 @@ def vector_field(
         own = {"scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])), "scale_units": "xy"}
     arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **own)
     arrows.set_clim(0.0, top or most or 1.0)
-    return row_told(ax, arrows, component, unit, connection, labels)
+    return row_told(ax, arrows, component, connection, labels)
 
 
-def row_told(ax, arrows, component: int, unit: str, connection: Connection, labels: Labels):
+def row_told(ax, arrows, component: int, connection: Connection, labels: Labels):
     """Title, colours and plane of a map of a row of A."""
     of = rf"\mathbf{{A}}^{{{COMPONENTS[component]}}}"
     ax.set_title(f"${of}$: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
-    colorbar.set_label(f"$|{of}|$ ({unit_of(component, unit)}/{labels[0][1]})")
+    colorbar.set_label(f"$|{of}|$ ({unit_of(component, connection.unit)}/{labels[0][1]})")
     return shape_space(ax, connection.axes, labels)
 
 
@@ -86,7 +87,7 @@ def drawable(field: Field) -> Field:
     """The field on at most FINEST points an axis: a finer mesh shows no more and fills gigabytes."""
     picks = [np.unique(np.linspace(0, len(a) - 1, min(len(a), FINEST)).round().astype(int)) for a in field.axes]
     axes = tuple(a[p] for a, p in zip(field.axes, picks))
-    return Field(axes, field.values[(..., *np.ix_(*picks))], field.degree)
+    return replace(field, axes=axes, values=field.values[(..., *np.ix_(*picks))])
 
 
 def has(field: Field, component: int) -> bool:
@@ -97,7 +98,7 @@ def has(field: Field, component: int) -> bool:
 
 @styled
 def ccf_map(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
 ):  # fmt: skip
     """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)), as far as the field goes; the colours
@@ -135,7 +136,7 @@ def ccf_map(
         ax.text(0.02, 0.02, "gait leaves the field", transform=ax.transAxes, fontsize=7, bbox=paper)
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     ax.figure.colorbar(image, ax=ax, shrink=0.85, ticks=None if drawn else [0.0]).set_label(
-        ccf_label(component, unit, labels)
+        ccf_label(component, field.unit, labels)
     )
     return ax
 
@@ -275,7 +276,7 @@ def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 @styled
-def frame_figure(pose: Field, unit: str = "BL", labels: Labels = ANGLES):
+def frame_figure(pose: Field, *, labels: Labels = ANGLES):
     """The pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
     from cmcrameri import cm
 
@@ -287,7 +288,7 @@ def frame_figure(pose: Field, unit: str = "BL", labels: Labels = ANGLES):
         image = ax.pcolormesh(
             *pose.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True
         )
-        fig.colorbar(image, ax=ax, shrink=0.85).set_label(f"{name} ({'rad' if component == 2 else unit})")
+        fig.colorbar(image, ax=ax, shrink=0.85).set_label(f"{name} ({unit_of(component, pose.unit)})")
         ax.set_title(f"{name} of the frame")
         shape_space(ax, pose.axes, labels)
     return fig

@@ -69,7 +69,7 @@ def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = 
     if system.joints == 2:
         if field is not None:
             component = next((k for k in range(3) if has(field, k)), 0)
-            ccf_map(field, component, [scene.gait], system.unit, ax, error, labels=system.shape_labels)
+            ccf_map(field, component, [scene.gait], ax=ax, error=error, labels=system.shape_labels)
         else:
             draw_gait(scene.gait, ax)
             low, high = motion.alpha.min(0), motion.alpha.max(0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from geomech.connection import Connection
@@ -38,11 +40,14 @@ def along(optimum: Optimum, study: Study | None = None) -> Field:
     there, (x, y, _) = fitted, best.displacement
     if not fitted.field.masked:
         frame = minimum_perturbation(fitted)
-        there = Connection(fitted.axes, frame.connection(fitted), fitted.residual, fitted.speed, fitted.degree)
+        A = frame.connection(fitted)
+        there = Connection(fitted.axes, A, fitted.residual, fitted.speed, fitted.degree, **fitted.size)
         x, y, _ = frame.net(best.displacement, best.gait.shape(0.0))
     found = ccf(there)
-    share = np.array([0, 0, 1] if optimum.request.aim.name == "turning" else [x, y, 0]) / (np.hypot(x, y) or 1.0)
-    return Field(found.axes, np.tensordot(share, found.values, 1)[None], found.degree)
+    turning = optimum.request.aim.name == "turning"
+    share = np.array([0, 0, 1] if turning else [x, y, 0]) / (np.hypot(x, y) or 1.0)
+    values = np.tensordot(share, found.values, 1)[None]
+    return replace(found, values=values, unit="rad" if turning else found.unit)
 
 
 def held(optimum: Optimum, field: Field | None) -> np.ndarray:
@@ -86,7 +91,7 @@ def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
     else:
         field = drawable(along(optimum) if field is None else field)
-        ccf_map(field, 0, (), unit_of_gain(optimum), ax, labels=system.shape_labels)
+        ccf_map(field, ax=ax, labels=system.shape_labels)
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
         ax.set_title(f"CCF of the {gain(optimum)},\n{frame}")
         bar = ax.collections[0].colorbar
@@ -102,7 +107,7 @@ def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, stu
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
     field, plane = along(optimum, study) if field is None else field, stretch(study.metric)
     effort = "BL" if system.power_degree == 1 else "path length"
-    stretched_map(field, plane, 0, (), unit_of_gain(optimum), ax, labels=system.shape_labels, effort=effort)
+    stretched_map(field, plane, ax=ax, labels=system.shape_labels, effort=effort)
     ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
     bar = ax.collections[0].colorbar
     bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
@@ -113,10 +118,6 @@ def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, stu
 
 def gain(optimum: Optimum) -> str:
     return "heading" if optimum.request.aim.name == "turning" else "displacement"
-
-
-def unit_of_gain(optimum: Optimum) -> str:
-    return "rad" if optimum.request.aim.name == "turning" else optimum.scene.system.unit
 
 
 def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> None:

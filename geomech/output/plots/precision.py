@@ -31,10 +31,13 @@ FLAT = 0.3  # order below which finer settings gain nothing to speak of
 @styled
 def work_precision(results: Mapping, axes=None):
     """Error against seconds of `accuracy.study`, a line for each setting of a tier, the values it goes from and to beside
-    its ends: how far off the answer is on the first of two Axes, how far off what that setting comes to on the second."""
-    axes = figure(10.0, 3.8, 2)[1][0] if axes is None else axes
-    for ax, (against, (title, error)) in zip(axes, PANELS.items()):
-        lines = [line for line in results["lines"] if line["against"] == against]
+    its ends: how far off the answer is on the first of two Axes, how far off what that setting comes to on the second. Of what
+    no setting is measured against there are no Axes."""
+    found = {against: [x for x in results["lines"] if x["against"] == against] for against in PANELS}
+    found = {against: lines for against, lines in found.items() if lines}
+    axes = figure(5.0 * len(found), 3.8, len(found))[1][0] if axes is None else axes
+    for ax, (against, lines) in zip(axes, found.items()):
+        title, error = PANELS[against]
         for line, marker in zip(lines, KNOB_MARKER):
             colour = TIERS[line["tier"]].colour if against == "truth" else f"C{KNOB_MARKER.index(marker)}"
             _line(ax, line, marker, colour)
@@ -43,9 +46,8 @@ def work_precision(results: Mapping, axes=None):
         for axis in (ax.xaxis, ax.yaxis):
             _decades(axis)
         ax.grid(True, which="major", lw=0.3, color="0.85")
-        if lines:
-            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), title="tier: setting, from coarse to fine")
-            ax.get_legend().get_title().set_fontsize(8)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), title="tier: setting, from coarse to fine")
+        ax.get_legend().get_title().set_fontsize(8)
     return axes
 
 
@@ -70,6 +72,7 @@ def _decades(axis) -> None:
 
 @styled
 def work_precision_figure(results: Mapping):
-    fig, axes = figure(10.0, 5.2, 2)
+    count = len({line["against"] for line in results["lines"]})
+    fig, axes = figure(5.0 * count, 5.2, count)
     work_precision(results, axes[0])
     return fig

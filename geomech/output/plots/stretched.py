@@ -26,7 +26,7 @@ from geomech.stretch import Stretch
 
 @styled
 def stretched_map(
-    field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None,
+    field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None,
     error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort", top: float | None = None,
 ):  # fmt: skip
     """A component of the CCF over stretched shape space, for each area there: an area on paper times the colour is what it adds
@@ -50,7 +50,7 @@ def stretched_map(
     ax.set(aspect="equal", xlabel=f"effort ({effort})", ylabel=f"effort ({effort})")
     ax.set_title(f"{ccf_name(component)}: {TITLES[component]}")
     per = f"{effort}$^2$" if effort.isalpha() else f"({effort})$^2$"
-    label = f"{ccf_name(component)} / area ({unit_of(component, unit)}/{per})"
+    label = f"{ccf_name(component)} / area ({unit_of(component, field.unit)}/{per})"
     ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(label)
     return ax
 
@@ -100,13 +100,13 @@ def _draw(gait: Gait, ax, stretch: Stretch) -> None:
 
 @styled
 def stretched_figure(
-    field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), unit: str = "BL", error: Field | None = None,
+    field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
     labels: Labels = ANGLES, effort: str = "effort",
 ):  # fmt: skip
     """All three components side by side, with what the plane does to lengths."""
     fig, axes = figure(11.4, 3.5, 3, layout="compressed")
     for component, ax in enumerate(axes[0]):
-        stretched_map(field, stretch, component, gaits, unit, ax, error, labels, effort)
+        stretched_map(field, stretch, component, gaits, ax=ax, error=error, labels=labels, effort=effort)
     off = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"
     fold = f"; {100 * stretch.folded:.2g} % of the plane is folded over" if stretch.folded else ""
     fig.supxlabel(off + fold, fontsize=8)

@@ -36,7 +36,7 @@ PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards
 
 @styled
 def streamlines(
-    connection: Connection, component: int = 0, unit: str = "BL", ax=None, labels: Labels = ANGLES, top: float | None = None
+    connection: Connection, component: int = 0, *, ax=None, labels: Labels = ANGLES, top: float | None = None
 ):  # fmt: skip
     """Row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for its
     size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
@@ -57,12 +57,12 @@ def streamlines(
         u, v, size = 0 * u, 0 * v, 0 * size
     look = {"cmap": "viridis", "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
-    return row_told(ax, lines.lines, component, unit, connection, labels)
+    return row_told(ax, lines.lines, component, connection, labels)
 
 
 @styled
 def ccf_contours(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, top: float | None = None,
 ):  # fmt: skip
     """A component of the CCF as contours, dashed below zero, and the area of each gait shaded by the sign of what it adds to
@@ -85,7 +85,7 @@ def ccf_contours(
         draw_gait(gait, ax, within=field.axes)
     if signs:
         ax.legend(handles=_ways(component, signs), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
-    ax.set_title(f"{ccf_label(component, unit, labels)}: {TITLES[component]}")
+    ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
     return ax
 
 
@@ -129,7 +129,7 @@ def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 @styled
 def ccf_surface(
-    field: Field, component: int = 0, gaits: Sequence[Gait] = (), unit: str = "BL", ax=None, error: Field | None = None,
+    field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, top: float | None = None,
 ):  # fmt: skip
     """A component of the CCF as a surface over shape space, with gaits drawn on it and, on the plane below, their areas shaded
@@ -163,7 +163,7 @@ def ccf_surface(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
         title=f"{ccf_name(component)}: {TITLES[component]}",
     )  # fmt: skip
-    ax.set_zlabel(ccf_label(component, unit, labels), labelpad=6)
+    ax.set_zlabel(ccf_label(component, field.unit, labels), labelpad=6)
     ax.set_zticks([x for x in ax.get_zticks() if -most <= x <= most])
     ax.tick_params(labelsize=7)
     ax.view_init(elev=28, azim=-58)
