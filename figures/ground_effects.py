@@ -24,8 +24,9 @@ PLACES = (-0.04, 0.0, 0.04)  # m
 
 
 def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0, 0.2, 0.4, 0.6, 0.8)) -> dict:
-    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and falling
-    (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
+    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
+    falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
+    REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
     plain = leg.run()
     size = np.sqrt((plain.force**2).sum(-1).mean())
