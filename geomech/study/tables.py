@@ -29,8 +29,8 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
 
     medium: None, or what the uncertainty of the medium does to the true displacement, and so to every tier's
     (`geomech.study.uncertainty.of_medium`): "medium_error" {tier: [...]}, of the position, body lengths,
-    "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit, and
-    "medium_error_rule" [...].
+    "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit,
+    "medium_shift_of", alike, by how much it shifts the mean, and "medium_error_rule" [...].
     """
     unit, frequency = scene.system.unit, frequency_of(scene.system, gait)
     found = {m: of_pose(p) for m, p in poses.items()}
@@ -42,6 +42,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
         more = {"frequency": frequency, **_speeds(found, frequency, scene.system.length), **more}
     if medium is not None:
         units |= {"medium_error": "BL", "medium_error_heading": "rad", "medium_error_of": "that of the quantity"}
+        units["medium_shift_of"] = units["medium_error_of"]
         more = {**_of_medium(medium, tuple(poses), scene.system.length), **more}
     return {
         "amplitude": np.asarray(amplitudes, float).tolist(),
@@ -75,6 +76,7 @@ def _of_medium(medium: Mapping, methods: tuple[str, ...], length: float) -> dict
         "medium_error": dict.fromkeys(methods, position),
         "medium_error_heading": dict.fromkeys(methods, medium["heading"].tolist()),
         "medium_error_of": {q: medium[q].tolist() for q in QUANTITIES},
+        "medium_shift_of": {q: medium["shift"][q].tolist() for q in QUANTITIES},
         "medium_error_rule": medium["rule"],
     }
 
