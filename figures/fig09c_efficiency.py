@@ -4,7 +4,8 @@ Rows: progress per cycle over the arc length of a wave; undulation efficiency, p
 mechanical cost of transport. Left against the mean relative curvature, right against A / lambda, which are one to one.
 Dots mark the best wave where there is one: efficiency and slip go on improving with the amplitude. Solid: the whole
 body, ends and yaw included. Dashed and dotted: the balance of force along an endless wave that slides along its curve,
-without and with the sandfish's head drag; dash-dot-dotted: one whose points move only sideways. Last row: the sandfish's
+without and with the sandfish's head drag; dash-dot-dotted: one whose points move only sideways. Pale: the snake, its skin
+friction set against that of an aluminium rod, 0.2, in place of the 0.15 in the caption of Fig. 5. Last row: the sandfish's
 body velocity through a cycle of its own wave (dash-dotted above).
 
 The paper's text and caption define the efficiency by the wavelength and show its optimum near the animal, A / lambda =
@@ -25,6 +26,8 @@ from geomech.scene import Scene, load
 from geomech.study import undulation
 
 SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
+ROUGHER = "shovel-nosed-snake, rod 0.2"  # the snake, if the law's rod had that friction, not the 0.15 of Fig. 5
+COLOURS = {**SCENES, ROUGHER: "#8FD3B6"}
 ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
     "endless": (False, "sliding", "--", "endless wave, sliding"),
     "endless_head": (True, "sliding", ":", "the same, head drag"),
@@ -40,17 +43,20 @@ MEASURES = {  # what is best: the largest (1) or the least (-1)
 
 
 def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
-    """For each scene, with ``finer`` times its elements, its `undulation.performance` over amplitudes A / lambda (B,), and
-    "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the amplitudes. For the
-    sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is assumed, and not marked), and
-    "cycle" (N, 3), body velocity at that amplitude.
+    """For each scene and ROUGHER, with ``finer`` times its elements, its `undulation.performance` over amplitudes A /
+    lambda (B,), and "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the
+    amplitudes. For the sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is
+    assumed, and not marked), and "cycle" (N, 3), body velocity at that amplitude.
 
     finer: a snake's tight bends take some 120 elements a wave; with a third of them its efficiency seems to have an
     optimum near A / lambda = 0.4, which is none.
     """
     out = {}
-    for name in SCENES:
-        scene = refined(load(name), finer)
+    for name in COLOURS:
+        scene = refined(load(name.partition(",")[0]), finer)
+        if name == ROUGHER:
+            skin, *others = scene.system.effects
+            scene = scene.changed(effects=(dataclasses.replace(skin, reference=0.2), *others))
         found = undulation.performance(scene, amplitudes)
         best = {k: optimum(amplitudes, found[k], sign) for k, (sign, _) in {"progress": (1, ""), **MEASURES}.items()}
         found["best"] = {k: v for k, v in best.items() if v is not None}
@@ -109,7 +115,7 @@ def draw(numbers: dict):
 def draw_measure(ax, numbers: dict, key: str, against: str):
     place = Sine().relative_curvature if against == "relative_curvature" else np.asarray
     for name, found in numbers.items():
-        x, colour = found[against], SCENES[name]
+        x, colour = found[against], COLOURS[name]
         shown = np.degrees if key == "slip" else np.asarray
         ax.plot(x, shown(found[key]), color=colour, label=name.replace("-", " "))
         if key in found["best"]:
@@ -150,7 +156,7 @@ def legend(fig, ax, animal: float):
     ):
         handles.append(Line2D([], [], **style))
         labels.append(label)
-    fig.legend(handles, labels, loc="outside upper center", ncols=4)
+    fig.legend(handles, labels, loc="outside upper center", ncols=3)
 
 
 if __name__ == "__main__":

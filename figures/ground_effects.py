@@ -1,9 +1,9 @@
 """What effects do to the force on the c-leg of Fig. 8(b) in loose poppy seeds.
 
 Left: what the inertia of grains adds, rms over the turn, over the rms force without it, against the rate of turning, for
-lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift and drive over those in still, level ground against
-air speed over that of fluidisation, and slope over the angle of repose. Right: lift against angle with an earlier intrusion
-before the leg.
+lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift over that in still, level ground against air
+speed over that of fluidisation, and against slope over the angle of repose, where the leg sweeps down the slope and where it
+sweeps up. Right: lift against angle with an earlier intrusion before the leg.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from figures import main
 from geomech.output import plots
 from geomech.scene import load
 from rft.vertical.effects import Aeration, DisturbedGround, GrainInertia, Slope
+from rft.vertical.effects.slope import REPOSE
 
 SEEN = 230.0  # rpm
 SHARE = 0.1  # of the force, from which an effect counts as seen; assumed
-REPOSE = np.radians(36.0)  # of poppy seeds, assumed
 PLACES = (-0.04, 0.0, 0.04)  # m
 
 
 def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0, 0.2, 0.4, 0.6, 0.8)) -> dict:
-    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated and sloping (N,): peaks
-    of the lift over that without. angle (T,), rad; lift {place: (T,)}, N."""
+    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
+    falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
+    REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
     plain = leg.run()
     size = np.sqrt((plain.force**2).sum(-1).mean())
@@ -39,7 +40,8 @@ def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0,
         "at": rates[-1] * np.sqrt(SHARE / added[:, -1]),  # it grows with the square of the rate
         "shares": np.array(shares),
         "aerated": np.array([peak(Aeration(x * 0.03, 0.03)) for x in shares]),
-        "sloping": np.array([peak(Slope(x * REPOSE, REPOSE)) for x in shares]),
+        "rising": np.array([peak(Slope(x * REPOSE)) for x in shares]),
+        "falling": np.array([peak(Slope(-x * REPOSE)) for x in shares]),
         "angle": plain.pose[:, 2],
         "lift": {None: plain.force[:, 1]} | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
     }
@@ -73,9 +75,11 @@ def draw(numbers: dict):
     left.minorticks_off()
     left.legend(loc="upper left")
     middle.plot(numbers["shares"], numbers["aerated"], "o-", ms=3, lw=1.0, color="C0", label="air speed / fluidisation")
-    middle.plot(numbers["shares"], numbers["sloping"], "s-", ms=3, lw=1.0, color="C3", label="slope / angle of repose")
+    for name, marker, way in (("rising", "s-", "down"), ("falling", "s--", "up")):
+        label = f"slope / angle of repose, leg sweeps {way}hill"
+        middle.plot(numbers["shares"], numbers[name], marker, ms=3, lw=1.0, color="C3", label=label)
     middle.set(xlabel="share", ylabel="peak lift / that without", xlim=(0, 1), ylim=(0, 1.02))
-    middle.legend(loc="lower left")
+    middle.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     for place, colour in zip(numbers["lift"], ("0.2", "C1", "C2", "C4")):
         label = "untouched" if place is None else f"earlier at x = {1e3 * place:g} mm"
         right.plot(np.degrees(numbers["angle"]), numbers["lift"][place], color=colour, lw=1.0, label=label)

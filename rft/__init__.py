@@ -12,11 +12,11 @@ from rft.effects import (
     TowedSled,
     Transient,
 )
-from rft.media import CATALOGUE, Coulomb, Granular, Medium, Table, Viscous
+from rft.media import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
 from rft.time_stepping import TimeSteps, time_steps
 from rft.work import Work, work_done
 
-SOLVER = 6  # raised with every change that moves a number: what was computed before is not taken up after it
+SOLVER = 7  # raised with every change that moves a number: what was computed before is not taken up after it
 
 __all__ = [
     "CATALOGUE",
@@ -36,6 +36,7 @@ __all__ = [
     "Serpenoid",
     "SkinFriction",
     "Solution",
+    "Surface",
     "Table",
     "TimeSteps",
     "TowedSled",

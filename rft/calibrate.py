@@ -26,7 +26,14 @@ MOST_CAPS = 10.0  # e of a hemisphere is 4
 LEVELS = 1e-6  # of its bound, within which a parameter counts as lying on it
 EXACT = 1e-14  # of steps and sums of squares, at which a fit has arrived
 UNTOLD = 1e-7  # smallest singular value, over the largest, of the slopes that still tell the parameters apart
-DEVIATIONS = 2.0  # standard errors to either side of the band of uncertainty: 95 %
+LEVEL, ONE = 0.95, 0.6827  # of intervals and bands, and within one standard deviation
+
+
+def widening(free: float, level: float = LEVEL) -> float:
+    """Half an interval over the standard error, with so many degrees of freedom (Student)."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(free, (1 + level) / 2))
 
 
 @dataclass(frozen=True)
@@ -78,8 +85,9 @@ class Fit:
     end_caps: float
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{n} {v:.4g} +- {e:.2g}" for n, v, e in zip(self.names, self.values, self.errors))
-        return f"Fit({self.law}: {told}; {self.data.psi.size} rows, rms {self.rms:.3g} N)"
+        both = zip(self.names, self.values, self.intervals)
+        told = ", ".join(f"{name} {value:.4g} ({low:.4g} to {high:.4g})" for name, value, (low, high) in both)
+        return f"Fit({self.law}, 95 %: {told}; {self.data.psi.size} rows, rms {self.rms:.3g} N)"
 
     @property
     def rms(self) -> float:
@@ -90,6 +98,16 @@ class Fit:
     def errors(self) -> np.ndarray:
         """Standard errors of the parameters."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def free(self) -> int:
+        """Degrees of freedom: forces that weigh something beyond the parameters."""
+        return self.data.count - len(self.names)
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """(n, 2), each with 95 %."""
+        return self.values[:, None] + widening(self.free) * self.errors[:, None] * [-1.0, 1.0]
 
     @property
     def axial_force(self) -> float:
@@ -108,11 +126,12 @@ class Fit:
 
     @property
     def medium(self) -> Medium:
-        """The law, with the covariance of its own parameters."""
+        """The law, with the covariance of its own parameters, widened (Student) so that a standard deviation holds 68 %."""
         kind = FITS[self.law]
         own = [name for name in self.names if name in kind.make.__dataclass_fields__]  # k only where the law has it
         values, n = dict(zip(self.names, self.values.tolist())), len(own)
-        return kind.make(**{x: values[x] for x in own}, **({"covariance": self.covariance[:n, :n]} if own else {}))
+        wide = widening(self.free, ONE) ** 2 * self.covariance[:n, :n]
+        return kind.make(**{x: values[x] for x in own}, **({"covariance": wide} if own else {}))
 
     def forces(self, psi, values=None) -> np.ndarray:
         """(2, ...): forces along and across the rod at attack angles psi (rad), N; values: other ones of the parameters."""
@@ -128,7 +147,9 @@ class Fit:
                 (self.forces(psi, self.values + h * step) - self.forces(psi, self.values - h * step)) / (2 * h)
             )
         slopes = np.array(slopes)
-        return DEVIATIONS * np.sqrt(np.maximum(np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes), 0.0))
+        return widening(self.free) * np.sqrt(
+            np.maximum(np.einsum("i...,ij,j...->...", slopes, self.covariance, slopes), 0.0)
+        )
 
 
 def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN, end_caps: float | str = 0.0) -> Fit:

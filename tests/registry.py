@@ -159,7 +159,7 @@ EFFECTS = {
 GROUND_EFFECTS = {
     "aeration": (lambda x: Aeration(air_speed=0.03 * x, fluidisation=0.03), 1),
     "grain-inertia": (lambda x: GrainPressure(strength=2 * x, density=700.0), 1),
-    "slope": (lambda x: Slope(angle=-x, repose=0.6), 1),
+    "slope": (lambda x: Slope(angle=x, repose=0.6), 1),
     "disturbed-ground": (lambda x: DisturbedPlaces(places=(0.0, -0.1), radius=0.05, weakening=x), 1),
 }
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import norm, qmc
 
 from geomech import cli, scene
 from geomech.rows import Rows
@@ -44,6 +45,8 @@ def test_the_sample_has_its_published_fit(capsys):
     assert (found["C"], found["gamma0_deg"], found["k"]) == pytest.approx((1.49, 12.6, 2.49), rel=0.005)
     assert found["rms"] == pytest.approx(0.056, abs=0.001)
     assert found["parameters"] == ["C", "gamma0", "k"]
+    assert list(found["intervals"]) == list(found["errors"]) == ["C", "gamma0_deg", "k"]
+    assert found["intervals"]["gamma0_deg"] == pytest.approx([7.5, 17.7], abs=0.5)
     assert found["errors"]["gamma0_deg"] == pytest.approx(math.degrees(math.sqrt(found["covariance"][1][1])))
     assert found["axial_stress_Pa"] == pytest.approx(
         found["k"] * 0.588 * 1030 * 9.81 * 0.030
@@ -122,8 +125,25 @@ def test_covariance_and_band_are_those_of_the_law_linearised():
     np.testing.assert_allclose(found.errors**2, np.diag(found.covariance))
     psi = np.radians([5.0, 20.0, 80.0])
     spread = np.einsum("knp,pq,knq->kn", by_hand(found, psi), found.covariance, by_hand(found, psi))
-    np.testing.assert_allclose(found.band(psi), 2 * np.sqrt(spread), rtol=1e-4, atol=1e-12)
-    assert found.medium.covariance == tuple(map(tuple, found.covariance.tolist()))
+    assert found.free == 13
+    np.testing.assert_allclose(found.band(psi), 2.1604 * np.sqrt(spread), rtol=1e-4, atol=1e-12)  # Student's, 95 %
+    np.testing.assert_allclose(found.intervals[:, 1] - found.values, 2.1604 * found.errors, rtol=1e-4)
+    np.testing.assert_allclose(found.intervals.mean(1), found.values)
+    np.testing.assert_allclose(found.medium.covariance, 1.0400**2 * found.covariance, rtol=1e-4)  # and 68 %
+
+
+def test_intervals_of_few_forces_hold_as_often_as_they_say():
+    """95 and 68 % of the noise, spread evenly over its distribution, with two degrees of freedom; twice the standard error
+    and one of it would hold the true value in 82 and 58 %."""
+    noise = 0.02 * norm.ppf(qmc.Sobol(4, seed=1).random_base2(7)).reshape(-1, 2, 2)
+    held, near = [], []
+    for some in noise:
+        found = fit("viscous", rod_drag(np.array([0.0, 90.0]), *(np.array([[3.0, 0.0], [0.0, 7.5]]) + some)))
+        held.append(np.abs(found.values - [2.5, 3.0]) <= found.intervals[:, 1] - found.values)
+        near.append(abs(found.values[0] - 2.5) <= math.sqrt(found.medium.covariance[0][0]))
+    assert found.free == 2 and found.names == ("ratio", "axial_force")
+    np.testing.assert_allclose(np.mean(held, 0), 0.95, atol=0.025)
+    assert np.mean(near) == pytest.approx(0.68, abs=0.04)
 
 
 def test_no_other_start_ends_lower():
@@ -395,7 +415,7 @@ def test_the_picture_shows_data_law_band_and_residuals():
 def test_a_fit_shows_itself_in_a_line_and_one_angle_settles_nothing():
     told = repr(fit("granular", noisy(size=0.01)))
     assert (
-        told.startswith("Fit(granular: C 1.781 +- 0.014")
+        told.startswith("Fit(granular, 95 %: C 1.781 (1.751 to 1.811)")
         and "gamma0 0.24" in told
         and len(told) < 150
         and "\n" not in told

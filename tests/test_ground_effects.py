@@ -12,7 +12,7 @@ from figures import ground_effects
 from geomech import scene as scenes
 from geomech.output.explain import explain
 from rft.spatial import Spatial, bearing, shapes, wrench
-from rft.vertical import Plate, loads
+from rft.vertical import Plate, Polygon, loads
 from rft.vertical.effects import KINDS, Aeration, DisturbedGround, GrainInertia, Slope, folded
 
 POSE = [(0.0, -0.01, 0.7), (0.1, -0.2, -1.2), (-0.03, -0.04, 2.5)]
@@ -42,7 +42,7 @@ def of_mesh(effects, shape=None):
 def test_what_faces_bear_with_effects_sums_to_the_wrench():
     """Force and, of a fine mesh, moment: pressure of grains pushes against faces and has its lever, too."""
     fine, place = shapes.leg(0.03, 0.8, 0.006, 0.02, along=96, across=16, thick=6), np.array([0.02, 0.1, -0.01])
-    rates, effects = ([-0.3, 0.1, -0.4], [2.0, 9.0, 1.0]), (GrainInertia(20.0, 700.0), Slope(0.2, 0.6))
+    rates, effects = ([-0.3, 0.1, -0.4], [2.0, 9.0, 1.0]), (GrainInertia(20.0, 700.0), Slope(-0.2, 0.6))
     found, faces = (f(SOLID, fine, np.eye(3), place, *rates, effects) for f in (wrench, bearing))
     plain = wrench(SOLID, fine, np.eye(3), place, *rates)
     assert (np.abs(found.moment - plain.moment) > 0.1 * np.abs(plain.moment)).all()
@@ -129,10 +129,49 @@ def test_sizes_beyond_the_ground_are_refused():
     assert Slope(0.1).weight() == (0.0, 0.0)  # without a mass
 
 
-def test_a_slope_leaves_what_its_own_weight_does_not_take():
+HEADINGS = np.stack([np.cos(np.radians(np.arange(0, 360, 30))), np.sin(np.radians(np.arange(0, 360, 30)))], -1)
+
+
+def test_half_the_drag_is_left_downhill_at_20_degrees():
+    """The one datum of the paper (Sec. IV B), by default, of a plate that is dragged along the surface or pushed into it, in
+    the vertical plane and of a mesh; the rest of the directions keeps what gravity presses, cos 20 degrees."""
+    assert math.degrees(Slope(0.3).repose) == pytest.approx(37.88, abs=0.01)
+    for angle in (math.radians(20), -math.radians(20)):
+        downhill = -math.copysign(1.0, angle)
+        for v, left in (((downhill, 0), 0.5), ((-downhill, 0), math.cos(angle)), ((0, -1), math.cos(angle))):
+            for tilt in (0.0, 0.4, math.pi / 2):
+                plate = Plate(length=0.04, width=0.03, tilt=tilt).outline(8)
+                given = plate, [0.1, -0.1, 0.0], [*v, 0.0]
+                found, plain = loads(folded(MAP, [Slope(angle)]), *given), loads(MAP, *given)
+                np.testing.assert_allclose(found.force, left * plain.force, rtol=1e-12)
+                np.testing.assert_allclose(found.moment, left * plain.moment, rtol=1e-12)
+            given = np.eye(3), [0.1, 0.0, -0.1], [v[0], 0.0, v[1]], [0, 0, 0]
+            found, plain = (wrench(SOLID, MESH, *given, e) for e in ([Slope(angle)], []))
+            assert np.linalg.norm(plain.force) > 0
+            for what in ("force", "moment"):
+                np.testing.assert_allclose(getattr(found, what), left * getattr(plain, what), atol=1e-15)
+        across = wrench(SOLID, MESH, np.eye(3), [0, 0, -0.1], [0, 1.0, 0], [0, 0, 0], [Slope(angle)]).force
+        plain = wrench(SOLID, MESH, np.eye(3), [0, 0, -0.1], [0, 1.0, 0], [0, 0, 0]).force
+        np.testing.assert_allclose(across, math.cos(angle) * plain, atol=1e-15)
+
+
+def test_a_slope_weakens_in_proportion_to_how_far_a_face_moves_downhill():
+    """cos(angle) - d sin|angle| / tan(repose) at all directions; of a face that turns about a hub, by its own velocity."""
     for angle, repose in ((0.2, 0.6), (-0.35, 0.5), (0.0, 0.5)):
-        left = math.sin(repose - abs(angle)) / math.sin(repose)
-        np.testing.assert_allclose(both([Slope(angle, repose)]), left * both([]), rtol=1e-12)
+        d = np.maximum(-math.copysign(1.0, angle) * HEADINGS[:, 0], 0.0)
+        left = math.cos(angle) - d * math.sin(abs(angle)) / math.tan(repose)
+        assert left.min() == pytest.approx(math.sin(repose - abs(angle)) / math.sin(repose))
+        twist = np.column_stack([HEADINGS, np.zeros(len(HEADINGS))])
+        plate = Plate(length=0.04, width=0.03, tilt=0.3).outline(8)
+        found, plain = (loads(folded(MAP, e), plate, [0, -0.1, 0], twist) for e in ([Slope(angle, repose)], []))
+        np.testing.assert_allclose(found.force, left[:, None] * plain.force, rtol=1e-12, atol=1e-15)
+        tip = Polygon(points=((-1e-6, -0.03), (1e-6, -0.03)), width=0.02, closed=False).outline(1)
+        headings = np.arctan2(
+            HEADINGS[:, 1], HEADINGS[:, 0]
+        )  # of the tip: a leg that points down swings forwards at angle 0
+        pose = np.column_stack([0 * headings, 0 * headings - 0.1, -headings])
+        found, plain = (loads(folded(MAP, e), tip, pose, [0, 0, -5.0]) for e in ([Slope(angle, repose)], []))
+        np.testing.assert_allclose(found.moment, left * plain.moment, rtol=1e-12)
     for angle in (0.5, -0.5, 1.2):
         with pytest.raises(ValueError, match=r"slides by itself: it must be below the angle of repose, 28\.6 degrees"):
             Slope(angle, 0.5)

@@ -176,7 +176,7 @@ def test_what_is_left_out_is_what_the_documentation_says():
     assert Serpenoid() == Serpenoid(100, 1.0, "mean", 1.0)
     assert ConstantCurvature() == ConstantCurvature(100, 1.0, "mean", 2)
     assert Viscous() == Viscous(2.0)
-    assert SkinFriction() == SkinFriction(0.109, 0.137, 0.2)
+    assert SkinFriction() == SkinFriction(0.109, 0.137, 0.15)
     assert EndCaps(0.1) == EndCaps(0.1, head=1.0, tail=1.0)
     assert GrainInertia(**GRAINS) == GrainInertia(**GRAINS, strength=1.0)
     assert DepthProfile() == DepthProfile((1.0, 1.0), 0.0, 0.0)

@@ -313,7 +313,7 @@ REFUSED = [
     ("triangles = 300", "triangles = 0", "triangles must be a whole number from 1"),
     ("triangles = 300", "elements = 300", "[numerics] key: 'elements' is unknown"),
     ('kind = "slope"', 'kind = "hill"', "[[effects]] kind: 'hill' is unknown"),
-    ("angle_deg = 10", "angle_deg = 31", "a slope of 31 degrees slides by itself"),
+    ("angle_deg = 10", "angle_deg = 38", "a slope of 38 degrees slides by itself"),
     ("mass = 0.2", 'mass = 0.2\n[[effects]]\nkind = "slope"\nangle = 0.1', "slope stands twice"),
 ]
 
@@ -402,7 +402,7 @@ def test_figure_of_meshes(tmp_path):
 def test_explain_tells_effects_and_what_they_assume():
     told = explain(scenes.parse(MADE))
     assert "Sphere (radius = 0.02) of 320 triangles" in told and "on:  slope (angle = 0.174" in told
-    assert "assumes an angle of repose of 30 degrees" in told
+    assert "assumes an angle of repose of 37.9 degrees" in told
     assert "off, not evaluated: grain-inertia, aeration, disturbed-ground" in told
     assert "off, not evaluated: grain-inertia, aeration, slope, disturbed-ground" in explain(scenes.load("c-leg"))
 

@@ -38,7 +38,7 @@ WRONG = {
 RHEX = Rhex(0.2, 0.15, 0.03, 0.06, OUTLINES["c-leg"], (-0.05, 0.05))
 SCREWS = Screws(0.2, 0.15, 0.12, 0.03, spatial.Screw(0.03, 0.01, 0.02, 0.1, 0.003), 0.1)
 PARTS = {
-    "Granular": Granular(1.8, 0.24), "Viscous": Viscous(),
+    "Granular": Granular(1.8, 0.24), "Surface": rft.Surface(0.2, 0.06, 9.0), "Viscous": Viscous(),
     "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)), "Chain": Chain(), "Backbone": rft.Backbone(8),
     "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),

@@ -10,7 +10,7 @@ from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech.errors import SceneError
-from geomech.gaits import Ellipse
+from geomech.gaits import Butterfly, Ellipse
 from geomech.output import report, sweeps
 from geomech.scene import Scene
 from geomech.study import sweep, uncertainty
@@ -51,10 +51,13 @@ def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
     monkeypatch.setattr(uncertainty, "PHASES", 16)
     sand, amplitudes = scene(granular()), [0.7, 1.2]
     told = uncertainty.of_medium(sand, GAIT, np.array(amplitudes))
-    scatter = drawn(sand, whitened(80, 2, seed=1) @ uncertainty.root(COVARIANCE).T, amplitudes).std(0)
-    assert told["rule"] == ["linear", "linear"]
+    media = whitened(200, 2, seed=1) @ uncertainty.root(COVARIANCE).T
+    nets = drawn(sand, np.concatenate([media, -media]), amplitudes)
+    scatter, shift = nets.std(0), nets.mean(0) - drawn(sand, [[0.0, 0.0]], amplitudes)[0]
+    assert told["rule"] == ["second order", "second order"]  # of the heading, 3 % of it
     for k, quantity in enumerate(QUANTITIES):
         np.testing.assert_allclose(told[quantity], scatter[:, k], rtol=0.03)
+        np.testing.assert_allclose(told["shift"][quantity] / scatter[:, k], shift[:, k] / scatter[:, k], atol=0.03)
     np.testing.assert_allclose(told["position"], np.hypot(told["x"], told["y"]))
     assert (scatter > 1e-4).all()  # of every quantity there is something to see
 
@@ -82,6 +85,8 @@ def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
     assert told["rule"] == ["second order"] * 2
     np.testing.assert_allclose(told["x"], 0.5 * np.array([1, 3]))
     np.testing.assert_allclose(told["y"], np.sqrt(0.25 + np.trace(bend @ bend) / 2) * np.array([1, 3]))
+    np.testing.assert_allclose(told["shift"]["y"], np.trace(bend) / 2 * np.array([1, 3]))
+    np.testing.assert_allclose(told["shift"]["x"], 0.0, atol=1e-12)
     assert (told["heading"] == 0).all()
     bend *= 0.01
     told = uncertainty.of_medium(sand, GAIT, np.array([1.0]))
@@ -100,6 +105,41 @@ def test_a_wide_covariance_is_carried_on_to_second_order(monkeypatch):
     linear = [10 * near[q][0] for q in ("x", "y", "heading")]
     np.testing.assert_allclose([told["x"][0], told["y"][0]], scatter[:2], rtol=0.02)
     assert linear[2] < 0.9 * told["heading"][0] < told["heading"][0] < scatter[2]
+
+
+def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
+    """33 % on C and 25 % on gamma0, a strong butterfly: against media drawn from them, deviation and shift."""
+    monkeypatch.setattr(uncertainty, "PHASES", 32)
+    gait, spread = Butterfly(), np.array([0.33 * 1.8, 0.25 * 0.24])
+    tables, errors = {}, {}
+    for share in (1.0, 0.1):
+        medium = Granular(1.8, 0.24, covariance=np.diag((share * spread) ** 2))
+        sand = Scene(Swimmer(medium, Chain()), gait, name="sand").with_numerics(phases=64)
+        told = uncertainty.of_medium(sand, gait, np.array([1.2]))
+        assert told["x"] == pytest.approx(told["net_distance"], rel=1e-3)
+        media = np.concatenate([d := whitened(120, 2, seed=5), -d]) * share * spread
+        media = media[(media + [1.8, 0.24] > [0.0, 0.001]).all(1)]
+        nets = drawn(sand, media, [1.2], 32)[:, 0, 3]
+        shift = nets.mean() - drawn(sand, [[0.0, 0.0]], [1.2], 32)[0, 0, 3]
+        assert told["net_distance"][0] == pytest.approx(nets.std(), rel=0.06)
+        assert told["shift"]["net_distance"][0] == pytest.approx(shift, abs=0.03 * nets.std())
+        tables[share] = Study(sand).study([1.2], ["direct"])
+        errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
+    assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
+    wide, narrow = (report.text_table("sand", tables[share], sand) for share in (1.0, 0.1))
+    row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
+    assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
+    assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
+    assert tables[1.0]["units"]["medium_shift_of"] == "that of the quantity"
+
+
+def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
+    """C = 1.49 +- 1: at sqrt(3) deviations there is no medium, at one there is."""
+    sand = scene(Granular(1.49, 0.22, covariance=((1.0, 0.0), (0.0, 1e-6))))
+    reach, near, both = uncertainty.sigma_points(sand)
+    assert reach == 1.0 and sorted(round(s.medium.C, 9) for pair in near for s in pair) == [0.49, 1.49, 1.49, 2.49]
+    assert len(both) == 1 and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.REACH
+    assert np.isfinite(uncertainty.of_medium(sand, GAIT, np.array([1.0]))["x"]).all()
 
 
 def test_roots():
@@ -130,7 +170,11 @@ def test_every_tier_has_it_beside_its_own_error():
     text = report.text_table("sand", table, sand).splitlines()
     row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
     assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
-    assert [x for x in text if x.startswith("medium: one standard deviation")] and "linear" in text[-3]
+    assert (
+        [x for x in text if x.startswith("medium: one standard deviation")]
+        and "second order" in text[-4]
+        and text[-3].startswith("mean: ")
+    )
 
 
 def test_effects_and_time_stepping_feel_it(monkeypatch):

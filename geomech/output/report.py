@@ -19,7 +19,7 @@ from geomech.output import plots
 from geomech.output.netcdf import save_connection
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
-from geomech.study import effort, tables
+from geomech.study import effort, tables, uncertainty
 from geomech.study.bench import Study
 from geomech.study.cost import Cost, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
@@ -164,19 +164,32 @@ def text_table(title: str, table: dict, scene: Scene) -> str:
         lines.append("amplitude" + "".join(f"{m:>{places + 15}}" for m in tiers) + "     medium" * (medium is not None))
         values = [np.round(by * tables.of_pose(table[m])[quantity], places) + 0.0 for m in tiers]  # no -0.000
         errors = [by * tables.error_of(table, quantity, m) for m in tiers]
+        shifts = _shifts(table, quantity, length) if medium is not None else ()
         for k, a in enumerate(table["amplitude"]):
             row = (f"{x[k]:{places + 6}.{places}f} +-{e[k]:7.1e}" for x, e in zip(values, errors))
             lines.append(f"{a:9.6g}" + "".join(row) + (f"  +-{medium[k]:7.1e}" if medium is not None else ""))
+            lines[-1] += f"  mean {by * shifts[k]:+.1e}" if k in shifts else ""
     if "medium_error_rule" in table:
         rules = sorted({*table["medium_error_rule"]})
         lines.append(
             f"medium: one standard deviation by its covariance, carried on by {' and '.join(rules)} propagation"
         )
+        if any("  mean " in line for line in lines):
+            lines.append(
+                "mean: how far the mean over the media of that covariance lies from the displacement in their mean"
+            )
     lines += _surfaces(table, scene)
     lines += _effort(title, table, tiers)
     amplitude = re.sub(r"[$\\]", "", table["units"]["amplitude"])
     lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
     return "\n".join([*lines, _times(table), ""])
+
+
+def _shifts(table: dict, quantity: str, length: float) -> dict[int, float]:
+    """By the numbers of amplitudes at which it matters: how far an uncertain medium shifts the mean of a quantity."""
+    least = uncertainty.SEEN * (1.0 if quantity == "heading" else length)
+    both = zip(table["medium_shift_of"][quantity], table["medium_error_of"][quantity])
+    return {k: x for k, (x, sd) in enumerate(both) if abs(x) > max(uncertainty.SHIFTED * sd, least)}
 
 
 def _surfaces(table: dict, scene: Scene) -> list[str]:

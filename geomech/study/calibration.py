@@ -44,7 +44,7 @@ class OfDrag:
 
     def numbers(self) -> dict:
         """What `geomech calibrate --json` prints. covariance: of ``parameters``, gamma0 in rad; errors: the standard ones, of
-        gamma0 in degrees."""
+        gamma0 in degrees, and intervals with 95 %, alike."""
         f = self.fit
         medium = self._medium()
         medium.pop("covariance", None)
@@ -55,7 +55,8 @@ class OfDrag:
             "covariance": f.covariance.tolist(),
             "rms": f.rms,
             "parameters": list(f.names),
-            "errors": {_in_degrees(n): math.degrees(x) if n == "gamma0" else x for n, x in zip(f.names, f.errors.tolist())},
+            "errors": dict(zip(map(_in_degrees, f.names), _shown(f, f.errors).tolist())),
+            "intervals": dict(zip(map(_in_degrees, f.names), _shown(f, f.intervals).tolist())),
             "axial_force_N": f.axial_force,
             "axial_stress_Pa": f.axial_stress,
             "end_caps": f.end_caps,
@@ -81,6 +82,7 @@ class OfDrag:
         """A file that a scene takes as ``[medium] file``."""
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
+        of += f", widened for {f.free} degrees of freedom (Student)" if own else ""
         about = f"# Fitted to {json.dumps(self.name)}: {f.data.angles} angles, rms residual {f.rms:.3g} N{of}.\n"
         return about + table("medium", self._medium())
 
@@ -88,9 +90,9 @@ class OfDrag:
         """All of it in words and a table of residuals."""
         f = self.fit
         lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {f.data.angles} angles"]
-        for name, x, error in zip(f.names, f.values, f.errors):
-            turn = 180 / math.pi if name == "gamma0" else 1.0
-            lines.append(f"{name:13}{x * turn:12.5g} +- {error * turn:.2g} {UNITS.get(name, '')}".rstrip())
+        for name, x, (low, high) in zip(f.names, _shown(f, f.values), _shown(f, f.intervals)):
+            unit = f" {UNITS[name]}" if UNITS.get(name) else ""
+            lines.append(f"{name:13}{x:12.5g}, {low:.4g} to {high:.4g}{unit} with 95 %")
         if f.axial_stress and "axial_stress" not in f.names:
             lines.append(f"{'axial_stress':13}{f.axial_stress:12.5g} Pa")
         if "axial_force" not in f.names:
@@ -120,6 +122,11 @@ class OfDrag:
             "psi_deg": np.degrees(f.data.psi), "forces": f.data.forces, "residuals": f.residuals, "rms": f.rms,
             "fine_deg": np.degrees(psi), "law": f.forces(psi), "band": f.band(psi), "label": f"{f.law} law",
         }  # fmt: skip
+
+
+def _shown(f: Fit, values: np.ndarray) -> np.ndarray:
+    """Values (n, ...) of the parameters with gamma0 in degrees."""
+    return np.array([np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)])
 
 
 def _in_degrees(name: str) -> str:

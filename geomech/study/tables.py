@@ -32,8 +32,8 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
 
     medium: None, or what the uncertainty of the medium does to the true displacement, and so to every tier's
     (`geomech.study.uncertainty.of_medium`): "medium_error" {tier: [...]}, of the position,
-    "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit, and
-    "medium_error_rule" [...].
+    "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit,
+    "medium_shift_of", alike, by how much it shifts the mean, and "medium_error_rule" [...].
     """
     unit, length, frequency = scene.system.unit, scene.system.length, frequency_of(scene.system, gait)
     found = {m: of_pose(p) for m, p in poses.items()}
@@ -45,6 +45,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
         more = {"frequency": frequency, **_speeds(found, frequency, length), **more}
     if medium is not None:
         units |= {"medium_error": unit, "medium_error_heading": "rad", "medium_error_of": "that of the quantity"}
+        units["medium_shift_of"] = units["medium_error_of"]
         more = {**_of_medium(medium, tuple(poses)), **more}
     return {
         "amplitude": np.asarray(amplitudes, float).tolist(),
@@ -81,6 +82,7 @@ def _of_medium(medium: Mapping, methods: tuple[str, ...]) -> dict:
         "medium_error": dict.fromkeys(methods, medium["position"].tolist()),
         "medium_error_heading": dict.fromkeys(methods, medium["heading"].tolist()),
         "medium_error_of": {q: medium[q].tolist() for q in QUANTITIES},
+        "medium_shift_of": {q: medium["shift"][q].tolist() for q in QUANTITIES},
         "medium_error_rule": medium["rule"],
     }
 

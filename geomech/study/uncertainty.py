@@ -1,10 +1,12 @@
 """What the uncertainty of a medium does to a displacement: the covariance of its parameters carried to the net pose.
 
 This is no error of the computation but of the question: how far cycles in the sands that drag measurements allow differ. By
-the direct tier at sigma points, the parameters and one standard deviation to either side along each principal direction of
-their covariance, and one point for each two directions. Differences to either side give the linear propagation of the
-covariance; second differences what a quadratic dependence adds to the variance for normally distributed parameters,
-(1/2) sum_ij c_ij^2. Where that is little, linear propagation is right, and stands; where it is not, the sum does.
+the direct tier at sigma points, the parameters and sqrt(3) standard deviations to either side along each principal direction
+of their covariance, the nodes of the quadrature of Gauss and Hermite, and one point for each two directions. Where a medium
+of the widest points is none, points lie one standard deviation away. Differences to either side give the linear propagation
+of the covariance, terms of third order included; second differences c_ij what a quadratic dependence adds to the variance for
+normally distributed parameters, (1/2) sum_ij c_ij^2, and by how much it shifts the mean, (1/2) sum_i c_ii. Where they add
+little to the variance, linear propagation is right, and stands; where they do not, the sum does. The shift is always there.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import itertools
 
 import numpy as np
 
-from geomech.errors import named
+from geomech.errors import SceneError, named
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study.tables import QUANTITIES, of_pose
@@ -21,7 +23,9 @@ from geomech.systems import System
 from geomech.tiers.base import in_groups
 
 PHASES = 64  # of a cycle: changes of displacement are wanted to a per cent, not displacements
-NONLINEAR = 1.1  # times the linear standard deviation, from which on the second order counts
+NONLINEAR = 1.02  # times the linear standard deviation, from which on the second order counts
+REACH = np.sqrt(3.0)  # standard deviations, of sigma points
+SHIFTED = 0.1  # of a standard deviation, from which on a shift of the mean is told
 SEEN = 1e-6  # body lengths or rad: smaller standard deviations, of second order, are rounding
 
 
@@ -47,34 +51,43 @@ def points(system: System) -> int:
     return 1 + 2 * n + n * (n - 1) // 2
 
 
-def sigma_points(scene: Scene) -> tuple[list[tuple[System, System]], dict[tuple[int, int], System]]:
-    """The system one standard deviation to either side in every direction, and in any two together, by their numbers.
-    SceneError if one is no system: the covariance then allows what cannot be."""
+def sigma_points(scene: Scene) -> tuple[float, list[tuple[System, System]], dict[tuple[int, int], System]]:
+    """(standard deviations to either side, the systems there in every direction, those in any two together, by their
+    numbers). SceneError if one is no system a standard deviation away: the covariance then allows what cannot be."""
+    try:
+        return _points(scene, REACH)
+    except SceneError:
+        return _points(scene, 1.0)
+
+
+def _points(scene: Scene, reach: float):
     system = scene.system
-    steps = root(system.covariance).T
+    steps = reach * root(system.covariance).T
     pairs = itertools.combinations(range(len(steps)), 2)
     with named(scene.name):
         near = [(system.varied(s), system.varied(-s)) for s in steps]
-        return near, {(i, j): system.varied(steps[i] + steps[j]) for i, j in pairs}
+        return reach, near, {(i, j): system.varied(steps[i] + steps[j]) for i, j in pairs}
 
 
 def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | list[str]] | None:
     """Standard deviations of the net pose for amplitudes (B,), or None for those of gaits side by side: {"x", "y", "heading",
     "net_distance": (B,) in the scene's unit and rad, "position": (B,), of both coordinates together, "rule": [...]},
-    "linear" or "second order" for each. None where the medium is taken for certain. SceneError as of `sigma_points`.
+    "linear" or "second order" for each, and "shift": {the first four: (B,)}, how far the mean over the media lies from the
+    pose in their mean. None where the medium is taken for certain. SceneError as of `sigma_points`.
 
-    That of the net distance is of the position along the direction of the net displacement, which does not fold at 0; of
-    the whole position where the distance is smaller than that."""
+    What is of the net distance is of the position along the direction of the net displacement, which does not fold at 0; the
+    deviation is that of the whole position where the distance is smaller than that."""
     system = scene.system
     if not uncertain(system):
         return None
-    near, both = sigma_points(scene)
+    reach, near, both = sigma_points(scene)
     mid = _moved(system, gait, amplitudes)
     sides = [[_moved(s, gait, amplitudes) for s in pair] for pair in near]
     along = lambda change: _with_distance(mid, change)
-    slopes = [along((p - m) / 2) for p, m in sides]
-    bends = [along((p + m - 2 * mid) / np.sqrt(2)) for p, m in sides]
-    bends += [along(_moved(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid) for (i, j), s in both.items()]
+    slopes = [along((p - m) / (2 * reach)) for p, m in sides]
+    curves = [along((p + m - 2 * mid) / reach**2) for p, m in sides]
+    mixed = [along(_moved(s, gait, amplitudes) - sides[i][0] - sides[j][0] + mid) for (i, j), s in both.items()]
+    bends = [c / np.sqrt(2) for c in curves] + [c / reach**2 for c in mixed]
     linear, more = (sum((d * d for d in changes), np.zeros((len(mid), 4))) for changes in (slopes, bends))
     size = np.array([system.length, system.length, 1.0])
     bent = (linear + more > NONLINEAR**2 * linear)[:, :3] & (np.sqrt((linear + more)[:, :3]) / size > SEEN)
@@ -83,7 +96,9 @@ def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | li
     found["position"] = np.hypot(found["x"], found["y"])
     far = of_pose(mid)["net_distance"] >= found["position"]
     found["net_distance"] = np.where(far, found["net_distance"], found["position"])
-    return {**found, "rule": ["second order" if b else "linear" for b in bent.any(1)]}
+    shift = sum(curves, np.zeros((len(mid), 4))) / 2
+    rule = ["second order" if b else "linear" for b in bent.any(1)]
+    return {**found, "shift": dict(zip(QUANTITIES, shift.T)), "rule": rule}
 
 
 def _with_distance(poses: np.ndarray, change: np.ndarray) -> np.ndarray:

@@ -19,14 +19,15 @@ class SkinFriction(Effect):
     forward, backward (-): coefficient of friction with the grains that way. reference (-): that of the rod whose drag was
     measured.
 
-    The defaults are the shovel-nosed snake's against 0.3 mm glass, 0.109
-    forward and 0.137 backward, and 0.2 for the aluminium of the measured rod (from the literature on the snake; that
-    they scale the axial drag in proportion is assumed).
+    The defaults are the shovel-nosed snake's against 0.3 mm glass, 0.109 forward and 0.137 backward (from the literature on
+    the snake), and about 0.15 for the rod whose drag gave Eqs. 2 and 3 (paper, caption of Fig. 5). The literature on the
+    snake has 0.2, for aluminium: take that with a law that was measured with such a rod. That friction scales the axial drag
+    in proportion is assumed.
     """
 
     forward: float = 0.109
     backward: float = 0.137
-    reference: float = 0.2
+    reference: float = 0.15
 
     kind = "skin-friction"
     limit = "forward = backward = reference"

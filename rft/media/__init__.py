@@ -4,10 +4,11 @@ from rft.media.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_
 from rft.media.catalogue import CATALOGUE
 from rft.media.coulomb import Coulomb
 from rft.media.granular import Granular
+from rft.media.surface import Surface
 from rft.media.table import Table
 from rft.media.viscous import Viscous
 
-LAWS = {"granular": Granular, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
+LAWS = {"granular": Granular, "surface": Surface, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
 
 __all__ = [
     "CATALOGUE",
@@ -15,6 +16,7 @@ __all__ = [
     "Coulomb",
     "Granular",
     "Medium",
+    "Surface",
     "Table",
     "TermLaw",
     "Viscous",

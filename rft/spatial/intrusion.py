@@ -98,7 +98,7 @@ def _summed(medium, effects, n, up, ahead, velocity, spin, middle, weight, arms,
     stress = medium.on_faces(n, v, up)
     bears = area[stress.any(0)].sum()
     if effects:
-        stress = stress * strength(effects, ahead[0] @ middle + ahead[1])
+        stress = stress * strength(effects, ahead[0] @ middle + ahead[1], ahead[0] @ v / _sizes(v))
         push = pressure(effects, np.maximum(np.einsum("iN,iN->N", n, v), 0.0)) * area
     force, moment = stress @ weight, _cross(arms, stress).sum(-1)
     if effects:
@@ -120,9 +120,16 @@ def bearing(
     parts, of = below(world[mesh.faces], world[mesh.faces, 2])
     middle, n = parts.mean(1), mesh.facing[of] @ rotation.T
     v = velocity + np.cross(spin, middle - place)
-    stress = medium.stress(n, v) * (-middle[:, 2:] * np.reshape(strength(effects, middle[:, 0]), (-1, 1)))
+    share = strength(effects, middle[:, 0], v[:, 0] / _sizes(v.T))
+    stress = medium.stress(n, v) * (-middle[:, 2:] * np.reshape(share, (-1, 1)))
     stress = stress - n * np.reshape(pressure(effects, np.maximum((n * v).sum(-1), 0.0)), (-1, 1))
     return Faces(parts, middle, stress * _areas(parts)[:, None], of)
+
+
+def _sizes(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (N,) of vectors (3, N), 1 of none."""
+    sizes = np.sqrt(np.einsum("iN,iN->N", vectors, vectors))
+    return np.where(sizes == 0.0, 1.0, sizes)
 
 
 def _areas(parts: np.ndarray) -> np.ndarray:

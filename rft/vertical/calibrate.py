@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.calibrate import widening
 from rft.media.base import in_range, real_array, require
 from rft.vertical.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
 GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
 SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times what the named media with nine of their own stray by at most
 DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
-LEVEL = 0.95  # of intervals
 FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
 MOST = 100_000
 LARGEST = 1e12  # of any number; what is below 1 over it counts as 0
@@ -93,13 +93,6 @@ class ZetaFit:
     def interval(self) -> np.ndarray:
         """(2,), with 95 %."""
         return self.zeta + widening(self.free) * self.error * np.array([-1.0, 1.0])
-
-
-def widening(free: float) -> float:
-    """Half an interval over the standard error (Student)."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(free, (1 + LEVEL) / 2))
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:

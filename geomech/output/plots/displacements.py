@@ -46,11 +46,12 @@ def displacement(
 
 
 def _band(ax, table: Mapping, quantity: str, amplitudes) -> None:
-    """What the medium leaves open, about the best tier there is."""
+    """What the medium leaves open, about the best tier there is and as far from it as the medium shifts the mean."""
     best = [name for name in TIERS if name in table][-1:]
     if "medium_error_of" in table and best:
         values, error = of_pose(table[best[0]])[quantity], np.array(table["medium_error_of"][quantity])
-        medium_band(ax, amplitudes, values, error)
+        shift = np.array(table["medium_shift_of"][quantity]) if "medium_shift_of" in table else 0.0
+        medium_band(ax, amplitudes, values + shift, error)
 
 
 def medium_band(ax, x, values, error) -> None:

@@ -31,7 +31,7 @@ class Aeration(GroundEffect):
         told = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on, and no longer "
         require(self.air_speed < self.fluidisation, f"{told}bears as this law says; give less")
 
-    def share(self, x) -> float:
+    def share(self, x, ahead=0.0) -> float:
         return 1.0 - self.air_speed / self.fluidisation
 
     @property

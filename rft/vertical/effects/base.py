@@ -2,7 +2,7 @@
 
 Whatever the effect, the grains' stress on a face at x that leads with v_n m/s across itself is
 
-    (product of all shares at x) x (stress of the plain law)  -  (sum of all pressures at v_n) n,
+    (product of all shares at x and v) x (stress of the plain law)  -  (sum of all pressures at v_n) n,
 
 so any effects commute, and they are the same on outlines and on meshes.
 """
@@ -33,8 +33,9 @@ class GroundEffect:
     order = 1
     cost = ""
 
-    def share(self, x) -> np.ndarray:
-        """What it leaves of the ground's strength at places x along the ground, m; a number if it is the same everywhere."""
+    def share(self, x, ahead=0.0) -> np.ndarray:
+        """What it leaves of the ground's strength at places x along the ground, m, for faces whose unit velocity has the part
+        ``ahead`` along x; a number if it is the same everywhere."""
         return 1.0
 
     def pressure(self, v_n) -> np.ndarray:
@@ -69,17 +70,18 @@ class Ground:
     def on(self, parts) -> tuple[np.ndarray, np.ndarray]:
         """Stress (x, z) in Pa on `rft.vertical.loads.Parts`."""
         t_x, t_z = self.stress.on(parts)
-        share = strength(self.effects, parts.x)
+        share = strength(self.effects, parts.x, parts.v[0])
         across = parts.n[0] * parts.v[0] + parts.n[1] * parts.v[1]
         push = np.sign(across) * pressure(self.effects, np.abs(across) * parts.speed)
         return share * t_x - push * parts.n[0], share * t_z - push * parts.n[1]
 
 
-def strength(effects: Sequence[GroundEffect], x):
-    """The product of what the effects leave of the ground's strength at places x, m."""
+def strength(effects: Sequence[GroundEffect], x, ahead=0.0):
+    """The product of what the effects leave of the ground's strength at places x, m, for unit velocities with the part
+    ``ahead`` along x."""
     left = 1.0
     for effect in effects:
-        left = left * effect.share(x)
+        left = left * effect.share(x, ahead)
     return left
 
 

@@ -42,7 +42,7 @@ class DisturbedGround(GroundEffect):
         object.__setattr__(self, "places", tuple(places.tolist()))
         check_ranges(self, radius=(1e-6, 1e3), weakening=(0, 1))
 
-    def share(self, x) -> np.ndarray:
+    def share(self, x, ahead=0.0) -> np.ndarray:
         disturbance = np.zeros(np.shape(x))
         for place in self.places:
             disturbance = np.maximum(disturbance, np.clip(1.5 - np.abs(x - place) / self.radius, 0.0, 1.0))
