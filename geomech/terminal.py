@@ -85,10 +85,11 @@ def _notes():
     notes: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("always", Note)
+        warnings.filterwarnings("always", category=UserWarning, module=r"rft\.")  # its notes; it takes NumPy to load
         others = warnings.showwarning
 
         def show(message, category, *where, **options):
-            if issubclass(category, Note):
+            if issubclass(category, Note) or category.__module__.partition(".")[0] == "rft":
                 notes.setdefault(re.split(r"[\d.]+ ", str(message))[0], str(message))
             else:
                 others(message, category, *where, **options)
@@ -107,8 +108,12 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
         return code or 0
     except SystemExit as ended:  # what typer makes of a closed pipe
         return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
-    except (Stopped, KeyboardInterrupt, typer.Abort) as stopped:
+    except (Stopped, KeyboardInterrupt) as stopped:
         return _stopped(stopped, argv)
+    except typer.Abort as aborted:  # what typer makes of an interrupt, and of an EOFError, which is none
+        if isinstance(aborted.__cause__, KeyboardInterrupt):
+            return _stopped(aborted.__cause__, argv)
+        raise (aborted.__cause__ or aborted) from None
     except MemoryError:
         tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
     except BrokenPipeError:

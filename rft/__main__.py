@@ -8,4 +8,5 @@ try:
     kept = compiled.make()
 except ValueError as error:
     sys.exit(str(error))
-print(f"compiled code is kept in {compiled.folder()}" if kept else "no folder to keep it in: set NUMBA_CACHE_DIR")
+none = "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
+print(f"compiled code is kept in {compiled.folder()}" if kept else none)

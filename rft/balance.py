@@ -129,7 +129,8 @@ def _started(start, batch: tuple, length: float) -> np.ndarray:
         start = None
     if start is None:
         raise ValueError(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
-    return start.reshape(-1, 3).T / [[length], [length], [1.0]]
+    with np.errstate(over="ignore"):
+        return start.reshape(-1, 3).T / [[length], [length], [1.0]]
 
 
 def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:

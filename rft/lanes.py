@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from rft.compiled import STAMP
+from rft.lane_cache import kept
 from rft.lane_loads import OPTIONS, ROW, ROWS, compiled, inlined
 
 # isort: off
@@ -80,6 +81,7 @@ def judge(of, lanes, first, descent, limits):
         )
         force, about = math.sqrt(f_x * f_x + f_y * f_y), moment - cx * f_y + cy * f_x
         now = max(force, abs(about)) / of[UNIT * LANES + lane]
+        now = now if force + abs(about) < np.inf else np.inf  # max forgets a nan
         kept = ((eps < before) | (now < worst) | (stride <= shortest)) & (not fresh)
         down = kept & (eps > last) & (now < loose)
         slow, slowest = of[SLOW * LANES + lane], of[SLOWEST * LANES + lane]
@@ -189,7 +191,7 @@ def built(stamp: str):
         shares developed left and right, velocity across before, and shares that are given, of the first k elements. rates:
         (2, B or 1), dt and e-foldings a length, dt < 0 where nothing develops. masses: (13, B) as `add_momentum` has them,
         or (0, 1)."""
-        _ = stamp  # this source's, so that numba's cache knows which it keeps
+        _ = stamp  # this source's, so that what is kept tells which it is
         terms, viscous, which = law
         n, size, shared = motion[0].shape[0], motion[0].shape[1], pasts.shape[1]
         lanes = max(1, min(LANES, size, 4 * ROW // n))
@@ -219,10 +221,7 @@ def built(stamp: str):
                     leave(of, lane, who[lane], last, out)
                     who[lane], gone = -1, gone + 1
 
-    try:
-        return njit(cache=True, **OPTIONS)(attempt)
-    except RuntimeError:  # no folder for it: neither beside this file, nor the user's, nor where NUMBA_CACHE_DIR points
-        return njit(**OPTIONS)(attempt)
+    return kept(njit(**OPTIONS)(attempt), "lanes")
 
 
 attempt = built(STAMP)

@@ -30,6 +30,7 @@ from rft.workers import each, keep_freed_memory, split, workers
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the regularisation is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples solved side by side
 COMPILED_WORTH = 4096  # samples a thread, below which another does not pay
+FASTEST = 1e30  # velocity over the scale, of which none comes near: beyond it squares overflow, and drag reads as 0
 
 keep_freed_memory()
 
@@ -78,8 +79,8 @@ class Balance:
 
     def solve(self, motion: Callable, scale, threads=None, guess=None, model: Model | None = None) -> Solved:
         """Body velocities of B samples. motion(index): `Kinematics` of all contacts' elements of those samples. scale:
-        (B,), the size of their velocities. guess: (3, B), tried first but where it is nan. model: of this batch, if not the
-        balance's own."""
+        (B,), the size of their velocities. guess: (3, B), tried first but where it is nan, or beyond FASTEST. model: of this
+        batch, if not the balance's own."""
         self.motion, self.scale = motion, scale
         self.model = self.model if model is None else model
         self.scaled = not self.model.rate_independent
@@ -88,14 +89,16 @@ class Balance:
         size = scale.size
         out = Solved(np.zeros((3, size)), np.full(size, np.inf), np.zeros(size, int), np.zeros(size, bool))
         todo = np.arange(size)
+        with np.errstate(over="ignore"):
+            guess = None if guess is None else guess / scale
         for way in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-            start = guess / scale if way is WARM else None
-            some = todo if start is None else np.flatnonzero(np.isfinite(start).all(0))
+            start = guess if way is WARM else None
+            some = todo if start is None else np.flatnonzero(_possible(start))
             if isinstance(way, Descent) and some.size:
                 self._descend(some, way, start, out, threads)
             elif some.size:
                 self._follow(some, *way, out)
-            todo = np.flatnonzero(out.residual > self.limit)
+            todo = np.flatnonzero(~(out.residual <= self.limit))
             if not todo.size:
                 break
         return out._replace(xi=out.xi * scale)
@@ -144,7 +147,8 @@ class Balance:
         """Try one descent of the samples ``todo``, shared out to threads."""
 
         def wrote(index, xi, residual, evaluations, slowest):
-            out.xi[:, index], out.residual[index], out.stuck[index] = xi, residual, self._stuck(slowest)
+            out.xi[:, index], out.stuck[index] = xi, self._stuck(slowest)
+            out.residual[index] = np.where(_possible(xi), residual, np.inf)
             out.iterations[index] += evaluations
 
         if backend.takes(self.backend, self.model, todo.size * self.rows[-1].stop * self.nodes):
@@ -204,3 +208,8 @@ class Balance:
             net += term(xi * of.scale)
         net[:, 1:] *= of.scale
         return net, slope if slope is None else slope * of.scale
+
+
+def _possible(xi: np.ndarray) -> np.ndarray:
+    """Return whether velocities over the scale (3, B) are numbers that the solver can compute with, (B,)."""
+    return (np.abs(xi) < FASTEST).all(0)

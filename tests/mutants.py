@@ -12,6 +12,7 @@ import ast
 import copy
 import difflib
 import importlib
+import importlib.util
 import os
 import random
 import resource
@@ -133,6 +134,8 @@ def start(tree: Path, tests: list[str], seconds: float) -> int:
         os.dup2(1, 2)
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
+        if "backend" in tests and importlib.util.find_spec("numba"):  # else they are skipped
+            importlib.import_module("rft.compiled").make()
         slow = [f"--deselect=tests/test_{name}.py::test_{x}" for name in tests for x in TABLE["slow"].get(name, ())]
         os._exit(importlib.import_module("pytest").main([*PYTEST, *slow, *(f"tests/test_{x}.py" for x in tests)]))
     finally:

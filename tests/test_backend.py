@@ -1,7 +1,12 @@
 """Compiled descents against NumPy's: the same answers for every medium, body and effect; and which of the two is taken."""
 
 import dataclasses
+import errno
+import hashlib
+import itertools
+import json
 import os
+import resource
 import subprocess
 import sys
 import types
@@ -20,7 +25,7 @@ from rft import Chain, EndCaps, GrainInertia, SkinFriction, TowedSled, backend, 
 from rft.bodies.base import Kinematics
 from rft.contact import Model
 from rft.media.base import TermLaw
-from rft.newton import Balance
+from rft.newton import WARM, Balance
 from rft.samples import Jacobian
 from rft.workers import one_thread
 
@@ -112,6 +117,46 @@ def test_starts(how, compiled_code):
         assert steps["near"].mean() < 0.7 * cold_steps.mean()
         np.testing.assert_array_equal(steps["of some"][0::2], steps["near"][0::2])
         np.testing.assert_array_equal(steps["of some"][1::2], cold_steps[1::2])
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e12, 1e31, 1e154, 1e155, 1e200, 1e300])
+@pytest.mark.parametrize("rate", [1e-90, 1.0, 1e90])
+def test_starts_whose_squares_overflow(size, rate, solved_by):
+    """So that drag reads as none: the answer is that of no start. In a dry medium, and in one in which speed counts."""
+    rng = np.random.default_rng(12)
+    alpha, alphadot = rng.uniform(-2, 2, (20, 2)), rng.normal(size=(20, 2)) * rate
+    start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
+    for medium in (GLASS, MEDIA["viscous-2"]):
+        cold, found = (body_velocity(medium, BODY, alpha, alphadot, start=s, backend=solved_by) for s in (None, start))
+        assert (found.status == cold.status).all()
+        assert apart(found, cold, alphadot, BODY).max() < 1e-10
+
+
+@pytest.mark.parametrize("size", [1e40, 1e155, 1e300, np.nan])
+def test_no_overflow_is_a_solution(size, solved_by):
+    """Whatever brought a descent there: a residual that is 0 because squares overflow, or nan, is none."""
+    alpha, alphadot = GAIT.cycle(8)
+    problem = Balance.of(Model.of(GLASS), BODY, 1e-6, 1e-10)
+    problem.backend = solved_by
+    motion = BODY.motion(alpha.T, alphadot.T)
+    solved = problem.solve(lambda index: motion.take(index), np.ones(8))
+    assert (solved.residual < 1e-10).all()
+    with np.errstate(all="ignore"):
+        problem._descend(np.arange(8), WARM, np.full((3, 8), size), solved, 1)
+    assert (solved.residual == np.inf).all()
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_a_moment_that_is_no_number_is_no_balance(monkeypatch):
+    """Where the force is 0, as that of overflowing speeds is."""
+    alpha, alphadot = GAIT.cycle(8)
+    problem = Balance.of(Model.of(GLASS), BODY, 1e-6, 1e-10)
+    problem.backend, motion = "numba", BODY.motion(alpha.T, alphadot.T)
+    solved = problem.solve(lambda index: motion, np.ones(8))
+    monkeypatch.setattr("rft.newton.FASTEST", np.inf)
+    problem._descend(np.arange(8), WARM, np.full((3, 8), 1e155), solved, 1)
+    assert (solved.residual > 1.0).all()
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((4, 3)), [0.0, np.inf, 0.0], "here", np.zeros((2, 3, 3))])
@@ -226,6 +271,8 @@ def test_backends_that_are_none(tmp_path):
 def auto(monkeypatch):
     """What "auto" knows at the start of a process, and what it does: made, started."""
     fresh, seen = backend.Auto(), types.SimpleNamespace(made=False, started=0, going=True)
+    clock = types.SimpleNamespace(process_time=(k * 1e-3 for k in itertools.count()).__next__)
+    monkeypatch.setattr(backend, "time", clock)  # the machine's stands still for some ms under a limit of CPU time
     maker = types.SimpleNamespace(poll=lambda: None if seen.going else 0)
 
     def started():
@@ -315,13 +362,12 @@ def test_the_maker_ends_with_the_command(monkeypatch):
     assert maker.poll() is not None
 
 
-def test_a_folder_that_cannot_be_written(tmp_path, monkeypatch):
-    """Not even that of a mark."""
-    (tmp_path / "file").write_text("")
-    monkeypatch.setattr(compiled, "_mark", lambda: (tmp_path / "file" / "mark", "text"))
+def test_a_folder_that_cannot_be_written(monkeypatch):
+    monkeypatch.setattr(compiled, "_file", lambda: None)
     monkeypatch.setattr("rft.body_velocity", lambda *args, **kwargs: None)
     assert not compiled.made()
     assert not compiled.make()
+    assert compiled.folder() is None
 
 
 @pytest.mark.usefixtures("compiled_code")
@@ -331,14 +377,155 @@ def test_made_beforehand():
     assert done.stdout.startswith("compiled code is kept in ")
 
 
-@pytest.mark.usefixtures("compiled_code")
-def test_code_of_another_source_or_machine_is_not_taken(monkeypatch, tmp_path):
-    text = compiled._mark()[1]
-    assert compiled.made()
-    assert compiled.STAMP in text
-    (tmp_path / "mark").write_text(text.replace(compiled.STAMP, "0" * 16))
-    monkeypatch.setattr(compiled, "_mark", lambda: (tmp_path / "mark", text))
-    assert not compiled.made()
+def doubled(x):
+    return 2.0 * x
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    """(a function that compiles `doubled`, or loads it, and tells whether it was loaded, where it is kept)."""
+    numba = pytest.importorskip("numba")
+    from rft.lane_cache import kept
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+
+    def loaded():
+        function = kept(numba.njit(doubled), "doubled")
+        assert function(3.5) == 7.0
+        return bool(function.stats.cache_hits)
+
+    return loaded, kept(numba.njit(doubled), "doubled")._cache.file
+
+
+def test_compiled_code_is_kept_in_one_file(small):
+    loaded, file = small
+    assert file.read() is None
+    assert [loaded() for _ in range(3)] == [False, True, True]
+    assert [p.name for p in file.path.parent.iterdir()] == [file.path.name]
+    assert all(x in file.path.name for x in ("doubled.", sys.implementation.cache_tag, "numba0."))
+
+
+def flipped(at):
+    return lambda raw: raw[: int(at * len(raw))] + bytes([raw[int(at * len(raw))] ^ 8]) + raw[int(at * len(raw)) + 1 :]
+
+
+def unloadable(raw):
+    """Whole, and no pickle."""
+    body = b"nothing that can be loaded"
+    return raw[:17] + hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+
+
+DAMAGES = {
+    "empty": lambda raw: b"",
+    "in its first line": lambda raw: raw[:30],
+    "cut short": lambda raw: raw[: len(raw) // 2],
+    "longer": lambda raw: raw + b"\0",
+    "another file": lambda raw: b"#!/bin/sh\n" * 30,
+    "zeros": lambda raw: bytes(len(raw)),
+    **{f"a bit at {at:g}": flipped(at) for at in (0.01, 0.3, 0.6, 0.999)},
+    "unloadable": unloadable,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_code_is_set_aside_and_made_anew(damage, small):
+    loaded, file = small
+    assert not loaded()
+    bad = DAMAGES[damage](file.path.read_bytes())
+    file.path.write_bytes(bad)
+    with pytest.warns(compiled.Note) as notes:
+        assert not loaded()
+    (note,) = (str(x.message) for x in notes)
+    why = "it cannot be loaded (UnpicklingError)" if damage == "unloadable" else "it is damaged"
+    assert note.startswith(f"the compiled code in {file.path} is not taken, {why}: set aside as ")
+    assert "python -m rft" in note and "\n" not in note
+    assert file.path.with_name(file.path.name + ".damaged").read_bytes() == bad
+    assert loaded()
+
+
+def test_nothing_of_damaged_code_reaches_numba(small, monkeypatch):
+    """Which believes it: any flipped bit might run."""
+    loaded, file = small
+    loaded()
+    raw, good = file.path.read_bytes(), file.read()
+    monkeypatch.setattr(file, "set_aside", lambda why: None)
+    rng = np.random.default_rng(3)
+    for at in [*range(82), *rng.integers(82, len(raw), 100)]:
+        file.path.write_bytes(raw[:at] + bytes([raw[at] ^ 1 << rng.integers(8)]) + raw[at + 1 :])
+        assert file.read() is None
+    file.path.write_bytes(raw)
+    assert file.read() == good
+
+
+def test_code_of_another_source_or_signature_is_not_taken(small, monkeypatch):
+    """Nor is it damaged."""
+    loaded, file = small
+    loaded()
+    raw = file.path.read_bytes()
+    assert raw.startswith(compiled.STAMP.encode())
+    assert file.load("another signature") is None
+    file.path.write_bytes(b"0" * 16 + raw[16:])
+    assert file.read() is None
+    assert [loaded(), loaded()] == [False, True]
+    assert file.path.read_bytes().startswith(compiled.STAMP.encode())
+
+
+def test_code_that_cannot_be_kept_is_used_all_the_same(small, monkeypatch):
+    loaded, file = small
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rft.lane_cache.os.replace", full)
+        with pytest.warns(compiled.Note, match="not kept in .*: No space left on device; make room"):
+            assert not loaded()
+        assert list(file.path.parent.iterdir()) == []
+        file.path.write_bytes(b"")  # nor can it be set aside
+        with pytest.warns(compiled.Note) as notes:
+            assert not loaded()
+    assert sum("cannot be set aside (No space left on device): remove it" in str(x.message) for x in notes) == 1
+
+
+def test_a_command_notes_damaged_code_and_goes_on(small, monkeypatch, tmp_path, geomech):
+    """By NumPy, in one line, where "auto" would have loaded it."""
+    _, file = small
+    file.path.write_bytes(b"")
+    auto = backend.Auto()
+    auto.worked = backend.TO_LOAD
+    monkeypatch.setattr(backend, "AUTO", auto)
+    monkeypatch.setattr(compiled, "_file", lambda: file)
+    code, out, err = geomech("velocity", "three-link-glass", "--alpha", "0.5,0.3", "--alphadot", "1,0")
+    assert code == 0 and out.startswith("xi = (")
+    assert err.startswith(f"note: the compiled code in {file.path} is not taken, it is damaged: ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("damage", ["empty", "cut short", "a bit at 0.6", "unloadable", "full disk"])
+def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
+    """Of the true code, in a process of its own; 20 s each. compiled_code: numba is there."""
+    (tmp_path / "s.toml").write_text(scenes.load("three-link-glass").text + '[numerics]\nbackend = "numba"\n')
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONWARNINGS": "error"}
+    args = ["-m", "geomech", "displacement", "s.toml", "--amplitudes", "1", "--methods", "direct", "--json"]
+
+    def run(limit=resource.RLIM_INFINITY):
+        small_files = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        done = subprocess.run(
+            [sys.executable, *args], capture_output=True, text=True, env=env, cwd=tmp_path, preexec_fn=small_files
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)["direct"], [x for x in done.stderr.splitlines() if " under way for " not in x]
+
+    full = damage == "full disk"
+    first, notes = run(*[50_000] * full)
+    assert len(notes) == full and all("is not kept in " in x for x in notes)
+    if damage in DAMAGES:
+        (file,) = (tmp_path / "cache").rglob("*.code")
+        file.write_bytes(DAMAGES[damage](file.read_bytes()))
+        again, (note,) = run()
+        assert again == first and "is not taken" in note
+    assert run() == (first, [])
 
 
 def test_one_matrix_does_what_a_motion_does():

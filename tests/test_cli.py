@@ -401,7 +401,7 @@ def test_names_that_are_not_text_are_kept(tmp_path):
         code, _, err = geomech(*args, cwd=tmp_path)
         assert (code, err) == (0, "")
     for file, start in ((os.fsdecode(b"\xe9.nc"), "Net displacement"), ("a.nc", "Local connection")):
-        with xarray.open_dataset(tmp_path / file) as data:
+        with xarray.open_dataset(tmp_path / file, engine="scipy") as data:  # netCDF4, if it is there, takes text alone
             assert data.attrs["title"].startswith(start)
             assert data.attrs["title"].endswith("of the scene caf\\udce9.toml")
             said = scenes.parse(data.attrs["scene"], "three-link-viscous")

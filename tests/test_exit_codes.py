@@ -208,3 +208,15 @@ def test_a_fault_of_the_program_is_not_passed_off_as_the_users(ended, monkeypatc
     failing(monkeypatch, lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         ended(*arguments("displacement"))
+
+
+def test_nor_as_a_signal(ended, monkeypatch, capsys):
+    """An EOFError, of which typer makes what it makes of an interrupt."""
+
+    def end_of_file():
+        raise EOFError("Ran out of input")
+
+    failing(monkeypatch, end_of_file)
+    with pytest.raises(EOFError, match="Ran out of input"):
+        ended(*arguments("displacement"))
+    assert "stopped" not in capsys.readouterr().err

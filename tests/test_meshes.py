@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import json
 import math
+import re
 import sys
 
 import numpy as np
@@ -19,11 +20,13 @@ from geomech.errors import SceneError
 from geomech.output import plots
 from geomech.output.explain import explain
 from geomech.scene import MeshScene
+from rft import spatial
 from rft.spatial import (
     SOLIDS,
     Cylinder,
     Drag,
     Leg,
+    Mesh,
     Path,
     Penetrate,
     Rotate,
@@ -283,6 +286,65 @@ def test_files_that_are_no_mesh_get_one_line(name, data, said, geomech, tmp_path
         (tmp_path / name).write_bytes(data)
     (tmp_path / "s.toml").write_text(MADE.replace('shape = "sphere"\nradius = 0.02', f'file = "{name}"'))
     refused(geomech("intrude", "s.toml"), said)
+
+
+PLY = b"""ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 4
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 0 2 1
+3 0 1 3
+3 0 3 2
+3 1 2 3
+"""
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+LAST = {PLY: b"3 1 2 3\n", OBJ: b"f 2 3 4\n"}
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize(
+    ("whole", "last", "said"),
+    [
+        (PLY, b"3 1 2 3\n", None),
+        (PLY, b"3 1 2 9\n", "a face names vertex 9, where vertices are 0 to 3"),
+        (PLY, b"3 1 2 4\n", "a face names vertex 4, where vertices are 0 to 3"),
+        (PLY, b"3 1 2 -1\n", "a face names vertex -1, where vertices are 0 to 3"),
+        (PLY, b"4 1 2 -4 3\n", "a face names vertex -4, where vertices are 0 to 3"),
+        (OBJ, b"f 2/1/1 3//-7 4\n", None),
+        (OBJ, b"f -3 -2 -1\n", None),
+        (OBJ, b"f -3 -2 -1\nv 5 5 5\n", "a face counts vertices back, and vertices follow it"),
+        (OBJ, b"f 2 3 5\n", "is no OBJ mesh: 'index 4 is out of bounds"),
+        (OBJ, b"f 2 3 -5\n", "is no OBJ mesh: 'index -5 is out of bounds"),
+        (OBJ, b"f 2 3 0\n", "a face names vertex 0, where vertices count from 1"),
+        (OBJ, b"f 0//1 2//1 -1//1", "a face names vertex 0, where vertices count from 1"),
+    ],
+)
+def test_faces_name_vertices_that_exist(whole, last, said, closed, tmp_path):
+    """An open mesh, too, which no edge that lacks a neighbour gives away."""
+    pytest.importorskip("trimesh")
+    path = tmp_path / ("a.ply" if whole is PLY else "a.obj")
+    path.write_bytes(whole.replace(LAST[whole], last))
+    if said is None:
+        assert spatial.read(path, closed).volume == pytest.approx(1 / 6, abs=1e-12)
+        return
+    with pytest.raises(ValueError, match=re.escape(said)) as error:
+        spatial.read(path, closed)
+    assert str(error.value).startswith(f"{path}")
+
+
+@pytest.mark.parametrize("bad", [9, -1])
+def test_a_mesh_of_arrays_names_vertices_that_exist(bad):
+    with pytest.raises(ValueError, match=f"a face names vertex {bad}, where vertices are 0 to 3"):
+        Mesh(np.eye(4, 3), np.array([[0, 2, 1], [0, 1, bad]]), closed=False)
 
 
 def test_without_trimesh_files_are_refused_and_shapes_go_on(geomech, tmp_path, monkeypatch):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,8 +38,7 @@ class Mesh:
         require(good, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
         require(0 < len(faces) <= MOST, f"a mesh has 1 to {MOST:,} triangles, got {len(faces):,}")
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
-        inside = 0 <= faces.min() and faces.max() < len(vertices)
-        require(inside, f"faces name vertex {faces.max()} or {faces.min()}, of {len(vertices)}")
+        _require_known(faces, len(vertices))
         require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
         bends = self.bends if self.bends is None else real_array("bends", self.bends)
         good = bends is None or (bends.shape == (len(faces), 3, 3) and bool(np.isfinite(bends).all()))
@@ -183,14 +185,44 @@ def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     require(kind in ("stl", "obj", "ply"), f"{path}: a mesh is an .stl, .obj or .ply file")
     vertices, faces = _loaded(Path(path), kind)
     require(faces.ndim == 2 and len(faces) > 0, f"{path} is no {kind.upper()} mesh: it has no triangles")
+    with _named(path):
+        _require_known(faces, len(vertices))
     merged, where = np.unique(vertices, axis=0, return_inverse=True)  # an STL file tells every corner anew
     size = scale * float(np.ptp(merged, axis=0).max())
     told = f"{path}: the mesh is {size:.4g} m large, beyond {LARGEST:g} m: give scale, 0.001 if it is in mm"
     require(not size > LARGEST, told)
-    try:
+    with _named(path):
         return Mesh(merged * scale, where.reshape(-1)[faces], closed)
+
+
+@contextlib.contextmanager
+def _named(path) -> Iterator[None]:
+    """Put the file's name before the text of a ValueError."""
+    try:
+        yield
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _require_known(faces: np.ndarray, count: int) -> None:
+    """Raise ValueError if faces name vertices other than 0 to count - 1."""
+    for bad in faces[(faces < 0) | (faces >= count)][:1]:
+        raise ValueError(f"a face names vertex {bad}, where vertices are 0 to {count - 1}: mend the mesh")
+
+
+# Of an OBJ file: a face with a vertex 0, one with a vertex below 0, and a vertex.
+ZERO, BACK, VERTEX = (
+    re.compile(rb"^[ \t]*" + line, re.M) for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
+)
+
+
+def _require_read_rightly(data: bytes) -> None:
+    """Raise ValueError for the vertices of an OBJ file that trimesh takes for others: it takes 0 for the last one, and counts
+    those below 0 back from the last of all, where OBJ counts from the last before the face."""
+    require(not ZERO.search(data), "a face names vertex 0, where vertices count from 1: mend the mesh")
+    back = BACK.search(data)
+    good = back is None or not VERTEX.search(data, back.end())
+    require(good, "a face counts vertices back, and vertices follow it: count from 1, or put all vertices first")
 
 
 def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -206,6 +238,9 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         data = path.read_bytes()
     except OSError as error:
         raise ValueError(f"cannot read mesh {path}: {error.strerror}") from None
+    if kind == "obj":
+        with _named(path):
+            _require_read_rightly(data)
     try:
         found = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
         return np.asarray(found.vertices, float), np.asarray(getattr(found, "faces", ()))
