@@ -200,12 +200,13 @@ def test_what_leaves_the_library_has_one_unit_and_says_it(length):
     lengths = {u for u in units.values() if "m" in u.split("/")[0].split() or "BL" in u}
     assert lengths == {"m", "m/s", "BL/s"} and [k for k, u in units.items() if u == "BL/s"] == ["speed_body_lengths"]
     assert table["body_length"] == length and plain["units"]["estimate"] == "BL"
-    for key in set(table) - no_units - {"medium_error_of", "amplitude"}:
+    for key in set(table) - no_units - {"medium_error_of", "medium_shift_of", "amplitude"}:
         law_of_units(table[key], units[key], plain[key], length)
     for key in ("area", "path", "direct"):
         law_of_units(table[key], ["m", "m", "rad"], plain[key], length)
     for key in ("x", "y", "net_distance", "heading"):
-        law_of_units(table["medium_error_of"][key], units[key], plain["medium_error_of"][key], length)
+        for of in ("medium_error_of", "medium_shift_of"):
+            law_of_units(table[of][key], units[key], plain[of][key], length)
 
     data = table.to_xarray()
     assert (data.attrs["body_length"], data.attrs["length_unit"]) == (length, "m")
