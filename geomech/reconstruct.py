@@ -131,8 +131,7 @@ def slopes(xi) -> tuple[np.ndarray, np.ndarray]:
     reach, step = _reach(turns), 1e-5
     net = np.array([*_parts((s.wave * reach).sum()), 2 * np.pi * s.mean_turn[0]])
     share = np.where((n % 2 == 0) & (np.abs(s.k) == n // 2), 0.5, 1.0)
-    phases = 2 * np.pi * np.arange(n) / n
-    seen = np.exp(-1j * np.outer(phases, s.k)) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
+    seen = _seen(n) @ (share * reach) / n  # of e^(i theta) (xi_x + i xi_y) at each phase
     heading = turning(xi) - turning(xi)[0]
     wave, way = np.exp(1j * heading) * seen, xi[:, 0] + 1j * xi[:, 1]
     turned = (s.wave * (_reach(turns + step) - _reach(turns - step)) / (2 * step)).sum() / n
@@ -148,6 +147,12 @@ def _parts(z: complex) -> tuple[float, float]:
 def _reach(turns: np.ndarray) -> np.ndarray:
     """Integral of e^(i turns t) over a cycle."""
     return 2 * np.pi * np.exp(1j * np.pi * turns) * np.sinc(turns)
+
+
+@functools.lru_cache(maxsize=8)
+def _seen(n: int) -> np.ndarray:
+    """(N, M): e^(-i k t) at each phase, for every wave number of `_waves`."""
+    return np.exp(-1j * np.outer(2 * np.pi * np.arange(n) / n, _waves(n).k))
 
 
 @functools.lru_cache(maxsize=8)

@@ -145,7 +145,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     numbers = json.loads(json.dumps(cheap.numbers()))
     assert list(numbers) == [
         "objective", "value", "start_value", "displacement", "path_length", "work", "gait", "evaluations", "seconds",
-        "active", "estimate", "body_length", "units",
+        "active", "answers", "estimate", "body_length", "units",
     ]  # fmt: skip
     assert numbers["gait"]["kind"] == "fourier"
 

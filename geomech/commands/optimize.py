@@ -33,7 +33,9 @@ def optimize(
         Optional[str],
         typer.Option(metavar="EXTENT", help="of joints, in rad: 2.5, 120deg, -0.5:2, or 1,2 for each; else the field's"),
     ] = None,
-    starts: Annotated[int, typer.Option(metavar="N", help="loops to begin with; the first is the scene's")] = 1,
+    starts: Annotated[
+        Optional[int], typer.Option(metavar="N", help="loops to begin with; the first is the scene's; 1, in sand 9")
+    ] = None,
     rate: Annotated[Optional[float], typer.Option(help="rad/s that no joint exceeds, for speed")] = None,
     power: Annotated[Optional[float], typer.Option(help="mean, body's axial drag x BL/s, for speed")] = None,
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="BEST.toml", help="scene to write")] = None,

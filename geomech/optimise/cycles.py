@@ -37,6 +37,8 @@ class Phases:
     """Cycles of loops by their velocity(alpha, alphadot) -> (..., 3) and power(alpha, alphadot) -> (...), which is of degree
     ``degree`` in alphadot; power None where its cost is not asked for."""
 
+    exact = 1e-10  # rad: what a turn of none may be
+
     def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
         self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
         self.count, self.last, self.warm = 0, None, _begins(velocity)
@@ -87,6 +89,8 @@ class Phases:
 
 class Runs:
     """Cycles of gaits run as a whole, by `System.run`; loops: whatever has ``cycle(p)`` for rows of p. length: of the body."""
+
+    exact = 1e-6  # rad: that to which they repeat
 
     def __init__(
         self, loops, run: Callable, work: bool = False, degree: float = 1.0, length: float = 1.0,

@@ -9,6 +9,7 @@ from geomech.optimise.stroke import Stroke
 
 MARGIN = 0.5  # of the first loop's distance from singular shapes
 NEARLY = 0.95  # of that, to rounding
+SLIGHTLY = 0.05  # of the sweep of its first harmonic: a loop that goes back no further is one stroke, or soon made one
 SMALLER = 0.7 ** np.arange(12)  # sizes that are tried
 
 
@@ -19,7 +20,7 @@ class Keeping:
     def __init__(self, loops, singularity, first: np.ndarray):
         self.loops, self.singularity, self.away = loops, singularity, 0.0
         self.first = self._clear(first, first)
-        self.stroke = isinstance(loops, Loops) and Stroke.is_one(loops, self.first)
+        self.stroke = isinstance(loops, Loops) and Stroke.is_one(loops, self.first, SLIGHTLY)
         if singularity is not None:
             self.away = MARGIN * float(np.abs(self._distance(self.first)).min())
 

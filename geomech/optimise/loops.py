@@ -6,6 +6,7 @@ and rates at the phases are linear in them.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,9 +16,20 @@ from geomech.gaits import Fourier, Gait
 
 DENSE = 1024  # phases at which a limit is held, and loops are compared
 TOUCHING = 5e-3  # of a limit: how near a loop is that touches it
-NARROWER = 5e-4  # of a limit: what a curve has beyond its phases
+NARROWER = 1e-4  # of a limit: what a curve has beyond its phases
 SMALL, SIZEABLE = 0.05, 0.3  # of the limit: a start that is too small, and what it is made
 SAME = 0.02  # of its size: largest distance between two loops that are one
+OUTLINES = (  # polygons to begin with, of two joints whose limits are -1 and 1: the largest and the shortest way round
+    ((1, 1), (-1, 1), (-1, -1), (1, -1)),
+    ((1, 0.5), (0.5, 1), (-1, 1), (-1, -0.5), (-0.5, -1), (1, -1)),
+    ((1, 1), (-0.5, 1), (-1, 0.5), (-1, -1), (0.5, -1), (1, -0.5)),
+    ((0.6, 0.6), (-0.6, 0.6), (-0.6, -0.6), (0.6, -0.6)),
+    ((1, 1), (-0.4, 0.4), (-1, -1), (0.4, -0.4)),
+    ((1, -1), (0.4, 0.4), (-1, 1), (-0.4, -0.4)),
+    *(tuple((0.5 * i + 0.35 * x, 0.5 * j + 0.35 * y) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
+      for i, j in ((1, -1), (1, 1), (-1, 1), (-1, -1))),
+)  # fmt: skip
+IN_MIRROR = 2  # of these, the last, that are others in the mirror
 
 
 @dataclass(frozen=True)
@@ -29,6 +41,11 @@ class Loops:
     harmonics: int
     within: float | tuple[tuple[float, float], ...]
     phases: int = 64
+
+    def narrower(self, share: float) -> Loops:
+        """Those within so much of the room about the middle of the limits."""
+        sides = self.middle + share * (self.box - self.middle)
+        return dataclasses.replace(self, within=tuple(zip(*sides.tolist())))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -72,9 +89,10 @@ class Loops:
         """(alpha, alphadot), (..., N, joints), of loops p (..., 2 K + 1, joints)."""
         return self.basis @ p, self.rates @ p
 
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """(A, b) with A p <= b for p as a row, at up to 256 phases of all shape variables together."""
-        rows = self.basis[:: max(1, self.joints * self.phases // 256)]
+    def limits(self, dense: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """(A, b) with A p <= b for p as a row, at 512 phases of all shape variables together; dense: at so many that
+        `fitted` leaves a loop which keeps them as it is."""
+        rows = waves(DENSE if dense else max(512 // self.joints, 4 * self.harmonics), self.harmonics)
         A = np.concatenate([np.kron(rows, unit) for unit in np.eye(self.joints)[:, None]])
         sides = self.half * (1 - NARROWER) + [[1.0], [-1.0]] * self.middle
         return np.concatenate([A, -A]), np.repeat(sides, len(rows), 1).ravel()
@@ -96,7 +114,10 @@ class Loops:
 
     def of(self, gait: Gait) -> np.ndarray:
         """p of what the gait has up to the highest harmonic."""
-        alpha = gait.shape(2 * np.pi * np.arange(DENSE) / DENSE)
+        return self._series(gait.shape(2 * np.pi * np.arange(DENSE) / DENSE))
+
+    def _series(self, alpha: np.ndarray) -> np.ndarray:
+        """p of a closed curve (DENSE, joints) at equally spaced phases, up to the highest harmonic."""
         c = np.fft.rfft(alpha, axis=0)[: self.harmonics + 1] / DENSE
         p = np.empty(self.shape)
         p[0], p[1::2], p[2::2] = c[0].real, 2 * c[1:].real, -2 * c[1:].imag
@@ -130,10 +151,12 @@ class Loops:
         return alpha.min(0), alpha.max(0)
 
     def starts(self, own, count: int, seed: int = 0) -> list[np.ndarray]:
-        """``count`` loops to begin with: ``own``, then travelling waves of several sizes and lags, then random ones."""
+        """``count`` loops to begin with: ``own``, then `OUTLINES` of two joints, then travelling waves of several sizes and
+        lags, then random ones."""
         rng, found = np.random.default_rng(seed), [self.fitted(self._sizeable(own))]
+        found += [self._outline(x) for x in OUTLINES[: count - 1] if self.joints == 2]
         lags = [np.pi / 2, -np.pi / 2, 2 * np.pi / 3, np.pi / 4]
-        for k in range(count - 1):
+        for k in range(count - len(found)):
             p = np.zeros(self.shape)
             lag = np.arange(self.joints) * (lags[k] if k < len(lags) else rng.uniform(-np.pi, np.pi))
             size = self.half * (0.7 if k == 0 else rng.uniform(0.4, 0.9))
@@ -144,6 +167,15 @@ class Loops:
                 p[0] += 0.1 * self.half * rng.normal(size=self.joints)
             found.append(self.fitted(p))
         return found
+
+
+    def _outline(self, corners) -> np.ndarray:
+        """The loop round a polygon, of `OUTLINES`, at a constant speed."""
+        closed = np.array([*corners, corners[0]], float)
+        path = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+        along = path[-1] * np.arange(DENSE) / DENSE
+        curve = np.stack([np.interp(along, path, x) for x in closed.T], -1)
+        return self.fitted(self._series(self.middle + self.half * curve))
 
 
 def waves(phases: int, harmonics: int) -> np.ndarray:

@@ -34,13 +34,15 @@ class Told:
 @dataclass(frozen=True, eq=False)
 class Optimum:
     """What `optimise` found. best, start: told by the direct tier. active: limits that the best touches. answers: value and
-    number of starts of every different loop found, best first. seconds: it took."""
+    number of starts of every different loop found, best first; others: of those that a table led to, by the direct tier
+    before it finished them. seconds: it took."""
 
     request: Request
     best: Told
     start: Told
     active: tuple[str, ...]
     answers: tuple[tuple[float, int], ...]
+    others: tuple[tuple[float, int], ...]
     evaluations: int
     seconds: float
 
@@ -73,6 +75,7 @@ class Optimum:
             "evaluations": self.evaluations,
             "seconds": self.seconds,
             "active": list(self.active),
+            "answers": [list(x) for x in self.answers + self.others],
             "estimate": b.error,
             "body_length": float(system.length),
             "units": {

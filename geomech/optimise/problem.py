@@ -20,9 +20,10 @@ class Enough(Exception):
 
 class Problem:
     """``aim`` near the loop p, in numbers x: those of a loop over its unit and, where a limit of rate paces it, the time of a
-    rad of phase over that of p. cycles: `Phases` or `Runs`; `Enough` after ``most``. told: whenever one is done."""
+    rad of phase over that of p. cycles: `Phases` or `Runs`; `Enough` after ``most``. told: whenever one is done. even: what
+    uneven pacing and a long way cost, of the value."""
 
-    def __init__(self, cycles, aim: Aim, p: np.ndarray, told: Callable, most: float):
+    def __init__(self, cycles, aim: Aim, p: np.ndarray, told: Callable, most: float, even: float = EVEN):
         self.cycles, self.aim, self.loops, self.told, self.last = cycles, aim, cycles.loops, told, cycles.count + most
         self.unit, self.shape, self.count = cycles.loops.unit, p.shape, p.size
         self.paced = aim.timed and aim.rate is not None
@@ -31,7 +32,7 @@ class Problem:
         b = self.brought(self.first)
         power = b.power[0] if b.power else None
         self.time = aim.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[0] if aim.timed else 1.0
-        self.weight = 0.0 if self.paced else EVEN * max(aim.value(b, 1.0)[0], 0.01)
+        self.weight = 0.0 if self.paced else even * max(aim.value(b, 1.0)[0], 0.01)
 
     def loop(self, x: np.ndarray) -> np.ndarray:
         """p of numbers x."""
@@ -73,10 +74,12 @@ class Problem:
         slower = (P / self.aim.power) ** (1 / self.cycles.degree) / self.time
         return slower, slower / P / self.cycles.degree * dP
 
-    def rules(self, turn: float, once: Stroke | None, singularity: Callable | None, away: float) -> list[dict]:
+    def rules(
+        self, turn: float, once: Stroke | None, singularity: Callable | None, away: float, dense: bool = False
+    ) -> list[dict]:
         """turn (rad): of a cycle, at most. once: the stroke that a loop stays. singularity: of shapes, no nearer to 0 than
-        ``away``."""
-        found = [_limits(self)]
+        ``away``. dense: limits at so many phases that they hold between them."""
+        found = [_limits(self, dense)]
         if self.paced:
             found.append(_rates(self))
             found += [_power(self)] if self.aim.power is not None else []
@@ -97,9 +100,9 @@ def _linear(A: np.ndarray, limit) -> dict:
     return {"type": "ineq", "fun": lambda x: limit - A @ x, "jac": lambda x: -A}
 
 
-def _limits(of: Problem) -> dict:
+def _limits(of: Problem, dense: bool) -> dict:
     """No shape beyond them."""
-    A, limit = of.loops.limits()
+    A, limit = of.loops.limits(dense)
     return _linear(of.slopes(A.reshape(-1, *of.shape)), limit)
 
 

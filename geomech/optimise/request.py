@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +16,7 @@ from geomech.gaits import Gait, Sine
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
 from geomech.optimise.limits import Asked, limits
-from geomech.optimise.loops import DENSE, Loops
+from geomech.optimise.loops import DENSE, IN_MIRROR, OUTLINES, Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
@@ -23,11 +24,13 @@ from geomech.systems.base import Premise, System
 
 JOINTS = 12  # more make more numbers than a search without a model of them can find
 PHASES = 128  # of a cycle in the search
+FINISHED = 3  # answers of the table that the direct tier goes on from
+SHARE, LED = 0.8, 4  # of the limits: narrower ones, that the search begins within; and how many of its answers lead on
 ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
-NEAR, FINISH, RUNS = 100, 16, 12  # steps of the search in tables, by the direct tier, and of gaits run as a whole
+NEAR, FINISH, POLISH, RUNS = 100, 16, 60, 12  # steps in tables, by the direct tier, of its best, of gaits run as a whole
 CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
 STILL = 1e-12  # of the velocity: what is rounding
-LOOPS = 4  # of which one at least turns, if any does
+LOOPS = 4 + len(OUTLINES)  # of which one at least turns, if any does
 DEGREES = 1e-3  # by which the degree of the power may scatter
 
 
@@ -111,21 +114,35 @@ class Request:
                 return loops.gait(loops.fitted(loops.of(gait)))
         return gait
 
+    @property
+    def phases(self) -> int:
+        """Of a cycle that is told: a multiple of 8, as errors are estimated on an eighth of them."""
+        return 8 * -(-max(self.scene.numerics.phases, self.loops.phases) // 8)
+
     def cost(self) -> cost.Cost:
         """Balances, seconds and memory that it takes at most."""
         scene, loops, gait = self.scene, self.loops, self.gait
         numbers = int(np.prod(loops.shape))
         each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
-        jobs = cost.direct(scene, gait, 3 + (2 if self.looks_up else self.starts), max(scene.numerics.phases, PHASES))
+        finished = min(FINISHED, self.starts) if self.looks_up else self.starts
+        jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
             jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
-            climbs, steps = min(2, self.starts), FINISH
+            steps = finished * FINISH + POLISH * self.phases / loops.phases
         else:
-            climbs, steps = self.starts, RUNS if self.whole else NEAR
-        gaits = int(climbs * steps * TRIES * each)
+            steps = self.starts * (RUNS if self.whole else NEAR)
+        gaits = int(steps * TRIES * each)
         jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, every=True)
         found = cost.price(jobs)
-        return found._replace(seconds=found.seconds + CLIMB * (self.starts + 1))
+        return found._replace(seconds=found.seconds + CLIMB * (self.climbs + 1))
+
+    @property
+    def climbs(self) -> int:
+        """How many it takes: from its starts and, where a table leads near, by the direct tier and of its best; from several starts, within
+        narrower limits and on from there, too."""
+        if not self.looks_up:
+            return self.starts
+        return self.starts + (self.starts + LED) * (self.starts > 1) + min(FINISHED, self.starts) + 1
 
     @property
     def extent(self) -> float:
@@ -135,11 +152,11 @@ class Request:
 
 def checked(
     scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: Asked = None,
-    starts: int = 1, rate: float | None = None, power: float | None = None,
+    starts: int | None = None, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
     """The request, or SceneError, one line, for one that makes no sense."""
     with named(checked_scene(scene).name):
-        number("--starts", starts, 1, 1000, whole=True)
+        number("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
         if system.near:
@@ -161,7 +178,9 @@ def checked(
             raise SceneError("a sine along a straight axis brings nothing across it: drop --direction, or say x")
         if isinstance(loops, Undulations) and wanted.rate is not None:
             raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
-        request = Request(scene, wanted, loops, int(starts))
+        request = Request(scene, wanted, loops, 1 if starts is None else int(starts))
+        if starts is None and request.looks_up:
+            request = dataclasses.replace(request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request))
         if wanted.costs:
             request.degree  # noqa: B018 - refuses what has none
         if wanted.straight and _stays(system):
@@ -177,6 +196,11 @@ def checked(
 def told_by(system: System) -> str:
     """A system, or its file."""
     return "the table's file" if system.stored("connection") else f"the {system.kind}"
+
+
+def _in_mirror(request: Request) -> bool:
+    """Whether the last of `OUTLINES` are others in the mirror."""
+    return request.system.mirror and not request.loops.middle.any()
 
 
 def _stays(system: System) -> bool:

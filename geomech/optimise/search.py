@@ -17,34 +17,35 @@ from geomech.gaits import Gait
 from geomech.gaits.base import FASTEST
 from geomech.optimise import loops as series
 from geomech.optimise import ways
-from geomech.optimise.climb import TRIES, climb
+from geomech.optimise.climb import TRIES, climb, settled
 from geomech.optimise.keeping import NEARLY, Keeping
 from geomech.optimise.limits import Asked
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
-from geomech.optimise.request import CLIMB, FINISH, NEAR, RUNS, Request, checked
+from geomech.optimise.problem import EVEN
+from geomech.optimise.request import CLIMB, FINISH, FINISHED, LED, NEAR, POLISH, RUNS, SHARE, Request, checked
 from geomech.optimise.telling import told
 from geomech.reconstruct import turning
 from geomech.scene.model import Scene
 
 NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
-FINISHED = 2  # answers of the table that the direct tier goes on from
-TURNED = 0.02  # rad: what 128 phases leave of a net turn
+NO_TURN = 1e-7  # rad: a net turn that is none
 AS_MUCH = 1e-3  # of the value
-STRAIGHTENED = 4  # steps of Newton, at most
 LARGER = 0.6  # of the room: how far the scene's own gait goes the second time
+POLISHED, EVEN_AT_LAST = 1e-7, EVEN / 10  # of the way of the best one, at the phases where it is told
 FINISHING = 1.0  # s from a start by the direct tier, likewise
 ENOUGH = 64  # harmonics that any start is told in
 
 
 def optimise(
     scene: Scene, aim: str = "displacement", direction: str | None = None, harmonics: int | None = None,
-    within: Asked = None, starts: int = 1, *, rate: float | None = None, power: float | None = None,
+    within: Asked = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
     """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
     ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest) for each,
-    searched for from the scene's own gait and ``starts`` - 1 others. A sine is sought among sines. SceneError for what makes
+    searched for from the scene's own gait and ``starts`` - 1 others: by default none, and in a dry medium, where two joints have
+    many a gait that is the best near by, `OUTLINES` of the limits. A sine is sought among sines. SceneError for what makes
     no sense."""
     request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
     return search(request, progress)
@@ -63,7 +64,7 @@ class _Search:
     def __init__(self, request: Request, progress: Callable | None):
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
         self.done = 0
-        climbs = request.starts + (min(FINISHED, request.starts) if request.looks_up else 0) + self._rough
+        climbs = request.climbs + self._rough
         self.climb = TRIES * (RUNS if request.whole else FINISH)  # cycles of one, or so
         self.expected = climbs * self.climb
 
@@ -80,14 +81,14 @@ class _Search:
         start = self._told(self._start())
         self._timed(start)  # refuses what no gait can be
         turn = abs(float(start.displacement[2]))
-        found = self._climbed([self.keeping.first, *map(self.keeping.start, others)], turn)
+        found, others = self._climbed([self.keeping.first, *map(self.keeping.start, others)], turn)
         best, answers, p = start, [], None
         for q, times in found:
             if self.keeping.meets(q, NEARLY):
                 continue
-            this, q = self._forwards(self._told(self._turned_to(q)), q)
-            straight = not r.aim.straight or abs(this.displacement[2]) <= turn + TURNED + this.heading
+            this, q = self._forwards(*self._finished(q, turn), turn)
             answers.append((this.value, times))
+            straight = not r.aim.straight or abs(this.displacement[2]) <= turn + self._slack(this)
             if straight and this.value > best.value:
                 best, p = this, q
         if p is None:
@@ -95,24 +96,49 @@ class _Search:
         active = [*r.loops.active(p), *["singular shapes"] * self.keeping.meets(p, 1 / NEARLY), *best.limits]
         best = dataclasses.replace(best, gait=self._timed(best))
         return Optimum(
-            r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), self.count,
+            r, best, start, tuple(active), tuple(sorted(answers, reverse=True)), others, self.count,
             time.perf_counter() - self.began,
         )  # fmt: skip
 
-    def _climbed(self, starts: list[np.ndarray], turn: float) -> list[tuple[np.ndarray, int]]:
-        """Different loops that the starts lead to, each with how many led there."""
+    def _climbed(self, starts: list[np.ndarray], turn: float) -> tuple[list, tuple]:
+        """(different loops that the starts lead to, each with how many led there; values of those that a table led to and
+        nobody finished, likewise)."""
         r, tier = self.r, ways.direct(self.r)
         if not r.looks_up:
-            return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR))
+            return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR)), ()
         looked_up = ways.looked_up(r)
-        near = self._near(ways.table(r, *looked_up), starts, turn, looked_up, NEAR)
+        near = self._near(ways.table(r, *looked_up), starts + self._led_on(looked_up, starts, turn), turn, looked_up, NEAR)
         if not r.system.odd:  # where the table, which is, takes either sense for as good
             near += [series.reversed_(p) for p in near]
-        worth = lambda found: [self._worth(tier, found[0], x) for x in (turn, np.inf)]  # what turns is straightened yet
-        ranked = sorted(self._different(near), key=worth, reverse=True)[:FINISHED]
-        further = self._each([p for p, _ in ranked], turn, None, FINISH, TOLERANCE)
-        finished = [max(q, p, key=lambda q: self._worth(tier, q, turn)) for q, (p, _) in zip(further, ranked)]
-        return [(self._straightened(tier, p, turn), times) for p, (_, times) in zip(finished, ranked)]
+        ranked = self._ranked(tier, near, turn)
+        best, rest = ranked[:FINISHED], ranked[FINISHED:]
+        further = self._each([p for p, *_ in best], turn, None, FINISH, TOLERANCE)
+        better = self._better(turn)
+        finished = [(better(q, p), times) for q, (p, times, _) in zip(further, best)]
+        k = max(range(len(finished)), key=lambda k: self._worth(tier, finished[k][0], turn))
+        (p,) = self._each([finished[k][0]], turn, None, POLISH, POLISHED, phases=r.phases)
+        finished[k] = better(p, finished[k][0]), finished[k][1]
+        return finished, tuple((worth, times) for _, times, worth in rest)
+
+    def _better(self, turn: float) -> Callable:
+        """A function that settles two loops and returns the better."""
+        tier = ways.direct(self.r, self.r.phases)
+        return lambda p, q: max(self._settled(p, turn), self._settled(q, turn), key=lambda x: self._worth(tier, x, turn))
+
+    def _led_on(self, looked_up: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
+        """The best loops within narrower limits, from which the search goes on: what is best there is so far from others that
+        wider limits alone may miss it. None for one start."""
+        if self.r.starts == 1:
+            return []
+        narrow = dataclasses.replace(self.r, loops=self.r.loops.narrower(SHARE))
+        begun = [self.keeping.start(narrow.loops.fitted(p)) for p in starts]
+        near = self._each(begun, turn, looked_up, NEAR, NEAR_TOLERANCE, narrow)
+        return [p for p, *_ in self._ranked(ways.table(narrow, *looked_up), near, turn)[:LED]]
+
+    def _ranked(self, tier, found: list[np.ndarray], turn: float) -> list[tuple[np.ndarray, int, float]]:
+        """Different loops, how many led to each and their worth, the best first."""
+        worth = [(p, times, self._worth(tier, p, turn)) for p, times in self._different(found)]
+        return sorted(worth, key=lambda x: x[2], reverse=True)
 
     def _near(self, cycles, starts: list[np.ndarray], turn: float, looked_up, most: int) -> list[np.ndarray]:
         """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near by."""
@@ -129,10 +155,14 @@ class _Search:
             self.r.loops.fitted(np.concatenate([p[:1], p[1:] * LARGER * self.r.loops.half.max() / size]))
         )
 
-    def _each(self, starts: list[np.ndarray], turn: float, looked_up, most: int, tolerance: float) -> list[np.ndarray]:
-        """Where each start leads, by the direct tier or what is ``looked_up``. Who computes: `geomech.workers`."""
+    def _each(
+        self, starts: list[np.ndarray], turn: float, looked_up, most: int, tolerance: float, r: Request | None = None,
+        phases: int | None = None,
+    ) -> list[np.ndarray]:  # fmt: skip
+        """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its phases or
+        others. Who computes: `geomech.workers`."""
         at_hand = len(starts) == 1 and not workers.far()
-        how = Way(self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None)
+        how = Way(r or self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None, phases)
         ends, before, seconds = [], self.done, len(starts) * (CLIMB if looked_up else FINISHING)
         for p, count in workers.each(_up_from, how, starts, len(starts), seconds=seconds):
             ends.append(p)
@@ -141,40 +171,54 @@ class _Search:
         return ends
 
     def _worth(self, tier, p, turn: float) -> float:
-        """Value of a loop as the search sees it, none if it turns too much."""
+        """Value of a loop as the search sees it, less what it takes by its slopes not to turn too much."""
         try:
             b = tier(p)
         except RuntimeError:  # it cannot be run
             return -np.inf
         finally:
             self.count += 1
-        if self.r.aim.straight and abs(b.net[0][2]) > turn + TURNED:
-            return -np.inf
         power = b.power[0] if b.power else None
         timed = self.r.aim.timed
         period = self.r.aim.time(np.abs(tier.loops.cycle(p)[1]).max(), power, tier.degree)[0] if timed else 1.0
-        return self.r.aim.value(b, period)[0]
+        value, by = self.r.aim.value(b, period)
+        if self.r.aim.straight:
+            theta, by_theta = b.net[0][2], b.net[1][2]
+            more = theta - np.clip(theta, -turn, turn)
+            value -= more * (by * by_theta).sum() / ((by_theta**2).sum() or 1.0)
+        return float(value) if np.isfinite(value) else -np.inf
 
     def _up(self, cycles, p, how: Way) -> np.ndarray:
         before = cycles.count
         p = climb(
             cycles, self.r.aim, p, turn=how.turn, most=how.most, tolerance=how.tolerance, stroke=self.keeping.stroke,
             singularity=self.r.system.singularity, away=self.keeping.away, told=how.told or (lambda: None),
+            even=EVEN_AT_LAST if how.phases else EVEN,
         )  # fmt: skip
         self.count += cycles.count - before
-        return self._straightened(cycles, self.r.loops.fitted(p), how.turn)
+        return p if isinstance(self.r.loops, Loops) else self.r.loops.fitted(p)  # loops are settled yet
 
-    def _straightened(self, cycles, p, turn: float) -> np.ndarray:
-        """The loop near by that turns no more than it may: the search may end a little beyond."""
-        for _ in range(STRAIGHTENED if self.r.aim.straight else 0):
-            b = cycles(p)
-            self.count += 1
-            theta, slopes = b.net[0][2], b.net[1][2]
-            more = theta - np.clip(theta, -turn, turn)
-            if abs(more) < TURNED / 20:
-                break
-            p = self.r.loops.fitted(p - more * slopes / ((slopes**2).sum() or 1.0))
-        return p
+    def _finished(self, p: np.ndarray, turn: float) -> tuple[Told, np.ndarray]:
+        """The loop, or the one next to it that keeps all rules, and what that brings."""
+        p = self._settled(self._turned_to(p), turn)
+        return self._told(self.r.loops.gait(p)), p
+
+    def _settled(self, p: np.ndarray, turn: float) -> np.ndarray:
+        """The loop next to p that keeps all rules at the phases where it is told, and between them."""
+        r = self.r
+        if not isinstance(r.loops, Loops):
+            return p
+        cycles = ways.direct(r, r.phases)
+        p = settled(
+            cycles, r.aim, p, turn=turn, stroke=self.keeping.stroke, singularity=r.system.singularity,
+            away=self.keeping.away,
+        )  # fmt: skip
+        self.count += cycles.count
+        return r.loops.fitted(p)  # as it is, but where no loop near by keeps all rules
+
+    def _slack(self, this: Told) -> float:
+        """rad: how much more than it may a gait turns by rounding; where its cycles are not those of the search, by its error."""
+        return NO_TURN + (this.heading if self.r.whole or self.r.system is not self.r.scene.system else 0.0)
 
     def _tell(self, cycles: int = 1) -> None:
         self.done += cycles
@@ -206,11 +250,11 @@ class _Search:
             return r.loops.gait(self.keeping.first)
         return r.gait
 
-    def _turned_to(self, p: np.ndarray) -> Gait:
-        """The gait; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
+    def _turned_to(self, p: np.ndarray) -> np.ndarray:
+        """The loop; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
         r = self.r
         if not (r.aim.direction and isinstance(r.loops, Loops)) or r.whole:
-            return r.loops.gait(p)
+            return p
         for _ in range(3):  # the crossing nearest to the start, more closely each time
             ahead = turning(r.scene.system.run(*r.loops.cycle(p)).xi)
             n, after = len(ahead), np.roll(ahead, -1)
@@ -218,15 +262,14 @@ class _Search:
             k = places[np.argmin(np.minimum(places, n - places))]
             share = ahead[k] / ((ahead[k] - after[k]) or 1.0)
             p = series.shifted(p, 2 * np.pi / n * (k + share))
-        return r.loops.gait(p)
+        return p
 
-    def _forwards(self, this: Told, p: np.ndarray) -> tuple[Told, np.ndarray]:
+    def _forwards(self, this: Told, p: np.ndarray, turn: float) -> tuple[Told, np.ndarray]:
         """Run backwards where a direction is asked for and the gait goes the other way, if that brings as much."""
         k = "xy".find(self.r.aim.direction or "-")
         if k < 0 or this.displacement[k] >= 0 or not isinstance(self.r.loops, Loops):
             return this, p
-        back = series.reversed_(p)
-        other = self._told(self._turned_to(back))
+        other, back = self._finished(series.reversed_(p), turn)
         return (other, back) if other.value >= this.value * (1 - AS_MUCH) else (this, p)
 
     def _timed(self, this: Told) -> Gait:
@@ -256,7 +299,8 @@ class _Search:
 
 class Way(NamedTuple):
     """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`, or
-    None for the direct tier. told: whenever a cycle is done, where only one start is under way."""
+    None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the direct tier, if others than the
+    search's."""
 
     r: Request
     origin: np.ndarray
@@ -265,11 +309,12 @@ class Way(NamedTuple):
     most: int
     tolerance: float
     told: Callable | None
+    phases: int | None = None
 
 
 def _up_from(how: Way, p: np.ndarray) -> tuple[np.ndarray, int]:
     """(where a start leads, cycles)."""
     search = _Search(how.r, None)
     search.keeping = Keeping(how.r.loops, how.r.system.singularity, how.origin)
-    cycles = ways.table(how.r, *how.looked_up) if how.looked_up else ways.direct(how.r)
+    cycles = ways.table(how.r, *how.looked_up) if how.looked_up else ways.direct(how.r, how.phases)
     return search._up(cycles, p, how), search.count

@@ -4,48 +4,73 @@ from __future__ import annotations
 
 import numpy as np
 
-FLAT, BACK = 0.05, 1e-6  # of the first harmonic: how thin a plane, and how far back a stroke, is none
+FLAT, BACK = 0.05, 1e-9  # of the first harmonic: how thin a plane is none; of its sweep: how far back is not back
+NEWTON = 3  # steps to the least sweep between two phases
 
 
 class Stroke:
-    """The sense and the plane, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`."""
+    """The sense and the plane, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`.
+
+    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least that it
+    has in each of N intervals between phases, so that a loop which goes back nowhere there goes back nowhere."""
 
     def __init__(self, loops, p: np.ndarray):
         self.plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
         self.thin, self.size = size[-1] < FLAT * size[0] or len(size) < 2, float(np.prod(size)) or 1.0
-        self.at, self.rates = loops.basis[::2].copy(), loops.rates[::2]
-        self.at[:, 0] = 0.0  # about the centre
+        self.k, self.width = np.arange(1, loops.harmonics + 1), 2 * np.pi / loops.phases
+        self.phases = self.width * np.arange(loops.phases)
         self.side = 1.0
         if not self.thin:
-            self.side = float(np.sign(self.swept(p).mean())) or 1.0
+            (u, v), (du, dv) = self._going(p, self.phases)[:2]
+            self.side = float(np.sign((u * dv - v * du).mean())) or 1.0
 
-    def _going(self, p):
+    def _going(self, p: np.ndarray, phases: np.ndarray) -> list[np.ndarray]:
+        """The loop about its centre at the phases (N,), and its first three derivatives, (2, N) each."""
         q = p @ self.plane
-        return (self.at @ q).T, (self.rates @ q).T
+        waves = np.exp(1j * np.outer(phases, self.k))
+        return [((waves * (1j * self.k) ** n) @ (q[1::2] - 1j * q[2::2])).real.T for n in range(4)]
+
+    def lowest(self, p: np.ndarray) -> np.ndarray:
+        """(N,): the phase of least sweep in each interval between phases."""
+        cross = lambda a, b: self.side * (a[0] * b[1] - a[1] * b[0])
+        off = np.zeros_like(self.phases)
+        for _ in range(NEWTON):
+            x, dx, ddx, dddx = self._going(p, self.phases + off)
+            rise, bend = cross(x, ddx), cross(dx, ddx) + cross(x, dddx)
+            step = -rise / np.where(bend > 0, bend, 1.0)
+            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where it has no least
+            off = np.clip(off + step, -self.width / 2, self.width / 2)
+        return self.phases + off
 
     def swept(self, p: np.ndarray) -> np.ndarray:
-        """(N,): area about the centre that the loop p sweeps, for each phase, over that of its first harmonic."""
-        (u, v), (du, dv) = self._going(p)
+        """(N,): the least area about the centre that the loop p sweeps for a rad of phase, in each interval between phases, over
+        that of its first harmonic."""
+        (u, v), (du, dv) = self._going(p, self.lowest(p))[:2]
         return self.side * (u * dv - v * du) / self.size
 
     def slopes(self, p: np.ndarray) -> np.ndarray:
         """Those of `swept`, (N, *shape of p)."""
-        (u, v), (du, dv) = self._going(p)
-        by_u = dv[:, None] * self.at - v[:, None] * self.rates
-        by_v = u[:, None] * self.rates - du[:, None] * self.at
+        at = self.lowest(p)
+        (u, v), (du, dv) = self._going(p, at)[:2]
+        kt = np.outer(at, self.k)
+        waves, rates = np.zeros((2, len(at), len(p)))
+        waves[:, 1::2], waves[:, 2::2] = np.cos(kt), np.sin(kt)
+        rates[:, 1::2], rates[:, 2::2] = -self.k * np.sin(kt), self.k * np.cos(kt)
+        by_u = dv[:, None] * waves - v[:, None] * rates
+        by_v = u[:, None] * rates - du[:, None] * waves
         rows = by_u[..., None] * self.plane[:, 0] + by_v[..., None] * self.plane[:, 1]
         return self.side * rows / self.size
 
     def winding(self, p: np.ndarray) -> int:
         """How often the loop goes round, in the sense of the first."""
-        (u, v), _ = self._going(p)
+        u, v = self._going(p, self.phases)[0]
         q = u + 1j * v
         return int(np.rint(self.side * np.angle(np.roll(q, -1) * np.conj(q)).sum() / (2 * np.pi)))
 
     @classmethod
-    def is_one(cls, loops, p: np.ndarray) -> bool:
-        """Whether the loop is one stroke."""
+    def is_one(cls, loops, p: np.ndarray, back: float = BACK) -> bool:
+        """Whether the loop is one stroke, and its sweep nowhere further below 0 than ``back``."""
         if p.ndim != 2 or p.shape[1] < 2:
             return False
         own = cls(loops, p)
-        return not own.thin and own.swept(p).min() >= -BACK and own.winding(p) == 1
+        return not own.thin and own.swept(p).min() >= -back and own.winding(p) == 1

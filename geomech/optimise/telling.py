@@ -15,7 +15,7 @@ from geomech.study import estimate
 def told(r: Request, gait: Gait) -> Told:
     """A gait at its own amplitude."""
     system, aim = r.scene.system, r.aim
-    phases = max(r.scene.numerics.phases, r.loops.phases, 4 * gait.harmonics)
+    phases = max(r.phases, 4 * gait.harmonics)
     (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
     alpha, alphadot = gait.cycle(phases)
     degree = r.degree if r.power else 1.0

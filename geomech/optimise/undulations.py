@@ -35,8 +35,8 @@ class Undulations:
         found = [self.gait(x).cycle(self.phases) for x in np.reshape(p, (-1, 2))]
         return tuple(np.stack(x).reshape(*np.shape(p)[:-1], self.phases, -1) for x in zip(*found))
 
-    def limits(self) -> tuple[np.ndarray, np.ndarray]:
-        """(A, b) with A p <= b."""
+    def limits(self, dense: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """(A, b) with A p <= b, which holds at all phases."""
         low, high = self.bounds
         return np.concatenate([np.eye(2), -np.eye(2)]), np.concatenate([high, -low])
 

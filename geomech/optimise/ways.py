@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -12,13 +13,14 @@ from geomech.optimise.request import Request
 from geomech.study.bench import Study
 
 
-def direct(r: Request) -> Phases | Runs:
-    """Cycles by the direct tier."""
+def direct(r: Request, phases: int | None = None) -> Phases | Runs:
+    """Cycles by the direct tier, at the phases of the loops or at others."""
     degree = r.degree if r.aim.costs else 1.0
+    loops = r.loops if phases is None else dataclasses.replace(r.loops, phases=phases)
     if r.whole:
-        return Runs(r.loops, r.system.run, r.aim.costs, degree, r.system.length)
+        return Runs(loops, r.system.run, r.aim.costs, degree, r.system.length)
     velocity = _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
-    return Phases(r.loops, velocity, r.power if r.aim.costs else None, degree)
+    return Phases(loops, velocity, r.power if r.aim.costs else None, degree)
 
 
 def looked_up(r: Request) -> tuple:

@@ -8,6 +8,8 @@ from geomech.optimise import Optimum
 from geomech.scene.write import toml
 from geomech.study.effort import METRIC
 
+SHOWN = 6  # answers that a table led to, of those that nobody finished
+
 
 def text(optimum: Optimum) -> str:
     """What was found, in lines."""
@@ -32,11 +34,23 @@ def text(optimum: Optimum) -> str:
         lines.append(f"frequency {best.gait.frequency:.6g} Hz, with {told}")
     lines.append(f"limits that it touches: {', '.join(optimum.active) or 'none'}")
     if optimum.request.starts > 1:
-        found = ", ".join(f"{value:.6g} (from {count})" for value, count in optimum.answers)
-        lines.append(f"{optimum.request.starts} starts, answers that differ: {found}")
+        lines += _found(optimum)
     if optimum.best.value <= optimum.start.value * (1 + 1e-12):
         lines.append("nothing better than the scene's own gait was found")
     return "\n".join([*lines, f"{optimum.evaluations} cycles evaluated in {optimum.seconds:.2g} s"])
+
+
+def _found(optimum: Optimum) -> list[str]:
+    """What the starts led to."""
+    listed = lambda answers: ", ".join(f"{value:.6g} (from {count})" for value, count in answers)
+    led = sum(count for _, count in optimum.answers + optimum.others) - optimum.request.starts
+    more = f", and {led} that narrower limits led to" if led > 0 else ""
+    lines = [f"{optimum.request.starts} starts{more}, answers that differ: {listed(optimum.answers)}"]
+    if optimum.others:
+        rest = len(optimum.others) - SHOWN
+        more = f" and {rest} more, down to {optimum.others[-1][0]:.6g}" if rest > 0 else ""
+        lines.append(f"and by a table alone, less: {listed(optimum.others[:SHOWN])}{more}")
+    return lines
 
 
 def scene_toml(optimum: Optimum) -> str:
