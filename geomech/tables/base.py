@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.connection import Connection
-from geomech.errors import SceneError, choose, short
+from geomech.errors import SceneError, choose, plain, short
 from geomech.files import read, why
 from geomech.gaits import Circle
 from geomech.harmonics import Harmonics
@@ -20,6 +20,7 @@ from geomech.reconstruct import displacement
 from geomech.tube import Tube
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
+LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
@@ -53,6 +54,9 @@ class Stored:
     power_degree: float | None = None
     A_error: np.ndarray | None = None
     level: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "frame", plain(" ".join(self.frame.split()))[:LONGEST_NAME])
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -139,7 +143,7 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
 def checked_names(told, plain: list[str]) -> tuple[str, ...]:
     """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
     words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
-    good = words and all(x.isprintable() and 0 < len(x) <= 60 and "$" not in x for x in told)
+    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in told)
     return tuple(told if good else plain)
 
 
@@ -202,7 +206,9 @@ def detected_sign(connection: Connection) -> str:
     centre = tuple(float(a[0] + a[-1]) / 2 for a in connection.axes)
     alpha, alphadot = Circle(centre=centre).cycle(64, [0.3 * half, 0.5 * half])
     xi = connection.velocity(alpha, alphadot)
+    least = 1e-9 * float(np.abs(xi).max())  # below it is rounding
     for sign, value in (("+", 1.0), ("-", -1.0)):
-        if (displacement(value * xi)[:, 0] < 0).all() and (displacement(-value * xi)[:, 0] > 0).all():
+        there, back = displacement(value * xi)[:, 0], displacement(-value * xi)[:, 0]
+        if (there < -least).all() and (back > least).all():
             return sign
     raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")

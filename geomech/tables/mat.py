@@ -58,7 +58,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     turned = plain if sign == "+" else Connection(axes, -A, residual, plain.speed, degree)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
     known = {"A_error": error, "level": checked_level(about)}
-    return Stored(turned, None, None, *own, frame[:60], sign, order, said, sha256, shapes, **known)
+    return Stored(turned, None, None, *own, frame, sign, order, said, sha256, shapes, **known)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
