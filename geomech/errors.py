@@ -6,6 +6,8 @@ import contextlib
 import difflib
 import math
 import numbers
+import re
+import unicodedata
 import warnings
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
@@ -14,12 +16,29 @@ if TYPE_CHECKING:
     import numpy as np
 
 
+def plain(text: str) -> str:
+    """Return text, which may hold what others wrote, as it may be shown: what steers a terminal, or is not seen, stands as its
+    escape. Lines, tabs and blanks stay. All that goes to a terminal or into HTML passes here."""
+    return re.sub(r"[^ -~\n\t]", _seen, text)
+
+
+def _seen(found: re.Match) -> str:
+    letter = found[0]
+    shown = letter.isprintable() or unicodedata.category(letter) == "Zs"
+    return letter if shown else letter.encode("unicode_escape").decode()
+
+
+def line(text: str, most: int = 400) -> str:
+    """Return `plain` text as one line of at most ``most`` characters, cut before its end."""
+    text = plain(" ".join(text.split()))
+    return text if len(text) <= most else text[: most - 100] + " ... " + text[-80:]
+
+
 class SceneError(ValueError):
     """A scene, option or file that makes no sense; its text is one line of readable length."""
 
     def __init__(self, text: str):
-        text = " ".join(text.split())
-        super().__init__(text if len(text) <= 400 else text[:300] + " ... " + text[-80:])
+        super().__init__(line(text))
 
 
 class Note(UserWarning):
@@ -54,7 +73,7 @@ def named(place: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        if str(error).startswith(f"{place}: "):
+        if str(error).startswith((f"{place}: ", f"{line(place)}: ")):
             raise
         raise SceneError(f"{place}: {error}") from None
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from geomech.errors import SceneError
+from geomech.errors import SceneError, plain
 
 try:
     import fcntl
@@ -29,7 +29,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 def note(text: str) -> None:
     """A line on standard error that is no failure."""
-    print("note: " + " ".join(text.split()), file=sys.stderr)
+    print("note: " + plain(" ".join(text.split())), file=sys.stderr)
 
 
 def read(path: str | Path, largest: int) -> bytes:

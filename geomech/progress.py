@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 
+from geomech.errors import plain
+
 EVERY = 10.0  # s between lines
 REDRAWN = 0.5  # s between drawings of a notebook's bar, and before the first
 
@@ -22,7 +24,7 @@ class Course:
         self.begin(title)
 
     def begin(self, title: str) -> None:
-        self.title, self.fraction, self.start = title, 0.0, time.monotonic()
+        self.title, self.fraction, self.start = plain(title), 0.0, time.monotonic()
 
     def reached(self, fraction: float) -> None:
         self.fraction = fraction
@@ -84,11 +86,12 @@ def _way(bar: bool) -> Callable:
 @contextlib.contextmanager
 def _on_terminal(course: Course):
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task(course.title, total=1.0)
-        course.shown = lambda: bars.update(task, completed=course.fraction, description=course.title)
+        task = bars.add_task(escape(course.title), total=1.0)
+        course.shown = lambda: bars.update(task, completed=course.fraction, description=escape(course.title))
         yield
 
 

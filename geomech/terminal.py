@@ -18,12 +18,13 @@ from pathlib import Path
 
 import typer
 
-from geomech.errors import Note
+from geomech.errors import Note, line, plain
 from geomech.progress import progress
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
 BELOW = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+LONGEST = 2000  # characters of an error
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
@@ -65,9 +66,33 @@ def calm() -> None:
 
 def ended(app: typer.Typer, argv: list[str]) -> int:
     """The exit code of a command, after one line on standard error if it failed."""
-    with stoppable():
+    with stoppable(), _plainly():
         _any_letters()
         return _run(app, argv)
+
+
+class _Plain:
+    """A stream of text, all of it `plain`."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write(plain(text))
+
+    def __getattr__(self, name: str):
+        return getattr(self._stream, name)
+
+
+@contextlib.contextmanager
+def _plainly() -> Iterator[None]:
+    """What is printed is `plain`, whatever files hold and are called."""
+    before = sys.stdout
+    sys.stdout = before and _Plain(before)
+    try:
+        yield
+    finally:
+        sys.stdout = before
 
 
 def _run(app: typer.Typer, argv: list[str]) -> int:
@@ -122,7 +147,7 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
-        tell("error: " + "; ".join([text, *getattr(error, "__notes__", ()), *notes.values()]))
+        tell("error: " + "; ".join([line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]))
         if isinstance(error, OSError):
             _deaf(sys.stdout)
     return 2
@@ -145,7 +170,7 @@ def _unheard() -> int:
 def tell(text: str) -> None:
     """One line on standard error, if anybody listens."""
     try:
-        print(" ".join(text.split()), file=sys.stderr, flush=True)
+        print(plain(" ".join(text.split())), file=sys.stderr, flush=True)
     except OSError:
         _deaf(sys.stderr)
 

@@ -17,6 +17,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 import numba
@@ -51,14 +52,14 @@ class CodeFile:
             return self.set_aside("it is damaged")
         return body
 
-    def load(self, key):
+    def load(self, key: tuple) -> Any:
         """Return what was saved under a key; None if nothing was."""
         if (body := self.read()) is None:
             return None
         saved, data = pickle.loads(body)
         return data if saved == key else None
 
-    def save(self, key, data) -> None:
+    def save(self, key: tuple, data: Any) -> None:
         """Write the file whole, or leave it as it was; OSError if that cannot be."""
         body = dumps((key, data))
         part = self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}")
@@ -95,7 +96,7 @@ class CodeCache(FunctionCache):
         super().__init__(function)
         self._cache_file = self.file = CodeFile(self.cache_path, name)
 
-    def load_overload(self, sig, target_context):
+    def load_overload(self, sig, target_context) -> Any:
         """Return the compiled code for a signature; None if it has to be compiled."""
         try:
             return super().load_overload(sig, target_context)
@@ -113,7 +114,7 @@ class CodeCache(FunctionCache):
             warnings.warn(told, Note, stacklevel=1)
 
 
-def kept(function, name: str):
+def kept(function: Any, name: str) -> Any:
     """Return a function of numba's that keeps its compiled code from run to run, where there is a folder for it: beside its
     source, the user's, or where NUMBA_CACHE_DIR points."""
     with contextlib.suppress(RuntimeError, AttributeError):  # none of these; or NUMBA_DISABLE_JIT compiles nothing

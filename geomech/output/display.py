@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from geomech.connection import Connection
+from geomech.errors import plain
 from geomech.field import Field
 from geomech.output import plots, sweeps
 from geomech.study.bench import Study
@@ -21,8 +22,9 @@ DPI = 90
 
 def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None) -> str:
     """A line, a table of at most MOST_ROWS, a Figure."""
-    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(_text(x))}</{tag}>"
-    parts = [f"<p>{html.escape(line)}</p>"]
+    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(plain(_text(x)))}</{tag}>"
+    line = html.escape(plain(line))
+    parts = [f"<p>{line}</p>"]
     if rows:
         lines = [("th", head)] * bool(head) + [("td", row) for row in rows[:MOST_ROWS]]
         body = "".join(f"<tr>{''.join(cell(tag, x) for x in row)}</tr>" for tag, row in lines)
@@ -30,7 +32,7 @@ def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), pic
         if len(rows) > MOST_ROWS:
             parts.append(f"<p>and {len(rows) - MOST_ROWS} rows more</p>")
     if picture is not None:
-        parts.append(f'<img alt="{html.escape(line)}" src="data:image/png;base64,{_encoded(picture)}"/>')
+        parts.append(f'<img alt="{line}" src="data:image/png;base64,{_encoded(picture)}"/>')
     return "<div>" + "".join(parts) + "</div>"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from geomech.errors import plain
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
@@ -22,7 +23,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
     intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
     if hasattr(scene, "told"):  # of bodies in grains, whose modules a swimmer does without
-        return "\n".join(scene.told())
+        return plain("\n".join(scene.told()))
     system = checked_scene(scene).system
     first, *told = system.told()
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
@@ -34,7 +35,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
     by_name = [name for name, tier in TIERS.items() if _by_name(tier, system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
-    return "\n".join([*lines, *_lost(system)])
+    return plain("\n".join([*lines, *_lost(system)]))
 
 
 def _lost(system) -> list[str]:

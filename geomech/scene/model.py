@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geomech.errors import choose, named, short
+from geomech.errors import choose, named, plain, short
 from geomech.gaits import Gait
 from geomech.gaits.base import checked_gait
 from geomech.scene.frames import reframed
@@ -19,7 +19,7 @@ class Told:
     """How a scene shows itself: its name and its parts, in a line of readable length."""
 
     def __repr__(self) -> str:
-        return f"Scene({self.name}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
+        return f"Scene({plain(self.name)}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech import summary
+from geomech.errors import plain
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.tiers import TIERS
@@ -38,7 +39,7 @@ class Displacements(dict):
     def __repr__(self) -> str:
         from geomech.output.report import text_table
 
-        return text_table(self.scene.name, self, self.scene)
+        return plain(text_table(self.scene.name, self, self.scene))
 
     def _repr_html_(self) -> str:
         from geomech.output import display
@@ -63,7 +64,8 @@ class Swept(dict):
         over = " x ".join(f"{name} ({len(v)}: {summary.span(v)})" for name, v in self["over"].items())
         unit = self["units"]["estimate"]
         worst = f"estimated error up to {np.max(self['estimate'], initial=0.0):.1e} {unit}"
-        return f"Swept({self.scene.name} over {over}; net {summary.poses(self['displacement'])} ({unit}, rad); {worst})"
+        net = f"net {summary.poses(self['displacement'])} ({unit}, rad)"
+        return f"Swept({plain(self.scene.name)} over {over}; {net}; {worst})"
 
     def _repr_html_(self) -> str:
         from geomech.output import display

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.connection import Connection
-from geomech.errors import SceneError, choose, short
+from geomech.errors import SceneError, choose, plain, short
 from geomech.files import read, why
 from geomech.gaits import Circle
 from geomech.harmonics import Harmonics
@@ -20,6 +20,7 @@ from geomech.reconstruct import displacement
 from geomech.tube import Tube
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
+LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
@@ -56,6 +57,9 @@ class Stored:
     A_error: np.ndarray | None = None
     level: float | None = None
     sized: bool = True
+
+    def __post_init__(self):
+        object.__setattr__(self, "frame", plain(" ".join(self.frame.split()))[:LONGEST_NAME])
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -143,7 +147,7 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
 def checked_names(told, plain: list[str]) -> tuple[str, ...]:
     """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
     words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
-    good = words and all(x.isprintable() and 0 < len(x) <= 60 and "$" not in x for x in told)
+    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in told)
     return tuple(told if good else plain)
 
 

@@ -60,7 +60,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     turned = plain if sign == "+" else replace(plain, A=-A)
     shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
     known = {"A_error": error, "level": checked_level(about), "sized": sized}
-    return Stored(turned, None, None, length, unit, frame[:60], sign, order, said, sha256, shapes, **known)
+    return Stored(turned, None, None, length, unit, frame, sign, order, said, sha256, shapes, **known)
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
