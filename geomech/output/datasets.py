@@ -98,6 +98,8 @@ def displacements(table: Displacements):
     attrs = {"title": f"Net displacement per cycle of the scene {table.scene.name}", "frame": table.scene.frame}
     if "frequency" in table:
         attrs |= {"frequency": float(table["frequency"]), "frequency_unit": "Hz"}
+    if "estimate_is" in table:
+        attrs["estimate_is"] = table["estimate_is"]
     return dataset(found, coordinates, attrs)
 
 

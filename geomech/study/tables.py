@@ -30,7 +30,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     medium: None, or what the uncertainty of the medium does to the true displacement, and so to every tier's
     (`geomech.study.uncertainty.of_medium`): "medium_error" {tier: [...]}, of the position, body lengths,
     "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit, and
-    "medium_error_rule" [...].
+    "medium_error_rule" [...]. Of a measured gait "estimate_is" says in words what the estimates leave out.
     """
     unit, frequency = scene.system.unit, frequency_of(scene.system, gait)
     found = {m: of_pose(p) for m, p in poses.items()}
@@ -40,6 +40,8 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     if frequency is not None:
         units |= {"frequency": "Hz", "speed": f"{unit}/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s"}
         more = {"frequency": frequency, **_speeds(found, frequency, scene.system.length), **more}
+    if said := getattr(gait, "estimate_is", ""):
+        more = {"estimate_is": said, **more}
     if medium is not None:
         units |= {"medium_error": "BL", "medium_error_heading": "rad", "medium_error_of": "that of the quantity"}
         more = {**_of_medium(medium, tuple(poses), scene.system.length), **more}
