@@ -202,7 +202,8 @@ def detected_sign(connection: Connection) -> str:
     centre = tuple(float(a[0] + a[-1]) / 2 for a in connection.axes)
     alpha, alphadot = Circle(centre=centre).cycle(64, [0.3 * half, 0.5 * half])
     xi = connection.velocity(alpha, alphadot)
+    sure = 1e-9 * np.abs(xi).max()  # what roundoff leaves of nothing has a sign, too
     for sign, value in (("+", 1.0), ("-", -1.0)):
-        if (displacement(value * xi)[:, 0] < 0).all() and (displacement(-value * xi)[:, 0] > 0).all():
+        if (displacement(value * xi)[:, 0] < -sure).all() and (displacement(-value * xi)[:, 0] > sure).all():
             return sign
     raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")
