@@ -26,11 +26,12 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str =
         terminal.tell(f"{scene.name}: {cost}")
 
 
-def scene_with_gait(name: str):
-    """The scene of that name; SceneError for one without a gait."""
+def scene_with_gait(name):
+    """The scene of that name, or one that is loaded; SceneError for one without a gait."""
     from geomech.scene import Scene, load
 
-    scene = load(name)
+    scene = load(name) if isinstance(name, str) else name
+    name = name if isinstance(name, str) else scene.name
     if isinstance(scene, Scene):
         return scene
     if hasattr(scene, "robot"):
@@ -40,8 +41,8 @@ def scene_with_gait(name: str):
     raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
 
 
-def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
-    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
+def loaded(name, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+    """The scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is given."""
     from geomech.scene import in_medium
 
     scene = scene_with_gait(name)
