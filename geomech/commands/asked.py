@@ -6,10 +6,14 @@ import contextlib
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from geomech import terminal
 from geomech.commands.options import check_outputs
 from geomech.errors import Note, SceneError, check_angle, named
+
+if TYPE_CHECKING:
+    from geomech.scene import Scene
 
 WORTH_SAYING = 1.0  # s that a field takes
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -26,7 +30,7 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str =
         terminal.tell(f"{scene.name}: {cost}")
 
 
-def scene_with_gait(name):
+def scene_with_gait(name: str | Scene) -> Scene:
     """The scene of that name, or one that is loaded; SceneError for one without a gait."""
     from geomech.scene import Scene, load
 
@@ -41,7 +45,7 @@ def scene_with_gait(name):
     raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
 
 
-def loaded(name, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+def loaded(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
     """The scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is given."""
     from geomech.scene import in_medium
 
