@@ -32,20 +32,30 @@ def note(text: str) -> None:
     print("note: " + plain(" ".join(text.split())), file=sys.stderr)
 
 
-def read(path: str | Path, largest: int) -> bytes:
-    """The bytes of an ordinary file of at most ``largest``; OSError or ValueError otherwise, before anything is read."""
+def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
+    """The bytes of an ordinary file of at most ``largest``; OSError or ValueError otherwise, before anything is read. pipes:
+    or of a pipe that somebody writes to."""
     path = Path(path)
-    if path.stat() and not path.is_file():
+    if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
         raise OSError(errno.EINVAL, "it is no ordinary file")
-    with path.open("rb") as file:
+    with open(path, "rb", opener=_opened if path.is_fifo() else None) as file:
         if os.fstat(file.fileno()).st_size > largest or len(raw := file.read(largest + 1)) > largest:
             raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
+        if not raw and path.is_fifo():
+            raise OSError(errno.EPIPE, "nothing came through this pipe")
     return raw
 
 
-def read_text(path: str | Path, largest: int) -> str:
-    """The text of an ordinary file in UTF-8, as `read`, line ends made equal."""
-    return read(path, largest).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+def _opened(path: str, flags: int) -> int:
+    """A pipe; nobody waits for one that nobody writes to."""
+    pipe = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(pipe, True)
+    return pipe
+
+
+def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
+    """The text of an ordinary file, or a pipe, in UTF-8, as `read`, line ends made equal."""
+    return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def why(error: Exception) -> str:
@@ -174,6 +184,8 @@ class _Workshop:
         finally:
             if self.mark:
                 self.mark.close()
+            if self.folder.is_dir():  # too many files are open: now there is one fewer, which is enough
+                _discard_plainly(self.folder)
 
 
 def _key(target: Path) -> str:
@@ -234,6 +246,17 @@ def _discard(folder: Path) -> None:
     shutil.rmtree(folder / NEW, ignore_errors=True)
     with contextlib.suppress(OSError):
         (folder / MARK).unlink(missing_ok=True)
+        folder.rmdir()
+
+
+def _discard_plainly(folder: Path) -> None:
+    """Remove a folder of ours, with one open file at a time."""
+    for place, folders, names in os.walk(folder, topdown=False):
+        for remove, found in ((os.unlink, names), (os.rmdir, folders)):
+            for name in found:
+                with contextlib.suppress(OSError):
+                    remove(os.path.join(place, name))
+    with contextlib.suppress(OSError):
         folder.rmdir()
 
 

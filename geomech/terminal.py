@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import math
 import os
@@ -19,6 +20,7 @@ from pathlib import Path
 import typer
 
 from geomech.errors import Note, line, plain
+from geomech.files import FULL
 from geomech.progress import progress
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
@@ -147,10 +149,22 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
+        if isinstance(error, OSError):
+            text = _of_system(error)
         tell("error: " + "; ".join([line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]))
         if isinstance(error, OSError):
             _deaf(sys.stdout)
     return 2
+
+
+def _of_system(error: OSError) -> str:
+    """What the system refuses, with its cure. Files of ours are named where they are written: a full disk without a name is
+    that of what is printed."""
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        return "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
+    if error.errno in FULL and error.filename is None:
+        return f"cannot write to standard output: {error.strerror}; make room, or send it elsewhere"
+    return str(error)
 
 
 def _stopped(by: BaseException, argv: list[str]) -> int:

@@ -134,7 +134,8 @@ class Known:
     independent: the squares of what each does to a result add up to its variance. spread: (d, d, P), at equally spaced
     phases: the data reach a shape where delta . spread^-1 delta <= 1. beyond: (3,), of a net pose: what the variation of the
     cycles changes in it beyond the first order; where links begin and cease to stick, a Taylor series may be off by as much.
-    off: (3, 2, P), at equally spaced phases: standard errors of A along the gait, and across it, for what is left of xi.
+    off: (3, 2, P), at equally spaced phases: standard errors of A along the gait, and across it, for what is left of xi and
+    what the series cut off.
     factor: an error is this many standard deviations. level: share of cases in which it is meant to cover the truth."""
 
     loop: Loop
@@ -157,7 +158,7 @@ class Known:
         return _between(self.spread, t)
 
     def off_at(self, t) -> np.ndarray:
-        """(..., 3, d): standard errors of A at phases t (...), for what is left of xi."""
+        """(..., 3, d): standard errors of A at phases t (...), as `off`."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
         return np.sqrt(_between(self.off**2, t) @ np.stack([along, 1 - along], -2))

@@ -1,6 +1,7 @@
 """Measured centrelines: what was measured comes back, to the order claimed; bad files are refused by line."""
 
 import dataclasses
+import json
 import os
 import pathlib
 import signal
@@ -13,9 +14,10 @@ from scipy.special import ellipe
 
 from geomech import cli
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.errors import Note, SceneError, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
+from geomech.output import sweeps
 from geomech.study.bench import Study
 from rft import Backbone
 
@@ -310,6 +312,14 @@ def without(test):
     return lambda table: [row for row in table if not test(row)]
 
 
+def later(table, by):
+    return [(row[0] + by, *row[1:]) for row in table]
+
+
+def twice(table):
+    return [*table, *later(table, 1.0)]
+
+
 CURVE, POINTS = "t,s,curvature\n", "t,x,y\n"
 BAD = {
     "missing": (lambda path: None, "", "cannot read .*No such file"),
@@ -357,6 +367,20 @@ BAD = {
     "modes": (good, "keep_modes = 7", "from 0 to 6 for 12 places, got 7"),
     "period": (good, "period = 0", "period must be a number from"),
     "sha256": (good, 'sha256 = "0"', "not the one whose sha256 is given"),
+    "two": (edited("points", twice), "", "the body does the same again after 1 in t, 2 times in the period of 2: give the"),
+    "two and repeated": (
+        edited("numbered", lambda t: [*twice(t), *([2.0, *row[1:]] for row in t[:12])]), "period = 2", "2 times in the"
+    ),
+    "two and a half": (
+        edited("points", lambda t: [*twice(t), *later(t, 2.0)[:48]], count=8), "", "2.5 times in the period of 2.5"
+    ),
+    "one and a half": (
+        edited("points", lambda t: [*t, *later(t, 1.0)[:48]], count=8), "", "the frame at t = 1 repeats the first, and 3 more"
+    ),
+    "one and a quarter": (
+        edited("points", lambda t: [*t, *later(t, 1.0)[:48]], count=16), "",
+        "the frame at t = 1 repeats the first, and 3 more come",
+    ),
 }  # fmt: skip
 
 
@@ -375,6 +399,64 @@ def test_bad_files_get_one_line(name, tmp_path, monkeypatch, capsys):
     assert (left.value.code, out) == (2, "")
     assert err.startswith("error: ")
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("kind", ["curvature", "points"])
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_a_wave_to_the_head_is_noted(kind, noise, tmp_path):
+    """As of points that were given from the head, unless it is asked for."""
+    table = list(rows(kind, count=16, amplitude=0.2, noise=noise * {"curvature": 0.5, "points": 1e-3}[kind]))
+    gait(write(tmp_path, kind, table))  # warnings are errors here
+    if kind == "points":
+        table = [row for k in range(0, len(table), 40) for row in table[k : k + 40][::-1]]
+    else:
+        table = [(t, 1 - s, -value) for t, s, value in table]
+    path = write(tmp_path, kind, table)
+    with pytest.warns(
+        Note, match="^swim.csv: the wave runs from the tail to the head, .* give the points from the tail"
+    ):
+        gait(path)
+    gait(path, reverse=True)
+
+
+def test_a_standing_wave_runs_nowhere_and_a_pause_is_no_end(tmp_path):
+    """One bends and stretches again, in a part of the period or all of it."""
+    s = np.linspace(0, 1, 12)
+    for share in (1.0, 0.25):
+        bend = [np.sin(np.pi * min(t / share, 1)) ** 2 for t in np.arange(24) / 24]
+        gait(write(tmp_path, "curvature", [(k / 24, x, 5 * b * np.cos(3 * x)) for k, b in enumerate(bend) for x in s]))
+
+
+@pytest.mark.parametrize(
+    ("column", "frequency"), [("t", 2.0), ("t", 1.02), ("t", None), ("frame", 2.0), ("phase", 2.0)]
+)
+def test_a_frequency_that_is_not_that_of_t_is_noted(column, frequency, tmp_path):
+    path = write(tmp_path, "points")
+    path.write_text(path.read_text().replace("t,x,y", f"{column},x,y"))
+    if (column, frequency) != ("t", 2.0):
+        gait(path, frequency=frequency)
+        return
+    with pytest.warns(
+        UnitWarning, match="^swim.csv: the period is 1 in t, and frequency = 2 Hz makes it 0.5 s: mend one"
+    ):
+        gait(path, frequency=frequency)
+
+
+def test_what_an_estimate_leaves_out_is_told(tmp_path, capsys):
+    """Of midlines that noise has moved by ten times the estimate and more."""
+    toml, said = scene_in(tmp_path, 12), "of the computation alone: what the measured midlines are off by is not in it"
+    write(tmp_path / "data", "points", count=12, places=20)
+    for more in ([], ["--json"]):
+        with pytest.raises(SystemExit):
+            cli.main(["displacement", str(toml), "--amplitudes", "1", *more])
+        told = capsys.readouterr().out
+        assert json.loads(told)["estimate_is"] == said if more else f"\nestimated error: {said}\n" in told
+    measured = Study(scenes.load(toml))
+    assert measured.study([1.0], ["direct"]).to_xarray().attrs["estimate_is"] == said
+    assert said in measured.study([1.0], ["direct"])._repr_html_()
+    assert sweeps.attributes(measured.scene)["estimate_is"] == said
+    plain = scenes.load("sandfish-loose")
+    assert "estimate_is" not in sweeps.attributes(plain)
 
 
 @pytest.mark.parametrize("elements", [2, 2001, 3.5, "x"])

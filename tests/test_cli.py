@@ -423,11 +423,39 @@ def test_what_is_no_scene_file_is_refused_at_once(path, tmp_path):
     assert err.startswith(f"error: cannot read scene '{path}': ")
 
 
-def test_neither_is_a_pipe_that_never_ends():
-    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    with subprocess.Popen([sys.executable, "-m", "geomech", "explain", "/dev/stdin"], **pipes) as done:
-        assert done.stderr.read().startswith(b"error: cannot read scene '/dev/stdin': it is no ordinary file")
-    assert done.returncode == 2
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("yes | {explain} /dev/stdin", "cannot read scene '/dev/stdin': it is larger than 10 MB"),
+        ("true | {explain} /dev/stdin", "cannot read scene '/dev/stdin': nothing came through this pipe"),
+        ("echo '[medium' | {explain} /dev/stdin", "pipe is not TOML"),
+    ],
+)
+def test_neither_is_a_pipe_that_brings_none(line, said, tmp_path):
+    line = line.format(explain=f"{sys.executable} -m geomech explain")
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith(f"error: {said}")
+
+
+def test_a_scene_comes_through_a_pipe(tmp_path):
+    """Once: also for commands that ask what it is first. Its files are looked for from the current folder."""
+    text = scenes.load("three-link-viscous").text
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "s.toml").write_text(text)
+    tell = f"{sys.executable} -m geomech"
+    for line, said in (
+        (f"{tell} explain <(cat data/s.toml)", "pipe: viscous (ratio = 2.0)"),
+        (f"cat data/s.toml | {tell} sweep /dev/stdin --over gait.amplitude=0.5,1 -o a.nc", "2 points, net distance"),
+        (f"cat data/s.toml | {tell} connection /dev/stdin --grid 5 -o b.nc", ""),
+        (f"sed 's/file = ./&a.nc/' data/t.toml | {tell} explain /dev/stdin", "pipe: table ("),
+    ):
+        (tmp_path / "data" / "t.toml").write_text('[system]\nkind = "table"\nfile = ""\n[gait]\nkind = "circle"\n')
+        if "t.toml" in line:
+            (tmp_path / "b.nc").rename(tmp_path / "a.nc")
+        done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+        assert (done.returncode, done.stderr) == (0, ""), line
+        assert done.stdout.startswith(said)
 
 
 def test_the_command_starts_without_the_heavy_libraries():

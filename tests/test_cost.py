@@ -84,6 +84,23 @@ def test_a_pilot_tells_what_a_balance_takes(scene, solved, monkeypatch):
     assert not solved  # too small for a pilot
 
 
+def test_what_is_not_tried_is_not_taken_for_less(monkeypatch):
+    """NumPy takes 1e-5 s and more for each element in sand: a field of 200 x 200 is worth a pilot, and what is not is told
+    within a few times of what it takes."""
+    tried = []
+    monkeypatch.setattr(cost, "_grown", lambda f, samples, most: tried.append(f) or 0.0)
+    cost.price([cost.built(GLASS.with_numerics(grid=200), "path")])
+    assert len(tried) == 1
+    small = GLASS.with_numerics(grid=60)
+    told = cost.price([cost.built(small, "path")])
+    assert len(tried) == 1
+    rng = np.random.default_rng(0)
+    start = time.process_time()
+    small.system.sample(rng.uniform(-2, 2, (4000, 2)), rng.normal(size=(4000, 2)))
+    took = (time.process_time() - start) / 4000 * told.balances
+    assert told.seconds > took / 4
+
+
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
     foretold = accuracy.cost(scene).balances
@@ -385,6 +402,18 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
     assert err.startswith("error: cannot read scene")
 
 
+def test_too_many_open_files_are_said_and_nothing_is_left(tmp_path):
+    """Where a figure needs a font and a folder of ours two more to go."""
+    line = f"ulimit -n 8; exec {sys.executable} -m geomech ccf three-link-viscous --grid 5 --plot a.png"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: too many files are open at once: raise the limit, as by 'ulimit -n 1024'")
+    assert [p.name for p in tmp_path.iterdir() if not p.name.endswith(".partial")] == []
+
+
+FULL = "No space left on device; make room, or send it elsewhere"
+
+
 def test_nobody_need_listen(tmp_path):
     """A pipe that is closed, as by head, and no standard output at all, are no failures; a full disk is one."""
     said = f"{sys.executable} -m geomech velocity three-link-viscous --alpha 0,0 --alphadot 1,0"
@@ -392,7 +421,8 @@ def test_nobody_need_listen(tmp_path):
         (f"{said} | true; exit ${{PIPESTATUS[0]}}", 0, ""),
         (f"{said} >&-", 0, ""),
         (f"{said} 2>&-  >/dev/null", 0, ""),
-        (f"{said} > /dev/full", 2, "error: [Errno 28] No space left on device\n"),
+        (f"{said} > /dev/full", 2, f"error: cannot write to standard output: {FULL}\n"),
+        (f"{sys.executable} -m geomech scenes > /dev/full", 2, f"error: cannot write to standard output: {FULL}\n"),
     ):
         done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, cwd=tmp_path, timeout=60)
         assert (done.returncode, done.stderr) == (code, err), line

@@ -30,7 +30,7 @@ from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
 from geomech.tables.mat import ERROR
-from geomech.tube import Loop, Tube, waves
+from geomech.tube import Loop, Tube, series, waves
 from rft import se2
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
@@ -105,6 +105,79 @@ def test_intervals_cover_the_net_pose_in_sand():
     assert A >= 0.85  # with corners of A, where links begin and cease to stick
 
 
+def wandering(velocity, gait, cycles=60, samples=60, spread=0.05, noise=1e-3, seed=0, finer=4):
+    """A log made in another way than those of `synthetic`: offsets and first harmonics of the joints wander from cycle to
+    cycle, as does the pace; headings and positions are integrated by Simpson's rule."""
+    rng = np.random.default_rng(seed)
+    t, knots = np.arange(cycles * samples * finer + 1) / (samples * finer), np.arange(-2, cycles + 3)
+
+    def wanders():
+        found = rng.normal(size=len(knots))
+        for k in range(1, len(found)):
+            found[k] = 0.3 * found[k - 1] + math.sqrt(1 - 0.3**2) * found[k]
+        return CubicSpline(knots, found)
+
+    pace = CubicSpline(knots, 1 + 0.02 * wanders()(knots))
+    phase, rate = 2 * np.pi * (pace.antiderivative()(t) - pace.antiderivative()(0)), 2 * np.pi * pace(t)
+    alpha, alphadot = gait.shape(phase), gait.rate(phase) * rate[:, None]
+    for joint, (f, slope) in itertools.product(
+        range(gait.joints), [(np.ones_like, np.zeros_like), (np.cos, lambda x: -np.sin(x)), (np.sin, np.cos)]
+    ):
+        by, size = wanders(), spread / math.sqrt(3)
+        alpha[:, joint] += size * by(t) * f(phase)
+        alphadot[:, joint] += size * (by(t, 1) * f(phase) + by(t) * slope(phase) * rate)
+    xi, step = velocity(alpha, alphadot), 2 * t[1]
+    summed = lambda x: np.concatenate([[0], np.cumsum(x[:-2:2] + 4 * x[1::2] + x[2::2])]) * step / 6
+    heading = np.empty(len(t))
+    heading[::2] = summed(xi[:, 2])
+    heading[1::2] = (heading[:-2:2] + heading[2::2]) / 2 + step / 8 * (xi[:-2:2, 2] - xi[2::2, 2])
+    way = summed(np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1]))
+    pose = np.stack([way.real, way.imag, heading[::2]], -1)[:: finer // 2]
+    noisy = lambda x: x + noise * rng.normal(size=x.shape)
+    return log_of(synthetic.Made(t[::finer], noisy(alpha[::finer]), noisy(pose), phase[::finer]))
+
+
+def covered_at_all_phases(log, velocity, **fit):
+    """(share of the entries of A that are covered, half width of their intervals in the median), at 96 phases."""
+    f, t = measured.fit_log(log, **fit), 2 * np.pi * (np.arange(96) + 0.37) / 96
+    found, off = f.along(t)
+    return np.mean(np.abs(found - true_A(f, velocity, t)) <= off), np.median(off)
+
+
+def test_what_is_cut_off_below_the_noise_is_an_error():
+    """A in sand has corners that harmonics do not follow, and noise hides what is left of xi: 83 % would be covered."""
+    velocity = Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
+    share, wide = covered_at_all_phases(wandering(velocity, GAIT, finer=2), velocity, harmonics=8)
+    assert share > 0.93 and wide < 0.04  # of 0.2
+
+
+def test_A_is_the_least_of_those_along_a_gait_whatever_series_there_are():
+    """Where cycles tell A along the gait alone. A butterfly has ways to make nothing along it with ever larger A."""
+    t = 2 * np.pi * np.arange(64) / 64
+    loop = Loop(phase.fitted_loop(t, gaits.Butterfly(amplitude=1.0).shape(t), 9))
+    rate = loop.shape(t, 1)
+    least = np.stack([np.cos(t), np.sin(2 * t), 0.5 + 0 * t])[:, None] * (rate / (rate**2).sum(1, keepdims=True)).T
+    along = phase.fitted_loop(t, np.einsum("ijt,tj->ti", least, rate), 9)
+    found = series(regression._spread_out(loop, along[:, None])[:, :, 0], t)
+    assert (np.sqrt((found**2).mean((0, 2))) < 1.3 * np.sqrt((least**2).mean((1, 2)))).all()  # else 1.4, 1.8 and 2.4
+    np.testing.assert_allclose(np.einsum("tij,tj->ti", found, rate), series(along, t), atol=0.03)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    ("medium", "gait", "asked", "wanted"),
+    [
+        ("viscous", GAIT, {}, 0.95), ("sand", GAIT, {}, 0.93), ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03}, 0.95),
+        ("sand", gaits.Circle(amplitude=1.0), {}, 0.95), ("sand", gaits.Circle(amplitude=1.0), {"spread": 0.1}, 0.95),
+    ],
+)  # fmt: skip
+def test_intervals_of_A_cover_it_in_logs_made_otherwise(medium, gait, asked, wanted, viscous):
+    velocity = viscous if medium == "viscous" else Swimmer(rft.Granular(1.8, math.radians(13.8)), BODY).velocity
+    shares = [covered_at_all_phases(wandering(velocity, gait, seed=k, **asked), velocity) for k in range(20)]
+    print(f"{medium}, {type(gait).__name__}, {asked}: {np.mean(shares, 0)}")
+    assert np.mean(shares, 0)[0] >= wanted
+
+
 def corner(alpha, alphadot):
     """A_theta2 is 0.4 or 0, by the sign of alphadot_2; of degree one."""
     turn = 0.3 * alphadot[..., 0] + 0.4 * np.maximum(alphadot[..., 1], 0.0)
@@ -128,8 +201,8 @@ def test_where_A_jumps_its_error_is_told():
     ("medium", "gait", "asked", "least"),
     [
         ("viscous", GAIT, {}, 0.93), ("viscous", GAIT, {"cycles": 14}, 0.93), ("viscous", GAIT, {"noise": 5e-3}, 0.93),
-        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.93), ("sand", GAIT, {}, 0.9),
-        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.9),
+        ("viscous", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.93), ("sand", GAIT, {}, 0.95),
+        ("sand", gaits.Butterfly(amplitude=0.7), {"spread": 0.03, "samples": 60}, 0.95),
     ],
 )  # fmt: skip
 def test_intervals_cover_the_truth_in_many_logs(medium, gait, asked, least, viscous):

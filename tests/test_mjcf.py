@@ -4,6 +4,7 @@ import dataclasses
 import json
 import pickle
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -254,6 +255,15 @@ def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch)
     assert code == 0 and "1 walking" in out
     results = walking.study(scenes.load(tmp_path / "small.toml"))
     assert results["speed"] == pytest.approx(found["speed"], rel=0.02) and 0 < results["lines"][0]["error"][0] < 0.2
+
+
+def test_a_sweep_of_robots_that_walk_alone_tells_how_far_it_is(tmp_path, monkeypatch):
+    walk = SimpleNamespace(speed=1.0, status="walking", cycles=3)
+    monkeypatch.setattr(walking, "walked", lambda some, settling: [walking.Walked(walk, 0.0) for _ in some])
+    (tmp_path / "small.toml").write_text(SMALL)
+    scene, done = scenes.load(tmp_path / "small.toml"), []
+    walking.sweep(scene, {"gait.frequency": [1.0, 2.0, 3.0, 4.0]}, progress=done.append)
+    assert done == [0.25, 0.5, 0.75, 1.0]
 
 
 def test_pictures_are_those_of_a_gl_or_none(cart):

@@ -18,6 +18,7 @@ from test_cli import geomech
 from geomech import connection, terminal, workers
 from geomech import scene as scenes
 from geomech.commands.asked import keeping
+from geomech.errors import SceneError
 from geomech.optimise import checked, search
 from geomech.study import accuracy, cost, kept, parts
 from geomech.study.bench import Study
@@ -305,6 +306,18 @@ def test_commands_that_take_long_are_taken_up(command, tmp_path, fine, monkeypat
         assert f" are kept in {name}: " in err
         kept_of.append(int(re.match(r"error: stopped by SIGTERM: (\d+) of ", err)[1]))
     assert kept_of[1] == kept_of[0] + 1
+
+
+def test_names_of_one_file_have_one_lock(tmp_path):
+    """Links to it, also those to a file that is not there yet."""
+    (tmp_path / "there").mkdir()
+    for k, real in enumerate((tmp_path / "there" / "a.nc", tmp_path / "b.nc")):
+        link = tmp_path / f"link{k}.nc"
+        link.symlink_to(real)
+        assert kept.beside(link, {"q": 1}) == kept.beside(real, {"q": 1})
+        for first, second in ((real, link), (link, real)):
+            with kept.alone(first), pytest.raises(SceneError, match="is under way: wait for it"), kept.alone(second):
+                pass
 
 
 def test_another_question_leaves_what_is_kept_alone(tmp_path, fine, monkeypatch):

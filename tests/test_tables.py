@@ -208,6 +208,26 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         assert not [line for line in told.said if "sign" in line]
 
 
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["explain"], ["displacement", "--amplitudes", "0.3"], ["sweep", "--over", "gait.amplitude=0.3", "-o", "s.nc"],
+        ["connection", "-o", "c.nc"], ["ccf", "--plot", "c.png"],
+    ],
+    ids=lambda args: args[0],
+)  # fmt: skip
+def test_a_sign_that_is_made_out_is_noted_once(args, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    plain_mat("a.mat", study().fitted)
+    (tmp_path / "t.toml").write_text(
+        '[system]\nkind = "table"\nfile = "a.mat"\n[gait]\nkind = "circle"\namplitude = 0.3\n'
+    )
+    with pytest.raises(SystemExit) as left:
+        cli.main([args[0], "t.toml", *args[1:]])
+    assert left.value.code == 0
+    assert capsys.readouterr().err.count("its sign is made out as") == 1
+
+
 def test_a_sign_that_cannot_be_made_out_is_asked_for(tmp_path):
     c = study().fitted
     plain_mat(tmp_path / "a.mat", Connection(c.axes, np.ones_like(c.A), c.residual, c.speed))

@@ -31,7 +31,7 @@ def accuracy(
     elif isinstance(scene, WalkerScene):
         study, draw = walking, walks.accuracy_figure
     else:
-        scene, draw = loaded(name), plots.work_precision_figure
+        scene, draw = loaded(scene), plots.work_precision_figure
     kept, told = keeping(scene, out, command="accuracy"), terminal.progress(f"accuracy of {scene.name}")
     with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
         allow(scene, study.cost(scene), yes)

@@ -6,10 +6,14 @@ import contextlib
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from geomech import terminal
 from geomech.commands.options import check_outputs
 from geomech.errors import Note, SceneError, check_angle, named
+
+if TYPE_CHECKING:
+    from geomech.scene import Scene
 
 WORTH_SAYING = 1.0  # s that a field takes
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -26,11 +30,12 @@ def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str =
         terminal.tell(f"{scene.name}: {cost}")
 
 
-def scene_with_gait(name: str):
-    """The scene of that name; SceneError for one without a gait."""
+def scene_with_gait(name: str | Scene) -> Scene:
+    """The scene of that name, or one that is loaded; SceneError for one without a gait."""
     from geomech.scene import Scene, load
 
-    scene = load(name)
+    scene = load(name) if isinstance(name, str) else name
+    name = name if isinstance(name, str) else scene.name
     if isinstance(scene, Scene):
         return scene
     if hasattr(scene, "robot"):
@@ -40,8 +45,8 @@ def scene_with_gait(name: str):
     raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
 
 
-def loaded(name: str, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
-    """The scene of that name, with the options of its field, in the medium of a file if one is given."""
+def loaded(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+    """The scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is given."""
     from geomech.scene import in_medium
 
     scene = scene_with_gait(name)

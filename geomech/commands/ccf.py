@@ -58,7 +58,7 @@ def ccf(
         if sliced:
             maps = _slices(scene, style or "map", (pair, slice_), beside, yes)
         else:
-            study = field(name, grid, extent, plot, plot, True, yes, with_gait=True, metric=metric or stretch)
+            study = field(scene, grid, extent, plot, plot, True, yes, with_gait=True, metric=metric or stretch)
             maps = _map(study, style, stretch, metric, beside, yes)
         plots.save(maps, plot)
 

@@ -66,7 +66,7 @@ def connection(
     with keeping(scene, out, command="connection", **asked):
         if sliced:
             found = planes(Study(scene), pair, slice_, yes)
-        study = field(name, grid, extent, out, plot, bool(plot) and not sliced, yes, harmonics=out.suffix == ".nc")
+        study = field(scene, grid, extent, out, plot, bool(plot) and not sliced, yes, harmonics=out.suffix == ".nc")
         if out.suffix == ".nc":
             netcdf.save_connection(out, study)
         else:

@@ -48,9 +48,11 @@ def sweep(
     check_netcdf(out)
     if plot and len(axes) > 2:
         raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
-    walks = hasattr(load(name), "robot")
-    scene = load(name) if walks else loaded(name)
-    if walks:
+    scene = load(name)  # once: it may come through a pipe
+    walks = hasattr(scene, "robot")
+    if not walks:
+        scene = loaded(scene)
+    else:
         from geomech.output import walk_sweeps as sweeps
         from geomech.study import walking as sweeping
     axes = {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}

@@ -24,6 +24,7 @@ class Gait:
     through effects that have a frequency.
 
     angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
+    estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
     """
 
     amplitude: float = 1.0
@@ -32,6 +33,7 @@ class Gait:
     frequency: float | None = None
     angles = ("centre",)
     harmonics = 1
+    estimate_is = ""
 
     def __post_init__(self):
         number("amplitude", self.amplitude, -LARGEST, LARGEST)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import number, short
+from geomech.errors import Note, UnitWarning, number, short
 from geomech.gaits import frames, midline
 from geomech.gaits.base import Gait
 from geomech.rows import LARGEST_NUMBER
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
+ALIKE = 0.1  # share of the headings' squares that differ, below which the body does the same again; noise is less
+PLACES = 240  # of the period, at which that is looked for
+LONGEST = 0.75  # of the period: what repeats later has too little left to compare
+FURTHER = 1.5  # times the largest move between neighbouring frames, that a last one beyond the period is from the first
+BACKWARDS = 1.0  # rad of phase along the body, by which a wave surely runs from the tail to the head
+OFF = 0.05  # of a period, by which the frequency may contradict the file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +34,8 @@ class Centreline(Gait):
       t,s,curvature   curvature in rad per body length at s, 0 at the tail to 1 at the head; every s at every t
       t,point,x,y     points of the midline, numbered from the tail to the head; the same points at every t
       t,x,y           the same without numbers, in the order of the rows; frames may differ in their number
-    t may be in any unit, x and y in any unit; # starts a comment, which is a good place for the units. Curvature is
+    t may be in any unit, x and y in any unit; # starts a comment, which is a good place for the units. `frame` or `phase`
+    may stand for t: then it is no time, and a frequency cannot contradict it, which is noted otherwise. Curvature is
     positive counter-clockwise and y runs upwards: pixels counted downwards give the mirror image. A midline keeps its
     length: each frame is scaled to its own, and where it lies and points to does not matter.
 
@@ -45,8 +53,11 @@ class Centreline(Gait):
     The file is read once, when the gait is made.
 
     Refused as slips of the tracking or of the pen: neighbouring elements or chords that bend by more than pi/2, a frame
-    20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close.
+    20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close, or that
+    repeats within the period. Noted: a wave that runs from tail to head, as of points that were given from the head.
     """
+
+    estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 
     file: str
     elements: int = 100
@@ -73,7 +84,11 @@ class Centreline(Gait):
         if self.sha256.lower() not in ("", data.sha256):
             raise data.wrong("the file is not the one whose sha256 is given: restore it, or leave sha256 out")
         object.__setattr__(self, "sha256", data.sha256)
-        object.__setattr__(self, "_curve", self._through(data))
+        phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
+        object.__setattr__(self, "_curve", self._through(data, phase, bends))
+        period = 2 * np.pi * (data.t[1] - data.t[0]) / phase[1]
+        _check_once(data, period, phase, bends)
+        self._note(data, period, phase, bends)
 
     @property
     def joints(self) -> int:
@@ -84,11 +99,10 @@ class Centreline(Gait):
         """The highest kept; 1 for a spline, which has no highest."""
         return max(1, self.keep_harmonics)
 
-    def _through(self, data: frames.Frames):
+    def _through(self, data: frames.Frames, phase: np.ndarray, bends: np.ndarray):
         """Function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
         from scipy.interpolate import CubicSpline
 
-        phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
         _check_turned(data, bends)
         # Two frames a wave, in the widest gap too: then the least squares are well posed.
         most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
@@ -98,6 +112,28 @@ class Centreline(Gait):
         if not self.keep_harmonics:
             return CubicSpline(phase, np.concatenate([bends, bends[:1]]), bc_type="periodic")
         return partial(_series, np.linalg.lstsq(_waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None)[0])
+
+    def _note(self, data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
+        """Warn of a wave that runs to the head, and of a period that is not that of the frequency."""
+        if self.frequency and data.timed and abs(period * self.frequency - 1) > OFF:
+            warnings.warn(
+                f"{data.name}: the period is {period:.4g} in t, and frequency = {self.frequency:g} Hz makes it "
+                f"{1 / self.frequency:.4g} s: mend one if t is in s, or call the column frame or phase",
+                UnitWarning,
+                stacklevel=5,
+            )
+        heading = _headings(bends)
+        first = np.exp(-1j * phase[:-1]) * np.gradient(phase)[:-1] @ heading  # harmonic
+        along = np.imag(first[:-1].conj() @ first[1:]) / max(
+            (np.abs(first) ** 2).mean(), 1e-300
+        )  # rad, towards the tail
+        if along < -BACKWARDS and not self.reverse and self.keep_modes not in (1, 2):  # of which no wave can be made
+            warnings.warn(
+                f"{data.name}: the wave runs from the tail to the head, which swims backwards: if the animal swam "
+                "forwards, give the points from the tail to the head, and s from 0 at the tail",
+                Note,
+                stacklevel=5,
+            )
 
     def unit(self, t) -> np.ndarray:
         return self._curve(np.asarray(t, float), 0)
@@ -142,6 +178,45 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
             f"neighbouring frames by up to {moves.max():.2g}: keep just one period, or give the right period"
         )
     return 2 * np.pi * np.append(t / period, 1.0), bends
+
+
+def _headings(bends: np.ndarray) -> np.ndarray:
+    """(N, joints + 1): headings of the elements from bends (N, joints), less their mean, in which noise is far less."""
+    heading = np.cumsum(np.pad(bends, ((0, 0), (1, 0))), 1)
+    return heading - heading.mean(1, keepdims=True)
+
+
+def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
+    """ValueError if the body does the same again within the period."""
+    from scipy.interpolate import CubicSpline
+
+    heading = _headings(bends)
+    closed = CubicSpline(phase, np.concatenate([heading, heading[:1]]), bc_type="periodic")
+    shape = closed(2 * np.pi * np.arange(PLACES) / PLACES)
+    shape = shape - shape.mean(0)
+    square, differ = (shape**2).sum(1), np.full(int(LONGEST * PLACES), 0.5)
+    for k in range(1, len(differ)):
+        ends = square[k:].mean(), square[:-k].mean()
+        if min(ends) > 0.5 * square.mean():  # neither is a pause
+            differ[k] = ((shape[k:] - shape[:-k]) ** 2).sum(1).mean() / sum(ends)
+    again = np.flatnonzero((differ < ALIKE) & (np.maximum.accumulate(differ) > 0.5))
+    if again.size:
+        lag = (again[0] + int((np.diff(differ[again[0] :]) > 0).argmax())) / PLACES
+        raise data.wrong(
+            f"the body does the same again after {lag * period:.3g} in t, {1 / lag:.2g} times in the period of {period:.4g}: "
+            "give the frames of just one period"
+        )
+    off, moves = _size(heading - heading[0]), _size(np.diff(heading, axis=0))
+    near = int(off.argmax()) + int(off[off.argmax() :].argmin())
+    if off[near] < 0.5 * off[-1] and off[-1] > FURTHER * moves.max():
+        raise data.wrong(
+            f"the frame at t = {data.t[near]:g} repeats the first, and {len(off) - 1 - near} more come after it: give the "
+            "frames of just one period"
+        )
+
+
+def _size(heading: np.ndarray) -> np.ndarray:
+    return np.sqrt((heading**2).mean(1))
 
 
 def _inferred(data: frames.Frames, t, moves, back) -> float:

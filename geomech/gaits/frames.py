@@ -12,6 +12,7 @@ from geomech.rows import Rows
 from geomech.rows import read as read_rows
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
+UNTIMED = ("frame", "phase")  # names that may stand for t, and are no s
 LARGEST_FILE = 100_000_000  # bytes, a few million rows
 SMALLEST_NUMBER = 1e-300  # that a period may be
 MOST_FRAMES = 10_000
@@ -22,8 +23,8 @@ FEWEST = 4  # frames, and points or places in each: what a cubic spline takes
 class Frames:
     """The rows of a file, sorted by t, then by s or point where the file has them, else in the file's order.
 
-    name, sha256: of the file. columns: of its header. rows: (N, columns). lines: (N,), the rows' line numbers.
-    t: (F,), ascending. starts: (F,), the first row of each frame.
+    name, sha256: of the file. columns: of its header, t for what stands there for it. timed: t may be in s. rows:
+    (N, columns). lines: (N,), the rows' line numbers. t: (F,), ascending. starts: (F,), the first row of each frame.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Frames:
     lines: np.ndarray
     t: np.ndarray
     starts: np.ndarray
+    timed: bool = True
 
     def wrong(self, what: str, row: int | None = None) -> ValueError:
         """To be raised for what is wrong in a row, or in the whole file."""
@@ -53,7 +55,8 @@ def read(path: str | Path) -> Frames:
     order = np.lexsort((rows[:, 1] if keyed else np.arange(len(rows)), rows[:, 0]))
     rows, numbers = rows[order], source.lines[order]
     t, starts = np.unique(rows[:, 0], return_index=True)
-    frames = Frames(source.name, source.sha256, columns, rows, numbers, t, starts)
+    timed = source.header[1][0] not in UNTIMED
+    frames = Frames(source.name, source.sha256, columns, rows, numbers, t, starts, timed)
     _check_counts(frames)
     if keyed:
         _check_grid(frames)
@@ -61,9 +64,10 @@ def read(path: str | Path) -> Frames:
 
 
 def _header(rows: Rows) -> tuple[str, ...]:
-    """The columns. What is found instead is quoted only if it has two of their names: another file's first line may be
-    nobody's business."""
+    """The columns, with t for what stands there for it. What is found instead is quoted only if it has two of their names:
+    another file's first line may be nobody's business."""
     line, columns = rows.header
+    columns = ("t", *columns[1:]) if columns[0] in UNTIMED else columns
     if columns not in HEADERS:
         known = " or ".join(",".join(h) for h in HEADERS)
         quoted = rows.filled[0][1][:40] if rows.filled else ""

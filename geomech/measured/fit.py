@@ -89,7 +89,8 @@ class Fitted:
 
     @property
     def misfit(self) -> np.ndarray:
-        """(3,), rms over the phase of what A may be off by along the gait, for what is left of xi beyond noise."""
+        """(3,), rms over the phase of what A may be off by along the gait, for what is left of xi beyond noise and what the
+        series cuts off."""
         return np.sqrt((self.known.off[:, 0] ** 2).mean(-1))
 
 

@@ -5,6 +5,9 @@ regression over all that cycles do about the gait follows these, and no spread o
 Its mean at a phase, over the rate of the gait, is what A along the gait is off by; its scatter beyond noise, over the rate
 across the gait, is the size of what A across it is off by: 1.7 times that for a corner in the midst of the cycles, 0.8 for
 one a standard deviation off. Both are of halves of the rows, each by splines of its own, whose noise is independent.
+
+Below the noise nothing of that is seen. There the series itself tells: of a jump, harmonics from K / 2 to K make as much as all
+those beyond K, at which the series ends, and of a spike less. What they make beyond their own noise is an error, too.
 """
 
 from __future__ import annotations
@@ -15,10 +18,12 @@ import numpy as np
 
 from geomech.measured.reach import PLACES, WIDTH
 from geomech.measured.regression import RATES, Samples
-from geomech.tube import Known
+from geomech.tube import Known, series
 
 NOISE = 0.3  # of its variance: what splines and harmonics that cross-validation chooses leave, where A is smooth
 COARSE = 0.5  # of the mean that halves leave: splines through all rows, twice as close, leave less
+UPPER = 0.5  # of the harmonics are below those that stand for what is cut off
+TAIL = 2.0  # times what these make: between a jump, 1, and spikes; covers 95 % of the entries of A where it has both
 SLOWEST = 0.03  # of its rms: the rate across the gait, at least
 
 
@@ -32,7 +37,7 @@ class Left(NamedTuple):
 
 
 def left(known: Known, samples: Samples, varies: int) -> Left:
-    """What ``known`` leaves of the samples."""
+    """What ``known`` leaves of the samples, and cuts off."""
     told = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms_at(samples.phase, alpha, rate))
     all_of_it = samples.xi - told(samples.alpha, samples.rate)
     residual = np.sqrt((all_of_it**2).mean(0) / (samples.rate**2).sum(-1).mean())
@@ -47,7 +52,24 @@ def left(known: Known, samples: Samples, varies: int) -> Left:
         swings = (np.einsum("nik,ni->nk", known.loop.normals(samples.phase), u) for _, u in samples.halves)
         swing = _near(places.mean(np.multiply(*swings).mean(-1, keepdims=True)))
         across = _near(common - NOISE * noise) / np.maximum(swing, SLOWEST**2 * swing.mean())
-    return Left(residual, explained, np.sqrt(np.maximum(np.stack([along, across]), 0.0)).transpose(2, 0, 1))
+    square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _cut_off(known)
+    return Left(residual, explained, np.sqrt(square).transpose(2, 0, 1))
+
+
+def _cut_off(known: Known) -> np.ndarray:
+    """(2, PLACES, 3): squares of what the upper harmonics of A make along the gait and across it, less those of their noise."""
+    t = 2 * np.pi * np.arange(PLACES) / PLACES
+    upper = np.arange(known.A.shape[-1]) > 2 * int(UPPER * (known.A.shape[-1] // 2))
+    rate, normals = known.loop.shape(t, 1), known.loop.normals(t)
+    tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
+
+    def squares(coefficients: np.ndarray) -> np.ndarray:
+        A = series(coefficients * upper, t)
+        across = np.einsum("t...ij,tjk->t...ik", A, normals)
+        return np.stack([np.einsum("t...ij,tj->t...i", A, tangent) ** 2, (across**2).mean(-1)])
+
+    noise = squares(known.errors[:, :, :, 0]).sum(2)
+    return np.stack([np.maximum(_near(a - b), 0.0) for a, b in zip(squares(known.A), noise)])
 
 
 class _Places:

@@ -23,6 +23,7 @@ MOST_BLOCKS = 120  # of cycles, that are left out as one
 MOST_NUMBERS = 20_000_000  # of all their matrices
 SECOND = 2  # harmonics of what is of the second order in the deviation, at most
 LAGS = 8  # blocks over which errors are correlated
+CROSSWISE = 0.01  # of what a series of A may at most do along the gait, that it does at least
 CERTAIN = 5.0  # standard errors by which the cycles must vary
 LEAST_VARIED = 3e-3  # of the joint rates, or of the gait's size, that those across it must be: splines make up as much
 NOTHING, SHAPES, RATES = range(
@@ -96,11 +97,11 @@ class Sums:
 
 def _spread_out(loop: Loop, along: np.ndarray) -> np.ndarray:
     """(..., 3, d, S, 2 K + 1): the least A, and slopes, with A theta' = along (..., 3, S, 2 K + 1); of as many waves, or as
-    many as the gait has."""
+    many as the gait has. What a series makes along the gait only by far more across it is left out."""
     d, wide = len(loop.coefficients), max(along.shape[-1], loop.coefficients.shape[1])
     t = 2 * np.pi * np.arange(8 * wide) / (8 * wide)
     rows = np.einsum("td,tw->tdw", loop.shape(t, 1), waves(t, wide // 2)).reshape(len(t), -1)
-    least = np.linalg.lstsq(rows, waves(t, along.shape[-1] // 2), rcond=1e-9)[0]
+    least = np.linalg.lstsq(rows, waves(t, along.shape[-1] // 2), rcond=CROSSWISE)[0]
     return np.moveaxis((along @ least.T).reshape(*along.shape[:-1], d, wide), -2, -3)
 
 

@@ -106,6 +106,8 @@ def displacements(table: Displacements):
     attrs |= _sized(system.unit, system.length)
     if "frequency" in table:
         attrs |= {"frequency": float(table["frequency"]), "frequency_unit": "Hz"}
+    if "estimate_is" in table:
+        attrs["estimate_is"] = table["estimate_is"]
     return dataset(found, coordinates, attrs)
 
 

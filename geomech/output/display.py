@@ -88,7 +88,8 @@ def displacements(table: Displacements) -> str:
             errors = (f"{values[name][k]:{style}}" for values, style in each)
             rows.append((amplitude, name, *(float(x) + 0.0 for x in np.round(table[name][k], 12)), *errors))
     head = ("amplitude", "tier", f"x ({unit})", f"y ({unit})", "heading (rad)", *there.values())
-    return page(f"Net displacement per cycle of {table.scene.name}", head, rows)
+    said = f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
+    return page(f"Net displacement per cycle of {table.scene.name}{said}", head, rows)
 
 
 def swept(results: Swept) -> str:

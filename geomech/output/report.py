@@ -182,6 +182,8 @@ def text_table(title: str, table: dict, scene: Scene) -> str:
     lines += _effort(title, table, tiers)
     amplitude = re.sub(r"[$\\]", "", table["units"]["amplitude"])
     lines.append(f"amplitude: {amplitude}; x, y, heading: the pose after a cycle, in the frame at its start")
+    if "estimate_is" in table:
+        lines.append(f"estimated error: {table['estimate_is']}")
     return "\n".join([*lines, _times(table), ""])
 
 

@@ -47,7 +47,9 @@ def save(path: Path, scene: Scene, results: dict) -> None:
 
 def attributes(scene: Scene) -> dict[str, str]:
     """Of a file of a sweep."""
-    return {"title": f"Net displacement per cycle of the scene {scene.name}", "scene": written.toml(scene)}
+    said = getattr(scene.gait, "estimate_is", "")
+    about = {"estimate_is": said} if said else {}
+    return {"title": f"Net displacement per cycle of the scene {scene.name}", "scene": written.toml(scene), **about}
 
 
 def parameters(results: dict) -> list[tuple[str, str, np.ndarray]]:

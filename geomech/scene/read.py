@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
 LARGEST = 10_000_000  # bytes of a scene file
+PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
 INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
 WALKERS = "walkers"  # and of robots that walk
 
@@ -82,7 +83,8 @@ def load(scene: str | Path) -> Scene | Any:
     try:
         if path.suffix != ".toml" and not path.exists():
             choose("scene", str(scene), names + intruder_names() + walker_names())
-        text = read_text(path, LARGEST)
+        text = read_text(path, LARGEST, pipes=True)
+        scene = PIPE if path.is_fifo() else scene  # files that it names are looked for from here
     except SceneError:
         raise
     except (OSError, ValueError) as error:
@@ -109,10 +111,10 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
-    """The files that a scene was read from: its own, unless it is built in, and those of its medium, gait and system, or
-    of an intruder scene's parts."""
+    """The files that a scene was read from: its own, unless it is built in or came through a pipe, and those of its medium,
+    gait and system, or of an intruder scene's parts."""
     parts = () if hasattr(scene, "intruder") or hasattr(scene, "robot") else (checked_scene(scene).gait, scene.system)
-    own = [] if scene.name in builtin_names() + intruder_names() + walker_names() else [scene.name]
+    own = [] if scene.name in [PIPE, *builtin_names(), *intruder_names(), *walker_names()] else [scene.name]
     return [Path(x) for x in (*own, *scene.files, *(getattr(part, "file", None) for part in parts)) if x]
 
 

@@ -29,8 +29,11 @@ LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 PILOT = 0.05  # s after which a pilot has seen enough
-FREE = 2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP besides
-SLOW, STEP = 4e-6, 4e-3  # s: some two times what they took on the machine this was written on
+FREE = (
+    2.0  # s below which there is no pilot, if a balance took SLOW for each element, a time step STEP and NEXT for each
+)
+SLOW, STEP = 2e-5, 4e-3  # s: some two times what NumPy took on the machine this was written on
+NEXT = 4e-6  # s for each element in a time step, which begins near its end
 CYCLES = 3  # that it takes to reach a limit cycle
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
@@ -233,7 +236,7 @@ def _per_sample(job: Job, count: float) -> float:
 def _per_step(job: Job, count: float) -> tuple[float, int]:
     """(seconds a time step takes, cycles until they are periodic)."""
     system, gait = job.scene.system, job.gait
-    prior, cycles = STEP + SLOW * system.evaluations * job.group, system.solver.cycles or CYCLES
+    prior, cycles = STEP + NEXT * system.evaluations * job.group, system.solver.cycles or CYCLES
     if prior * count * cycles < FREE:
         return prior / 2, cycles
     phases = max(16, 8 * -(-gait.harmonics // 3))

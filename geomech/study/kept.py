@@ -89,7 +89,8 @@ def alone(output: Path, what: str = "sweep"):
 
 
 def _plain(output: Path) -> Path:
-    return output.resolve() if ".." in output.parts else output
+    """The same path for all names of a file, links to it among them."""
+    return output.resolve() if ".." in output.parts or output.is_symlink() else output
 
 
 class Kept:

@@ -34,6 +34,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     (`geomech.study.uncertainty.of_medium`): "medium_error" {tier: [...]}, of the position,
     "medium_error_heading" {tier: [...]}, rad, "medium_error_of" {one of QUANTITIES: [...]}, each in its own unit,
     "medium_shift_of", alike, by how much it shifts the mean, and "medium_error_rule" [...].
+    Of a measured gait "estimate_is" says in words what the estimates leave out.
     """
     unit, length, frequency = scene.system.unit, scene.system.length, frequency_of(scene.system, gait)
     found = {m: of_pose(p) for m, p in poses.items()}
@@ -43,6 +44,8 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     if frequency is not None:
         units |= {"frequency": "Hz", "speed": f"{unit}/s", "speed_body_lengths": "BL/s", "turning_rate": "rad/s"}
         more = {"frequency": frequency, **_speeds(found, frequency, length), **more}
+    if said := getattr(gait, "estimate_is", ""):
+        more = {"estimate_is": said, **more}
     if medium is not None:
         units |= {"medium_error": unit, "medium_error_heading": "rad", "medium_error_of": "that of the quantity"}
         units["medium_shift_of"] = units["medium_error_of"]

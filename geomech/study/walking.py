@@ -146,10 +146,11 @@ def sweep(
     `geomech.study.sweep.sweep`, which keeps what is done."""
     tables, values, points = _grid(scene, over)
     shape, at = tuple(map(len, values.values())), _At(tables, scene, tuple(values))
-    parts = -(-points.total // TOGETHER)
+    together = TOGETHER if scene.engine == "planar" else 1  # others walk one after the other: each tells how far it is
+    parts = -(-points.total // together)
     with Rows(partial and Path(partial), question(scene, values), points.total, workers.settle(parts)) as rows:
-        left = range(len(rows), points.total, TOGETHER)
-        some = ([points[i] for i in range(k, min(k + TOGETHER, points.total))] for k in left)
+        left = range(len(rows), points.total, together)
+        some = ([points[i] for i in range(k, min(k + together, points.total))] for k in left)
         for found in workers.each(_part, at, some, parts, rows.settled, rows.left(seconds)):
             rows.add(found)
             if progress:
