@@ -243,6 +243,7 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
     monkeypatch.setattr(Course, "stride", stride)
     found = walk([Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)], dataclasses.replace(QUICK, duration=5.0))[0]
     assert found.periodic and found.speed == pytest.approx(0.2) and (found.cycles == 10) == (turn > 0.0)
+    assert (found.turning, found.aside, found.settled) == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
     way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
     np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
     np.testing.assert_allclose(found.more["y"][1:], way.imag, atol=1e-9)

@@ -35,8 +35,8 @@ class Multibody:
 
     model: compiled; gravity along -z, the surface at z = 0. surfaces: what touches the ground, of `rft.walking.geoms.named`
     or `Surface`; the geoms that they stand for touch grains and nothing else: the model has no contacts of theirs any more,
-    with a floor neither. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a time, s, with
-    the rates that hold at the time ``of``, on whose side of a kink it is; None: those of the data as they are.
+    with a floor neither. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a
+    time, s, with the rates that hold at the time ``of``, on whose side of a kink it is; None: those of the data as they are.
 
         craft = Multibody(model, named(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
         while craft.data.time < 10.0:
