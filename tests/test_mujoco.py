@@ -13,7 +13,7 @@ from rft.spatial import Spatial, wrench
 from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel
 from rft.vertical.effects import Aeration, GrainInertia
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
-from rft.walking.facets import Grains
+from rft.walking.facets import Grains, Surface
 from rft.walking.planar import GRAVITY
 from rft.walking.planar_walk import walk as planar_walk
 
@@ -78,6 +78,39 @@ def test_what_falls_free_falls_as_galilei_says():
     np.testing.assert_allclose(data.xipos[1], com + 0.2 * start + [0, 0, -9.81 * 0.02], atol=1e-4)
     np.testing.assert_allclose(data.subtree_angmom[0], spin, atol=1e-4 * np.linalg.norm(spin))
     assert body.energy() == pytest.approx(energy, rel=1e-4) and (body.work, body.loss) == (0.0, 0.0)
+
+
+FLOORED = """<mujoco><option gravity="0 0 -9.81"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
+<body name="a" pos="0 0 0.02"><freejoint/><geom name="foot" type="box" size="0.05 0.04 0.02"/>
+<geom name="arm" type="sphere" size="0.01" pos="0 0 0.05"/></body></worldbody>{}</mujoco>"""
+
+
+def test_what_touches_grains_touches_no_floor():
+    """As `geomech walk` has it: a foot sinks through the floor of its MJCF as through none, until the grains bear it, while
+    other geoms go on to touch the floor; of a surface that names no geom that holds of all of its body."""
+    made = lambda text: mujoco.MjModel.from_xml_string(text)
+    foot = lambda model: geoms.mesh_of(model, 1, 24)
+    depths = []
+    for text in (
+        FLOORED.format(""),
+        FLOORED.format("").replace('name="floor"', 'name="floor" contype="0" conaffinity="0"'),
+    ):
+        model = made(text)
+        body = Multibody(model, geoms.named(model, {"foot": foot(model)}), Grains(SPATIAL))
+        assert body.data.ncon == 0
+        for _ in range(100):
+            body.step(0.005)
+        depths.append(0.02 - body.data.qpos[2])
+        assert body.data.ncon == 0 and body.wrenches[0, 2] == pytest.approx(model.body_mass[1] * 9.81, rel=0.02)
+    assert depths[0] == depths[1] > 1e-3
+    model = made(FLOORED.format("").replace('pos="0 0 0.05"', 'pos="0 0 -0.025"'))
+    body = Multibody(model, geoms.named(model, {"foot": foot(model)}), Grains(SPATIAL))
+    assert body.data.ncon == 1 and model.geom_contype.tolist() == [1, 0, 1]
+    whole = Multibody(model, [Surface.of_mesh(1, foot(model))], Grains(SPATIAL))
+    assert whole.data.ncon == 0 and model.geom_contype.tolist() == [1, 0, 0]
+    paired = made(FLOORED.format('<contact><pair geom1="floor" geom2="foot"/></contact>'))
+    with pytest.raises(ValueError, match="a <pair> of <contact> names a geom that touches the ground"):
+        Multibody(paired, geoms.named(paired, {"foot": foot(paired)}), Grains(SPATIAL))
 
 
 PENDULUM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body pos="0 0 5"><joint name="j" axis="0 1 0" stiffness="0.4"
@@ -210,6 +243,7 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
     monkeypatch.setattr(Course, "stride", stride)
     found = walk([Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)], dataclasses.replace(QUICK, duration=5.0))[0]
     assert found.periodic and found.speed == pytest.approx(0.2) and (found.cycles == 10) == (turn > 0.0)
+    assert (found.turning, found.aside, found.settled) == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
     way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
     np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
     np.testing.assert_allclose(found.more["y"][1:], way.imag, atol=1e-9)

@@ -23,7 +23,7 @@ from rft.walking.march import step
 from rft.walking.planar import GRAVITY, State
 from rft.walking.planar_walk import _speed, _strides, again, walk
 from rft.walking.robot import parts
-from rft.walking.stride import from_rest, still_to_come
+from rft.walking.stride import Walk, cycles_to_settle, from_rest, still_to_come
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 ROBOT = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.06), hip_height=-0.004, axle=0.002)
@@ -205,6 +205,57 @@ def test_the_limit_cycle_is_that_of_many_strides():
     np.testing.assert_allclose(pushed.progress, found.progress, rtol=5e-3)
 
 
+def test_a_walk_tells_when_it_is_near_its_limit_cycle():
+    """Of one that drags its belly and swings through the limit's speed: the slopes there, known after two seconds, foretell
+    what the strides of six seconds are."""
+    assert [cycles_to_settle(x, -2.0) for x in ([-2.09, -1.91], [-2.0, -1.8, -2.09], [-2.0, -2.2], [])] == [
+        0,
+        2,
+        np.inf,
+        np.inf,
+    ]
+    assert cycles_to_settle([1.0, np.nan, 1.0], 1.0) == 2
+    swings = xplorer(-0.6, 3.25)
+    brief, long = (walk([swings], Fineness(steps=12, elements=6, duration=d))[0] for d in (2.0, 6.0))
+    x = np.interp(np.arange(20) / 3.25, long.t, long.pose[:, 0])
+    seen = cycles_to_settle(np.diff(x), long.speed / 3.25) / 3.25
+    assert 4.0 < seen == long.settled < 6.0 and abs(brief.settled - seen) < 1.5 / 3.25
+
+
+def test_what_is_told_of_a_walk():
+    """An energy over weight times way, when the robot is near its limit cycle, how it turns; nothing of the solver's cycles."""
+    t = np.linspace(0.0, 4.0, 33)
+    zero, pose = np.zeros_like(t), np.stack([0.25 * t, 0.03 + 0 * t, 0 * t], -1)
+    fields = t, pose, np.zeros_like(pose), 0.6 * t, 0.5 * t, zero, 0.25, "walking", 14.0, True, 0.0, None
+    one = walking.Walked(Walk(*fields, settled=1.5), 0.01)
+    said, found = walks.told(XPLORER, one), json.loads(walks.as_json(one))
+    assert said.startswith(
+        "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
+    )
+    cost = 0.6 / (0.15 * 9.81 * 0.25)
+    assert f"2.4 J, cost of transport {cost:.3g} (work over weight times way, from rest)" in said
+    assert "14" not in said and "turning" not in said and (found["settled"], found["cycles"]) == (1.5, 14.0)
+    for settled, words in (
+        (0.0, "within 5 % of it from the start)"),
+        (np.inf, "does not come within 5 %"),
+        (np.nan, "cycle)"),
+    ):
+        other = one._replace(walk=one.walk._replace(settled=settled))
+        assert words in walks.told(XPLORER, other)
+        assert json.loads(walks.as_json(other))["settled"] == (0.0 if settled == 0.0 else None)
+    y = 0.25 * (1 - np.cos(0.1 * t)) / 0.1
+    arc = np.stack([0.25 * np.sin(0.1 * t) / 0.1, pose[:, 1], 0 * t], -1)
+    more = {"y": y, "roll": zero, "yaw": 0.1 * t}
+    turns = one._replace(
+        walk=one.walk._replace(pose=arc, more=more, turning=0.1, aside=-0.02), turning=0.01, aside=0.003
+    )
+    said, found = walks.told(XPLORER, turns), json.loads(walks.as_json(turns))
+    assert "\nturning at 5.7 +- 0.6 degrees/s, drifting aside at -0.02 +- 0.003 m/s (positive: to the left" in said
+    assert f"cost of transport {cost:.3g} " in said  # along the arc
+    names = "turning", "estimate_turning", "aside", "estimate_aside"
+    assert [found[x] for x in names] == [0.1, 0.01, -0.02, 0.003]
+
+
 def test_robots_side_by_side_walk_as_alone():
     walkers = [xplorer(1.0, 2.0), xplorer(0.5, 3.0, mass=0.2)]
     walkers.append(dataclasses.replace(walkers[0], effects=(Aeration(0.1, 0.4), GrainInertia())))
@@ -215,6 +266,7 @@ def test_robots_side_by_side_walk_as_alone():
         np.testing.assert_allclose(one.pose[-1], alone.pose[-1], atol=1e-9)
         assert one.speed == pytest.approx(alone.speed, abs=1e-9)
     assert len({round(w.speed, 3) for w in together}) == 3
+    assert together[0].settled == 0.5 and (together[0].aside, together[0].turning) == (0.0, 0.0)
 
 
 def test_every_end_has_its_status_and_no_nan():
@@ -230,7 +282,7 @@ def test_every_end_has_its_status_and_no_nan():
     }
     for status, walker in cases.items():
         found = walk([walker], QUICK, 2)[0]
-        assert found.status == status
+        assert found.status == status and np.isnan(found.settled) == (status != "walking")
         for values in found[:8]:
             if not isinstance(values, str):
                 assert np.isfinite(values).all(), status
@@ -308,7 +360,10 @@ def test_a_walk_may_be_over_before_its_first_step():
         dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=1e-3)),
         walking.Walked(found, 0.01),
     )
-    assert "times weight" not in walks.told(scene, one) and walks.draw(scene, one).axes[0].get_xlim() == (0.0, 1e-3)
+    assert "cost of transport" not in walks.told(scene, one) and walks.draw(scene, one).axes[0].get_xlim() == (
+        0.0,
+        1e-3,
+    )
 
 
 def test_the_estimate_covers_the_error():
@@ -342,15 +397,17 @@ def test_a_short_stance_has_steps_enough():
 def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
     """Of half and three quarters of the steps the larger change counts, and that with twice the elements besides."""
     other = lambda numerics: {16: 0.0, 24: 0.3, 32: 0.02 if numerics.elements == 24 else 0.0}[numerics.steps]
-    walk = types.SimpleNamespace(speed=1.0, drift=0.001, off=0.0)
+    means = lambda off: {"speed": 1.0 + off, "aside": 0.1 - 2 * off, "turning": 0.2 + 3 * off}
+    walk = types.SimpleNamespace(**means(0.0), drift=0.001, off=0.0)
     how = types.SimpleNamespace(
         walk=lambda *args, **more: [walk],
-        again=lambda w, numerics, *rest: [types.SimpleNamespace(speed=1.0 + other(numerics))],
+        again=lambda w, numerics, *rest: [types.SimpleNamespace(**means(other(numerics)))],
     )
     monkeypatch.setattr(walking, "engine", lambda name: how)
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
     (one,) = walking.walked([dataclasses.replace(XPLORER, numerics=numerics)])
-    assert one.estimate == pytest.approx(0.001 + 0.3 + walking.TO_COME * 0.02)
+    change = 0.3 + walking.TO_COME * 0.02
+    assert (one.estimate, one.aside, one.turning) == pytest.approx((0.001 + change, 2 * change, 3 * change))
 
 
 def test_trends_of_figure_12():
@@ -523,7 +580,13 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
         assert (tmp_path / "figure.png").stat().st_size > 10_000
     assert "1" in fig12_walking.table(made[fig12_walking])
     sandbot = scenes.load("sandbot")
-    wide = [walking_sensitivity.varied(sandbot, name, 1.4) for name in walking_sensitivity.NAMES]
+    other = lambda name: walking_sensitivity.CHOICES.get(name, (1.0, 1.4))[1]
+    wide = [walking_sensitivity.varied(sandbot, name, other(name)) for name in walking_sensitivity.NAMES]
+    assert wide[-2].medium.tension == "cut" and wide[-1].robot.belly(8).points[:, 1] == pytest.approx(-0.025)
+    assert all(
+        walking_sensitivity.varied(sandbot, n, some[0]) == sandbot for n, some in walking_sensitivity.CHOICES.items()
+    )
+    assert walking_sensitivity.table(made[walking_sensitivity]).count("+0") == 5 * (2 * 8 + 2)
     assert all(a != b for a, b in zip(wide, [sandbot, *wide]))
     assert wide[0].robot.axle == pytest.approx(1.4 * sandbot.robot.axle)
     (_, _, left), (_, _, chattering) = made[walking_steps][3.0].values()

@@ -168,7 +168,6 @@ class Loops:
             found.append(self.fitted(p))
         return found
 
-
     def _outline(self, corners) -> np.ndarray:
         """The loop round a polygon, of `OUTLINES`, at a constant speed."""
         closed = np.array([*corners, corners[0]], float)

@@ -27,7 +27,12 @@ PHASES = 128  # of a cycle in the search
 FINISHED = 3  # answers of the table that the direct tier goes on from
 SHARE, LED = 0.8, 4  # of the limits: narrower ones, that the search begins within; and how many of its answers lead on
 ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
-NEAR, FINISH, POLISH, RUNS = 100, 16, 60, 12  # steps in tables, by the direct tier, of its best, of gaits run as a whole
+NEAR, FINISH, POLISH, RUNS = (
+    100,
+    16,
+    60,
+    12,
+)  # steps in tables, by the direct tier, of its best, of gaits run as a whole
 CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
 STILL = 1e-12  # of the velocity: what is rounding
 LOOPS = 4 + len(OUTLINES)  # of which one at least turns, if any does
@@ -64,8 +69,8 @@ class Request:
 
     @cached_property
     def power(self) -> Callable | None:
-        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square of its
-        own metric for a system that has one; None where nothing tells what moving costs."""
+        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square
+        of its own metric for a system that has one; None where nothing tells what moving costs."""
         system, length = self.system, self.system.length
         if self.stored:
             told, degree, box = system.stored("metric"), system.power_degree or 2.0, self.loops.box
@@ -138,8 +143,8 @@ class Request:
 
     @property
     def climbs(self) -> int:
-        """How many it takes: from its starts and, where a table leads near, by the direct tier and of its best; from several starts, within
-        narrower limits and on from there, too."""
+        """How many it takes: from its starts and, where a table leads near, by the direct tier and of its best; from
+        several starts, within narrower limits and on from there, too."""
         if not self.looks_up:
             return self.starts
         return self.starts + (self.starts + LED) * (self.starts > 1) + min(FINISHED, self.starts) + 1
@@ -204,7 +209,8 @@ def _in_mirror(request: Request) -> bool:
 
 
 def _stays(system: System) -> bool:
-    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
+    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for
+    all."""
     if system.steps or not system.linear or system.stored("connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
@@ -225,7 +231,8 @@ def _never_turns(request: Request) -> bool:
 
 
 def _own_rate(scene: Scene) -> float:
-    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of time."""
+    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of
+    time."""
     return float(2 * np.pi * (scene.frequency or 0.0) * np.abs(scene.gait.cycle(PHASES)[1]).max()) or 1.0
 
 

@@ -1,4 +1,5 @@
-"""The search for the best gait of a scene: in a table where that is near and cheap, finished and told by the direct tier."""
+"""The search for the best gait of a scene: in a table where that is near and cheap, finished and told by the direct
+tier."""
 
 from __future__ import annotations
 
@@ -42,11 +43,11 @@ def optimise(
     within: Asked = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
-    """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
-    ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest) for each,
-    searched for from the scene's own gait and ``starts`` - 1 others: by default none, and in a dry medium, where two joints have
-    many a gait that is the best near by, `OUTLINES` of the limits. A sine is sought among sines. SceneError for what makes
-    no sense."""
+    """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up
+    to ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest)
+    for each, searched for from the scene's own gait and ``starts`` - 1 others: by default none, and in a dry medium,
+    where two joints have many a gait that is the best near by, `OUTLINES` of the limits. A sine is sought among sines.
+    SceneError for what makes no sense."""
     request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
     return search(request, progress)
 
@@ -101,13 +102,15 @@ class _Search:
         )  # fmt: skip
 
     def _climbed(self, starts: list[np.ndarray], turn: float) -> tuple[list, tuple]:
-        """(different loops that the starts lead to, each with how many led there; values of those that a table led to and
-        nobody finished, likewise)."""
+        """(different loops that the starts lead to, each with how many led there; values of those that a table led to
+        and nobody finished, likewise)."""
         r, tier = self.r, ways.direct(self.r)
         if not r.looks_up:
             return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR)), ()
         looked_up = ways.looked_up(r)
-        near = self._near(ways.table(r, *looked_up), starts + self._led_on(looked_up, starts, turn), turn, looked_up, NEAR)
+        near = self._near(
+            ways.table(r, *looked_up), starts + self._led_on(looked_up, starts, turn), turn, looked_up, NEAR
+        )
         if not r.system.odd:  # where the table, which is, takes either sense for as good
             near += [series.reversed_(p) for p in near]
         ranked = self._ranked(tier, near, turn)
@@ -123,11 +126,13 @@ class _Search:
     def _better(self, turn: float) -> Callable:
         """A function that settles two loops and returns the better."""
         tier = ways.direct(self.r, self.r.phases)
-        return lambda p, q: max(self._settled(p, turn), self._settled(q, turn), key=lambda x: self._worth(tier, x, turn))
+        return lambda p, q: max(
+            self._settled(p, turn), self._settled(q, turn), key=lambda x: self._worth(tier, x, turn)
+        )
 
     def _led_on(self, looked_up: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
-        """The best loops within narrower limits, from which the search goes on: what is best there is so far from others that
-        wider limits alone may miss it. None for one start."""
+        """The best loops within narrower limits, from which the search goes on: what is best there is so far from
+        others that wider limits alone may miss it. None for one start."""
         if self.r.starts == 1:
             return []
         narrow = dataclasses.replace(self.r, loops=self.r.loops.narrower(SHARE))
@@ -141,7 +146,8 @@ class _Search:
         return sorted(worth, key=lambda x: x[2], reverse=True)
 
     def _near(self, cycles, starts: list[np.ndarray], turn: float, looked_up, most: int) -> list[np.ndarray]:
-        """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near by."""
+        """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near
+        by."""
         twice = [self._larger(starts[0])] if self._rough else []
         near = self._each([*starts, *twice], turn, looked_up, most, NEAR_TOLERANCE)
         if twice:
@@ -159,8 +165,8 @@ class _Search:
         self, starts: list[np.ndarray], turn: float, looked_up, most: int, tolerance: float, r: Request | None = None,
         phases: int | None = None,
     ) -> list[np.ndarray]:  # fmt: skip
-        """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its phases or
-        others. Who computes: `geomech.workers`."""
+        """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its
+        phases or others. Who computes: `geomech.workers`."""
         at_hand = len(starts) == 1 and not workers.far()
         how = Way(r or self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None, phases)
         ends, before, seconds = [], self.done, len(starts) * (CLIMB if looked_up else FINISHING)
@@ -217,7 +223,8 @@ class _Search:
         return r.loops.fitted(p)  # as it is, but where no loop near by keeps all rules
 
     def _slack(self, this: Told) -> float:
-        """rad: how much more than it may a gait turns by rounding; where its cycles are not those of the search, by its error."""
+        """rad: how much more than it may a gait turns by rounding; where its cycles are not those of the search, by its
+        error."""
         return NO_TURN + (this.heading if self.r.whole or self.r.system is not self.r.scene.system else 0.0)
 
     def _tell(self, cycles: int = 1) -> None:
@@ -251,7 +258,8 @@ class _Search:
         return r.gait
 
     def _turned_to(self, p: np.ndarray) -> np.ndarray:
-        """The loop; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
+        """The loop; with a direction, it starts where the body points as in the mean, and goes forwards or to the
+        left."""
         r = self.r
         if not (r.aim.direction and isinstance(r.loops, Loops)) or r.whole:
             return p
@@ -298,9 +306,9 @@ class _Search:
 
 
 class Way(NamedTuple):
-    """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`, or
-    None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the direct tier, if others than the
-    search's."""
+    """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`,
+    or None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the
+    direct tier, if others than the search's."""
 
     r: Request
     origin: np.ndarray

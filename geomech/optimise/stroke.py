@@ -11,8 +11,9 @@ NEWTON = 3  # steps to the least sweep between two phases
 class Stroke:
     """The sense and the plane, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`.
 
-    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least that it
-    has in each of N intervals between phases, so that a loop which goes back nowhere there goes back nowhere."""
+    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least
+    that it has in each of N intervals between phases, so that a loop which goes back nowhere there goes back
+    nowhere."""
 
     def __init__(self, loops, p: np.ndarray):
         self.plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
@@ -43,8 +44,8 @@ class Stroke:
         return self.phases + off
 
     def swept(self, p: np.ndarray) -> np.ndarray:
-        """(N,): the least area about the centre that the loop p sweeps for a rad of phase, in each interval between phases, over
-        that of its first harmonic."""
+        """(N,): the least area about the centre that the loop p sweeps for a rad of phase, in each interval between
+        phases, over that of its first harmonic."""
         (u, v), (du, dv) = self._going(p, self.lowest(p))[:2]
         return self.side * (u * dv - v * du) / self.size
 

@@ -14,6 +14,8 @@ from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
 from geomech.study import walking
 from geomech.study.walking import Walked
+from rft.media.catalogue import GRAVITY
+from rft.walking.stride import NEAR
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
@@ -28,23 +30,25 @@ def columns(found: Walked) -> dict[str, np.ndarray]:
 
 
 def as_json(found: Walked) -> str:
+    """SI units and rad. settled: null where it is not known, or never."""
     w = found.walk
     series = {name: values.tolist() for name, values in columns(found).items() if name in ("t", "x", "z", "pitch")}
     numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
     numbers |= {"residual": w.residual, "unaccounted": w.unaccounted}
+    numbers |= {"settled": w.settled if np.isfinite(w.settled) else None, "aside": w.aside, "turning": w.turning}
+    numbers |= {"estimate_aside": found.aside, "estimate_turning": found.turning}
     return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
 
 
 def told(scene: WalkerScene, found: Walked) -> str:
     """Speed, status, energy."""
     w, f = found.walk, scene.gait.frequency
-    turned = scene.robot.mass * 9.81 * w.speed
-    regular = "limit cycle" if w.periodic else "no limit cycle found: mean of what there is"
-    share = (
-        f", {(w.work[-1] / w.t[-1]) / turned:.3g} times weight times speed" if w.status == "walking" and w.t[-1] else ""
-    )
+    weighed = scene.robot.mass * GRAVITY * _way(w, f)
+    cost = w.status == "walking" and weighed > 0.0
+    share = f", cost of transport {w.work[-1] / weighed:.3g} (work over weight times way, from rest)" if cost else ""
     return "\n".join([
-        f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s ({regular}, {w.cycles:g} cycles at {f:g} Hz)",
+        f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settled(w)})",
+        *_turning(found),
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
         *_aside(w),
@@ -52,6 +56,37 @@ def told(scene: WalkerScene, found: Walked) -> str:
         f"{100 * w.unaccounted:.1g} % of the work is not accounted for, an error of the time steps",
         *([_unsolved(w)] if w.unsolved else []),
     ])  # fmt: skip
+
+
+def _way(walk, frequency: float) -> float:
+    """m, that a walk covers, in the chords of its cycles."""
+    at = np.append(np.arange(0.0, walk.t[-1], 1 / frequency), walk.t[-1])
+    y = walk.more["y"] if walk.more else np.zeros_like(walk.t)
+    return float(np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum())
+
+
+def _regular(walk) -> str:
+    return "limit cycle" if walk.periodic else "no limit cycle found: mean of what there is"
+
+
+def _settled(walk) -> str:
+    """When a robot that starts from rest goes on as the limit cycle does."""
+    if np.isnan(walk.settled):
+        return ""
+    within = f"within {100 * NEAR:g} % of it"
+    if np.isinf(walk.settled):
+        return f"; from rest it does not come {within}"
+    return f"; from rest {within} after {walk.settled:.2g} s" if walk.settled else f"; {within} from the start"
+
+
+def _turning(found: Walked) -> list[str]:
+    """How a robot of three dimensions leaves its heading."""
+    w = found.walk
+    if not w.more:
+        return []
+    turning, error = np.degrees([w.turning, found.turning])
+    aside = f"drifting aside at {w.aside:.2g} +- {found.aside:.1g} m/s"
+    return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {aside} (positive: to the left of its heading)"]
 
 
 def _unsolved(walk) -> str:

@@ -53,10 +53,12 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)
 class Walked(NamedTuple):
     """walk: as rft has it. estimate: error of its speed, m/s: what half or three quarters of the steps change, the larger, for
     one alone may be small by chance; `TO_COME` times what twice the elements change; what is left to the limit, and what
-    steps that are not solved move."""
+    steps that are not solved move. aside, turning: errors of those of the walk, m/s and rad/s, by the changes alone."""
 
     walk: Walk
     estimate: float
+    aside: float = 0.0
+    turning: float = 0.0
 
 
 def walked(
@@ -74,12 +76,18 @@ def walked(
         there = how.again(
             walkers, dataclasses.replace(numerics, **{name: other}), walks, SETTLING if settling else None
         )
-        changes.append(np.abs([a.speed - b.speed for a, b in zip(there, walks)]))
+        changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(there, walks)]))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
     half, most, finer = changes
-    error = np.array([w.drift + w.off for w in walks]) + np.maximum(half, most) + TO_COME * finer
-    return [Walked(w, float(e)) for w, e in zip(walks, error)]
+    error = np.maximum(half, most) + TO_COME * finer
+    error[:, 0] += [w.drift + w.off for w in walks]
+    return [Walked(w, *e) for w, e in zip(walks, error.tolist())]
+
+
+def _means(walk: Walk) -> tuple[float, float, float]:
+    """What is told of a walk with an error."""
+    return walk.speed, walk.aside, walk.turning
 
 
 def run(

@@ -50,12 +50,14 @@ class Grains:
 
 class Surface(NamedTuple):
     """Of one body: corners (T, 3, 3) and unit normals (T, 3) of triangles in the body's frame, m; sheet: whether they are a
-    thin sheet, either side of which may lead, and which is given once."""
+    thin sheet, either side of which may lead, and which is given once. geom: the number of the geom that they stand for; None
+    for all of the body's."""
 
     body: int
     corners: np.ndarray
     normals: np.ndarray
     sheet: bool = False
+    geom: int | None = None
 
     @classmethod
     def of_mesh(cls, body: int, mesh: Mesh, rotation=None, place=(0.0, 0.0, 0.0)) -> Surface:

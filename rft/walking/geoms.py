@@ -31,7 +31,7 @@ def surface(model: mujoco.MjModel, geom: int, mesh: Mesh) -> Surface:
     """A mesh in the frame of a geom."""
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    return Surface.of_mesh(int(model.geom_bodyid[geom]), mesh, turn, model.geom_pos[geom])
+    return Surface.of_mesh(int(model.geom_bodyid[geom]), mesh, turn, model.geom_pos[geom])._replace(geom=geom)
 
 
 def mesh_of(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:

@@ -24,6 +24,7 @@ SHORT = 0.01  # scaled: slopes are found anew after a longer step, after one
 FALLEN = 0.5  # that left more than this of the distance, and after `FEW_STRIDES`
 NEUTRAL = 1e-9  # determinant of identity - slopes: a push in some direction is kept for ever
 RETURNS = 1.001  # the largest eigenvalue of a map that leads back
+FORETOLD = 1000  # cycles, at most, that the slopes of a map foretell
 
 
 class Limit(NamedTuple):
@@ -34,6 +35,17 @@ class Limit(NamedTuple):
     fold: int
     slopes: np.ndarray | None = None
     gains: np.ndarray | None = None
+
+
+def foretold(strides: Strides, limit: Limit, state: State, k: int, progress: float) -> np.ndarray:
+    """Progress of the strides to come (N,), m, of robot k from ``state`` (1,), by the slopes at its limit, where a stride makes
+    ``progress``, m."""
+    here, there = (strides.scaled(x, np.array([k]))[:, 0] for x in (state, limit.state))
+    off, moves = here - there, []
+    for _ in range(FORETOLD * strides.cycle // limit.fold):
+        moves += [progress + limit.gains @ off / limit.fold] * limit.fold
+        off = limit.slopes @ off
+    return np.array(moves)
 
 
 class Found(NamedTuple):

@@ -69,7 +69,6 @@ class Mjcf(Robot):
         return float(self.model.body_mass.sum())
 
     def _find_geoms(self) -> None:
-
         model = self.model
         require(model.nv > 0, f"{self.mjcf}: nothing can move: it has no joints")
         found = []
@@ -78,7 +77,6 @@ class Mjcf(Robot):
             still = model.body_weldid[model.geom_bodyid[geom]] == 0
             require(not still, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
             found.append(geom)
-        model.geom_contype[found] = model.geom_conaffinity[found] = 0  # the grains bear them, and no floor
         object.__setattr__(self, "found", np.array(found))
 
     def _number(self, kind: str, name: str, count: int) -> int:

@@ -25,7 +25,7 @@ from rft.walking.facets import Grains
 from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
 from rft.walking.robot import parts, rounded
-from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk
+from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk, cycles_to_settle
 
 REPEATED = (
     1e-2  # of the speed of the legs' ends: what the start of a stride may differ from the last one's, to repeat it
@@ -132,8 +132,8 @@ class Course:
                 progress((stride + 1) / most)
             if ended:
                 break
-            moves.append(_progress(first, rows[-1]))
-            drift = float(approach.after(None, None, np.array([[moves[-1]]]))[0])
+            moves.append(_moved(first, rows[-1]))
+            drift = float(approach.after(None, None, np.array([[moves[-1][0]]]))[0])
             here = self.section()
             change, last = np.abs(here - last).max(), here
             periodic = bool(drift <= SETTLED * self.reach and change < REPEATED)
@@ -142,7 +142,12 @@ class Course:
         limit = None if ended else Start(self.unwound(stride + 1), body.data.qvel.copy())
         table, path = np.array(rows), np.array(states)
         off = body.defect - before if periodic else body.defect / max(1, len(moves))
-        speed, drift, status = self.told(table, moves, periodic, drift, ended)
+        (speed, aside, turning), drift, status = self.told(
+            table, np.array(moves).reshape(-1, 3), periodic, drift, ended
+        )
+        settled = np.nan
+        if periodic and start is None and status == "walking":
+            settled = float(cycles_to_settle([m[0] for m in moves], moves[-1][0])) / self.gait.frequency
         if periodic and duration is not None:
             table, path = _repeated(table, path, len(table) - 1 - begun, duration)
         if duration is not None:
@@ -153,22 +158,21 @@ class Course:
         more = {name: named[name] for name in ("y", "roll", "yaw")} | {"states": path}
         return Walk(
             named["t"], pose, twist, named["work"], named["loss"], named["energy"], speed, status,
-            float(len(moves)), periodic, drift, limit, body.unsolved, body.residual, off, more,
+            float(len(moves)), periodic, drift, limit, body.unsolved, body.residual, off, more, settled, aside, turning,
         )  # fmt: skip
 
-    def told(self, rows, moves, periodic: bool, drift: float, ended: str) -> tuple[float, float, str]:
-        """Speed, what it may yet change, and status."""
+    def told(self, rows, moves, periodic: bool, drift: float, ended: str) -> tuple[list[float], float, str]:
+        """(speed, m/s aside and rad/s of turning), what the speed may yet change, and status, of cycles that move by (N, 3)."""
         f = self.gait.frequency
         if ended:
-            time = rows[-1, 0]
-            return (_progress(rows[0], rows[-1]) / time if time else 0.0), 0.0, ended
-        if periodic:
-            progress = moves[-1]
-        else:
-            late = np.array(moves[-LATE:])
-            progress, drift = late.mean(), np.ptp(late) if len(late) > 1 else abs(late[0])
-        status = "stuck" if abs(progress) < STUCK * self.reach else "walking"
-        return float(progress * f), float(drift * f), status
+            ahead, aside, _ = _moved(rows[0], rows[-1])
+            turned = np.diff(np.unwrap(rows[:, ROW.index("yaw")])[[0, -1]])[0]
+            return (np.array([ahead, aside, turned]) / (rows[-1, 0] or np.inf)).tolist(), 0.0, ended
+        late = moves[-1:] if periodic else moves[-LATE:]
+        if not periodic:
+            drift = np.ptp(late[:, 0]) if len(late) > 1 else abs(late[0, 0])
+        status = "stuck" if abs(late[:, 0].mean()) < STUCK * self.reach else "walking"
+        return (late.mean(0) * f).tolist(), float(drift * f), status
 
     def stride(self, stride: int, rows: list, states: list) -> str:
         """The next one; how it ended, or ""."""
@@ -256,10 +260,11 @@ def _straight(before, after, duration: float) -> bool:
     return bool(abs(math.remainder(after[yaw] - before[yaw], 2 * math.pi)) * left <= STRAIGHT)
 
 
-def _progress(before, after) -> float:
-    """m, between two rows, along the heading of the first."""
+def _moved(before, after) -> np.ndarray:
+    """(3,): m along the heading of the first of two rows and to the left of it, and rad to the left, less than half a turn."""
     x, y, yaw = (ROW.index(n) for n in ("x", "y", "yaw"))
-    return float((after[x] - before[x]) * np.cos(before[yaw]) + (after[y] - before[y]) * np.sin(before[yaw]))
+    dx, dy, cos, sin = after[x] - before[x], after[y] - before[y], np.cos(before[yaw]), np.sin(before[yaw])
+    return np.array([dx * cos + dy * sin, dy * cos - dx * sin, math.remainder(after[yaw] - before[yaw], 2 * math.pi)])
 
 
 def _repeated(rows, states, steps: int, duration: float) -> tuple[np.ndarray, np.ndarray]:

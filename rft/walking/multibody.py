@@ -34,8 +34,9 @@ class Multibody:
     """A MuJoCo model on grains, step after step.
 
     model: compiled; gravity along -z, the surface at z = 0. surfaces: what touches the ground, of `rft.walking.geoms.named`
-    or `Surface`. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a time, s, with
-    the rates that hold at the time ``of``, on whose side of a kink it is; None: those of the data as they are.
+    or `Surface`; the geoms that they stand for touch grains and nothing else: the model has no contacts of theirs any more,
+    with a floor neither. grains: the law. control: a function of (time, of) that gives the actuators' controls (nu,) at a
+    time, s, with the rates that hold at the time ``of``, on whose side of a kink it is; None: those of the data as they are.
 
         craft = Multibody(model, named(model, {"hull": mesh}), Grains(Spatial(xi_n=3e5)))
         while craft.data.time < 10.0:
@@ -59,6 +60,7 @@ class Multibody:
         require(model.nv > 0, "nothing in the model can move: it has no joints")
         require(model.na == 0, "the model has actuators with a state of their own: drop their dyntype")
         mujoco.set_mju_user_warning(_ignored)
+        _untouched(model, surfaces)
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
         self.model, self.data = model, mujoco.MjData(model)
         self.facets, self.grains, self.control = Facets(surfaces), grains, control
@@ -220,6 +222,16 @@ class Multibody:
         at = Poses(rotation, data.xpos[facets.bodies], twist[:, :3], twist[:, 3:])
         self.wrenches, slopes = facets.loads(self.grains, at, k)
         return np.einsum("bij,bi->j", j, self.wrenches), (j.swapaxes(1, 2) @ slopes @ j).sum(0)
+
+
+def _untouched(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None:
+    """Geoms that touch grains touch nothing else."""
+    own = np.zeros(model.ngeom, bool)
+    for one in surfaces:
+        own |= model.geom_bodyid == one.body if one.geom is None else np.arange(model.ngeom) == one.geom
+    model.geom_contype[own] = model.geom_conaffinity[own] = 0
+    paired = own[model.pair_geom1] | own[model.pair_geom2]
+    require(not paired.any(), "a <pair> of <contact> names a geom that touches the ground, and no other thing: drop it")
 
 
 def _ignored(_warning: str) -> None:

@@ -12,11 +12,11 @@ from rft.media.base import require
 from rft.vertical.stress import PlateStress
 from rft.walking.engines import Fineness, Walker
 from rft.walking.ground import Ground
-from rft.walking.limit import Found, Limit, limit_cycle
+from rft.walking.limit import Found, Limit, foretold, limit_cycle
 from rft.walking.march import March
 from rft.walking.planar import Robots, State
 from rft.walking.robot import Rhex, Roller
-from rft.walking.stride import STUCK, Strides, Walk, from_rest
+from rft.walking.stride import STUCK, Strides, Walk, cycles_to_settle, from_rest
 
 
 def refuse(walker: Walker) -> None:
@@ -76,8 +76,20 @@ def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None, t
         own = float(speed), str(how[k]), 0.0, False, 0.0, None, int(state.unsolved[k]), float(state.residual[k])
         one = Walk(rows[:, 0], *states[:4], energy, *own)
         one = one._replace(**at_limit[k]) if k in at_limit else one
+        if one.periodic and one.status == "walking":
+            rest = state.take([k]) if how[k] == "" else None
+            one = one._replace(settled=_settled(strides, k, [b[-1, 1] for b in blocks[k]], rest, one))
         walks.append(one._replace(cycles=one.cycles + done[k] * strides.period))
     return walks
+
+
+def _settled(strides: Strides, k: int, x: list, rest: State | None, walk: Walk) -> float:
+    """`Walk.settled` from the places x, m, of robot k at the ends of its strides from rest. rest: its state at the last one,
+    from which the slopes at the limit foretell those to come; None where they repeat themselves."""
+    cycle = 1.0 / strides.frequency[k]
+    if rest is not None:
+        x = np.append(x, x[-1] + foretold(strides, walk.limit, rest, k, walk.speed * cycle / strides.cycle).cumsum())
+    return float(cycles_to_settle(np.diff(x[:: strides.cycle]), walk.speed * cycle) * cycle)
 
 
 def _at_limits(walkers: Sequence[Walker], numerics: Fineness, limits: list[Limit]) -> list[dict]:

@@ -21,6 +21,7 @@ FEW_STRIDES = 4  # the same from one that is near
 LATE = 4  # cycles whose mean counts where there is no limit cycle
 LIMPING = 0.5  # of the change from stride to stride, below which is that to the second next
 STUCK = 0.02  # of a leg's reach; progress in a cycle below which a robot is stuck, assumed
+NEAR = 0.05  # of the limit cycle's progress: what that of a cycle may differ from it by, to count as settled
 
 
 class Walk(NamedTuple):
@@ -31,6 +32,10 @@ class Walk(NamedTuple):
     came to an end. unsolved: steps, of all computed, that were taken unsolved. residual: m/s, the largest that any step
     is off by. off: m/s, how far those unsolved move the speed. more: of three dimensions, y (m), roll and yaw (rad),
     (T,), and "states" (T, nq), MuJoCo's positions.
+
+    settled: s from rest after which the progress of every cycle is within `NEAR` of the limit cycle's; inf of a robot that
+    does not come to that, nan where there is no limit cycle. aside: m/s, to the left of the heading at a cycle's start, and
+    turning: rad/s, to the left, the means over a cycle that the speed is of; 0 in the plane.
     """
 
     t: np.ndarray
@@ -49,6 +54,9 @@ class Walk(NamedTuple):
     residual: float = 0.0
     off: float = 0.0
     more: Mapping[str, np.ndarray] | None = None
+    settled: float = np.nan
+    aside: float = 0.0
+    turning: float = 0.0
 
     @property
     def unaccounted(self) -> float:
@@ -98,6 +106,13 @@ class Strides:
         z, pitch = state.pose[:, 1], np.abs(state.pose[:, 2])
         how = np.where(z + self.top[which] < 0.0, "sunk", np.where(z > self.out_of_reach[which], "airborne", ""))
         return np.where(pitch > np.pi / 2, "flipped", how)
+
+
+def cycles_to_settle(moves, limit: float) -> float:
+    """Cycles after which the progress of each, moves (N,), is within `NEAR` of the limit, m; inf if the last is not."""
+    far = np.flatnonzero(~(np.abs(np.asarray(moves) - limit) <= NEAR * abs(limit)))
+    after = far[-1] + 1 if far.size else 0
+    return float(after) if after < len(moves) else np.inf
 
 
 def _whole(kinks: tuple[float, ...]) -> tuple[float, ...]:

@@ -44,7 +44,7 @@ class View:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                renderer = mujoco.Renderer(model, tall, wide)
+                renderer = _Renderer(model, tall, wide)
         except Exception:  # whatever a machine without GL or display says
             return None
         return self._pictures(renderer, states)
@@ -60,6 +60,12 @@ class View:
                 renderer.update_scene(self.data, camera)
                 _add_sand(renderer.scene, camera.lookat, size)
                 yield renderer.render()
+
+
+class _Renderer(mujoco.Renderer):
+    """MuJoCo's before 4.0 complains as it is dropped unmade, where there is no GL: it then closes what it has not."""
+
+    _gl_context = _mjr_context = None
 
 
 def _add_sand(scene, place, size: float) -> None:
