@@ -26,13 +26,7 @@ from geomech.progress import progress
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
 BELOW = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
-PRINTING = (
-    "geomech.cli",
-    "geomech.commands",
-    "geomech.terminal",
-    "click",
-    "typer",
-)  # modules that print, and write no files
+PRINTING = "geomech.cli", "geomech.commands", "geomech.terminal", "click", "typer"  # modules that print; no files
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
