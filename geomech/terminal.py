@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,13 +21,13 @@ from pathlib import Path
 import typer
 
 from geomech.errors import Note, line, plain
-from geomech.files import FULL
 from geomech.progress import progress
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
 BELOW = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 LONGEST = 2000  # characters of an error
+PRINTING = "geomech.cli", "geomech.commands", "geomech.terminal", "click", "typer"  # modules that print; no files
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
 
 
@@ -158,11 +159,12 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
 
 
 def _of_system(error: OSError) -> str:
-    """What the system refuses, with its cure. Files of ours are named where they are written: a full disk without a name is
-    that of what is printed."""
+    """What the system refuses, with its cure. Standard output has no name; it is what commands write to themselves."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
-    if error.errno in FULL and error.filename is None:
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    where = frame.f_globals["__name__"]
+    if error.filename is None and where.startswith(PRINTING):
         return f"cannot write to standard output: {error.strerror}; make room, or send it elsewhere"
     return str(error)
 
