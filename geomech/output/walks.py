@@ -14,8 +14,6 @@ from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
 from geomech.study import walking
 from geomech.study.walking import Walked
-from rft.media.catalogue import GRAVITY
-from rft.walking.stride import NEAR
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
@@ -42,10 +40,9 @@ def as_json(found: Walked) -> str:
 
 def told(scene: WalkerScene, found: Walked) -> str:
     """Speed, status, energy."""
-    w, f = found.walk, scene.gait.frequency
-    weighed = scene.robot.mass * GRAVITY * _way(w, f)
-    cost = w.status == "walking" and weighed > 0.0
-    share = f", cost of transport {w.work[-1] / weighed:.3g} (work over weight times way, from rest)" if cost else ""
+    w, f, cost = found.walk, scene.gait.frequency, walking.cost_of_transport(scene, found.walk)
+    known = w.status == "walking" and np.isfinite(cost)
+    share = f", cost of transport {cost:.3g} (work over weight times way, from rest)" if known else ""
     return "\n".join([
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settled(w)})",
         *_turning(found),
@@ -58,13 +55,6 @@ def told(scene: WalkerScene, found: Walked) -> str:
     ])  # fmt: skip
 
 
-def _way(walk, frequency: float) -> float:
-    """m, that a walk covers, in the chords of its cycles."""
-    at = np.append(np.arange(0.0, walk.t[-1], 1 / frequency), walk.t[-1])
-    y = walk.more["y"] if walk.more else np.zeros_like(walk.t)
-    return float(np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum())
-
-
 def _regular(walk) -> str:
     return "limit cycle" if walk.periodic else "no limit cycle found: mean of what there is"
 
@@ -73,7 +63,7 @@ def _settled(walk) -> str:
     """When a robot that starts from rest goes on as the limit cycle does."""
     if np.isnan(walk.settled):
         return ""
-    within = f"within {100 * NEAR:g} % of it"
+    within = f"within {100 * walking.NEAR:g} % of it"
     if np.isinf(walk.settled):
         return f"; from rest it does not come {within}"
     return f"; from rest {within} after {walk.settled:.2g} s" if walk.settled else f"; {within} from the start"

@@ -24,8 +24,10 @@ from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.kept import Rows
 from geomech.study.parts import asking
 from geomech.study.sweep import LARGEST, Points, changed, listed
+from rft.media.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
+from rft.walking.stride import NEAR as NEAR
 
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
@@ -88,6 +90,15 @@ def walked(
 def _means(walk: Walk) -> tuple[float, float, float]:
     """What is told of a walk with an error."""
     return walk.speed, walk.aside, walk.turning
+
+
+def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
+    """Work of the motors over weight times way, from rest to the end; the way is in the chords of the cycles. inf of one that
+    makes none."""
+    at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
+    y = walk.more["y"] if walk.more else np.zeros_like(walk.t)
+    way = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
+    return float(walk.work[-1] / (scene.robot.mass * GRAVITY * way)) if way > 0.0 else math.inf
 
 
 def run(

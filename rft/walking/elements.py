@@ -37,9 +37,9 @@ class Elements:
     """
 
     def __init__(self, legs: Outlines, belly: Outlines | None, hips: np.ndarray, tension: str):
-        count = hips.shape[2]
-        some = [(k, legs, side) for k in range(count) for side in ((1,) if legs.closed else SIDES[tension])]
-        some += [(count, belly, 1)] if belly else []
+        count, sides = hips.shape[2], lambda outlines: (1,) if outlines.closed else SIDES[tension]
+        some = [(k, legs, side) for k in range(count) for side in sides(legs)]
+        some += [(count, belly, side) for side in sides(belly)] if belly else []
         size = max(len(outlines.points) for _, outlines, _ in some)
         numbers = [np.broadcast_to(x, (9, size, x.shape[2])) for x in (_numbers(o) for _, o, _ in some)]
         self.numbers = np.concatenate(numbers, 2)
