@@ -111,7 +111,7 @@ MASKS = [
     (r"residual [\d.e+-]+, \d+ iterations", "residual #, # iterations"),
     (r"about [\d.]+ (s|min|h|days|years)\b", "about #"),
     (r"\b[\d,.]+ [kMGT]?B of memory", "# of memory"),
-    (re.escape(tempfile.gettempdir()) + r"/tmp\w+", "#"),
+    (rf"(/private)?{re.escape(tempfile.gettempdir())}/tmp\w+", "#"),
 ]
 MASKED_KEYS = re.compile(r"(^|\.)(seconds|evaluations|iterations|residual|kept)($|\.)")
 
@@ -250,9 +250,9 @@ def of_file(file: pathlib.Path) -> Iterator[str]:
                 if not key.startswith("__"):
                     yield f"= {key} {value.dtype.kind}{value.dtype.itemsize} = {of_array(value)}"
         case ".toml":
-            yield from (f"= {line}" for line in flat(tomllib.loads(file.read_text())))
+            yield from (f"= {line}" for line in flat(tomllib.loads(masked(file.read_text()))))
         case ".json":
-            yield from (f"= {line}" for line in flat(json.loads(file.read_text())))
+            yield from (f"= {line}" for line in flat(json.loads(masked(file.read_text()))))
         case ".csv":
             rows = [line for line in file.read_text().splitlines() if not line.startswith("#")]
             yield f"= {len(rows)} lines of {rows[0]}"
@@ -277,10 +277,13 @@ def ran(line: str) -> list[str]:
     before = {p: p.stat().st_mtime_ns for p in pathlib.Path().rglob("*") if p.is_file()}
     code, out, err = geomech(*shlex.split(line))
     told = []
-    try:
-        told += [f"= {x}" for x in flat(json.loads(out))]
-    except ValueError:
-        told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
+    if line.endswith("--help"):
+        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*(?: <[^>]*>)?|[a-z]+)(?:  |$)", out, re.M)]
+    else:
+        try:
+            told += [f"= {x}" for x in flat(json.loads(out))]
+        except ValueError:
+            told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
     told += [f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))]
     for file in sorted(p for p in pathlib.Path().rglob("*") if p.is_file() and before.get(p) != p.stat().st_mtime_ns):
         told += [f"> {file}", *of_file(file)]
@@ -487,24 +490,30 @@ def keys() -> Iterator[str]:
             table = line
         elif line == "above all tables":
             table = "[]"
-    yield from (f"schema {line}" for line in of_schema(json.loads(geomech("keys", "--json-schema")[1])))
+    yield from (
+        f"schema {line}".replace("/$defs/", "") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
+    )
     yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
 
 
 def of_schema(node, path: str = "") -> Iterator[str]:
     """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
     a list by their kind where they have one."""
-    text = json.dumps(undescribed(node), sort_keys=True)
+    text = compact(undescribed(node))
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
     elif isinstance(node, list):
         for k, inner in enumerate(node):
             yield from of_schema(inner, f"{path}/{kind_of(inner) or k}")
     else:
-        small = {k: x for k, x in undescribed(node).items() if len(json.dumps(x)) <= 60}
-        yield f"{path} {json.dumps(small, sort_keys=True)}"
+        small = {k: x for k, x in undescribed(node).items() if len(compact(x)) <= 60}
+        yield f"{path} {compact(small)}"
         for key in sorted(set(node) - set(small) - {"description"}):
             yield from of_schema(node[key], f"{path}/{key}".replace("/properties", "").replace("/oneOf", ""))
+
+
+def compact(node) -> str:
+    return json.dumps(node, sort_keys=True, separators=(",", ":"))
 
 
 def kind_of(node: dict) -> str:
