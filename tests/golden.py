@@ -1,10 +1,11 @@
 """Golden numbers: what every medium, body, effect and built-in scene of the registry gives, kept in data/golden.json.
 
     python tests/golden.py            which entries changed, appeared or went, and by how much
-    python tests/golden.py --write    records them; lines that did not change stay as they are
+    python tests/golden.py --write    records them, and what `frozen` has; lines that did not change stay as they are
 
-They guard against a change nobody meant; what is right, other tests say. Everything goes through public doors, so that
-a move of modules needs no change here.
+They guard against a change nobody meant; what is right, other tests say. `frozen` keeps words and files likewise, and
+is written with them. Everything goes through the command line, `geomech` and the doors of rft that are named below, so
+that a move of modules needs no other change here.
 
 Regularisation is 1e-3 in place of 1e-6: an element at rest, or one that slides along itself, makes a balance as badly
 conditioned as 1 / regularisation, and the last digits would be the solver's path, not the solution's. For the same
@@ -12,27 +13,24 @@ reason balances are solved to the smallest tolerance there is: solved along anot
 error estimates contain the residual, which is rounding.
 """
 
-import contextlib
-import io
 import itertools
 import json
 import pathlib
+import re
 import sys
 import tempfile
 
+import frozen
 import numpy as np
 from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA, OUTLINES, SOLIDS, STRESSES, WALKERS
 from scipy.io import netcdf_file
 from scipy.spatial.transform import Rotation
 
+import geomech
 import rft
-import rft.spatial
-import rft.vertical
-import rft.walking
-from geomech import cli
-from geomech import scene as scenes
-from geomech.gaits import Ellipse
-from geomech.study.bench import Study
+from rft.spatial import Spatial, wrench
+from rft.vertical import loads
+from rft.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
 TOLERANCE, OF_ESTIMATES = 1e-12, 1e-8  # relative, of the largest number of an entry; the second for walks too
@@ -65,10 +63,10 @@ def velocities():
 
 
 def tiers():
-    for name in scenes.builtin_names():
-        scene = scenes.load(name)
+    for name in shipped("gait"):
+        scene = geomech.load(name)
         own = COARSE if scene.system.solver else {k: v for k, v in COARSE.items() if k in GEOMETRY}
-        study = Study(scene.with_numerics(**own))
+        study = geomech.Study(scene.with_numerics(**own))
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
         for tier in study.tiers:
             yield f"tier, {name}, {tier}", study.displacement(tier, None, amplitudes)
@@ -76,7 +74,10 @@ def tiers():
 
 def marches():
     """Every effect, and every two that differ in kind, strong enough to matter."""
-    body, gait = rft.Chain((1, 1.4, 0.8), frame="link-2"), Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
+    body, gait = (
+        rft.Chain((1, 1.4, 0.8), frame="link-2"),
+        geomech.gaits.Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)),
+    )
     kind = lambda name: name.partition(",")[0]
     pairs = [(a, b) for a, b in itertools.combinations(EFFECTS, 2) if kind(a) != kind(b)]
     for names in [(name,) for name in EFFECTS] + pairs:
@@ -90,17 +91,17 @@ def marches():
 
 def command(*args: str) -> str:
     """What a command of geomech prints; it must end well."""
-    out, before = io.StringIO(), sys.argv
-    sys.argv = ["geomech", *args]
-    try:
-        with contextlib.redirect_stdout(out):
-            cli.main()
-    except SystemExit as end:
-        if end.code:
-            raise RuntimeError(f"geomech {' '.join(args)} ended with {end.code}") from None
-    finally:
-        sys.argv = before
-    return out.getvalue()
+    code, out, err = frozen.geomech(*args)
+    if code != "0":
+        raise RuntimeError(f"geomech {' '.join(args)} ended with {code}: {err}")
+    return out
+
+
+def shipped(kind: str) -> list[str]:
+    """Names of the scenes that ship: of a "gait", an "intruder" or a "walker"."""
+    sections = command("scenes").split("\n\n")  # each but the first under a heading
+    lines = sections[("gait", "intruder", "walker").index(kind)].splitlines()
+    return [line.split()[0] for line in lines[kind != "gait" :]]
 
 
 def read(file: pathlib.Path) -> dict[str, np.ndarray]:
@@ -134,25 +135,85 @@ def intrusions():
     pose = [(0.0, 0.1, 0.3), (0.1, -0.01, 0.7), (0.0, -0.2, -1.2), (-0.3, -0.04, 2.5)]
     twist = [(1.0, 0.0, 0.0), (0.02, -0.03, 1.1), (0.0, 0.0, -2.0), (-0.1, 0.04, 0.3)]
     for (medium, stress), (name, shape) in itertools.product(STRESSES.items(), OUTLINES.items()):
-        found = rft.vertical.loads(stress, shape.outline(30), pose, twist)
+        found = loads(stress, shape.outline(30), pose, twist)
         yield f"intrusion, {medium}, {name}", np.column_stack([found.force, found.moment])
 
 
 def solids():
     """Every body of three dimensions, under the ground and across its surface, plain and with each effect."""
-    medium, place = rft.spatial.Spatial(3e5, 0.3), [(0.02, 0.1, -0.01), (-0.05, 0.0, -0.2)]
+    medium, place = Spatial(3e5, 0.3), [(0.02, 0.1, -0.01), (-0.05, 0.0, -0.2)]
     turn = Rotation.from_rotvec([(0.3, -0.7, 0.2), (1.0, 2.0, -0.4)]).as_matrix()
     effects = {name: [make(0.4)] for name, (make, _) in GROUND_EFFECTS.items()}
     for (name, body), (effect, some) in itertools.product(SOLIDS.items(), {"plain": [], **effects}.items()):
-        found = rft.spatial.wrench(medium, body.mesh(300), turn, place, [-0.3, 0.1, -0.4], [2.0, 9.0, 1.0], some)
+        found = wrench(medium, body.mesh(300), turn, place, [-0.3, 0.1, -0.4], [2.0, 9.0, 1.0], some)
         yield f"solid, {name}, {effect}", np.column_stack([found.force, found.moment, found.power])
 
 
 def walks():
     """Every robot after a cycle, and its speed in the end; steps are solved to 1e-3 of the rounding, not to the last digit."""
-    walk, coarse = rft.walking.engine("planar").walk, rft.walking.Fineness(steps=8, elements=4, rounding=0.01)
+    walk, coarse = engine("planar").walk, Fineness(steps=8, elements=4, rounding=0.01)
     for name, one in zip(WALKERS, walk(list(WALKERS.values()), coarse, 1)):
         yield f"walk, {name}", [*one.pose[-1], *one.twist[-1], one.work[-1], one.loss[-1], one.speed]
+
+
+def digest(values) -> list[float]:
+    """An array in few numbers: some of it, its root mean square, and a mean with weights, which notices any change. What is
+    below 1e-9 is rounding, or nearly."""
+    flat = np.ravel(np.array(values, float))
+    if flat.size > 12:
+        some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
+        flat = np.array([*some, np.sqrt((flat**2).mean()), (flat * np.cos(1.0 + np.arange(flat.size))).mean()])
+    return np.where(np.abs(flat) < 1e-9, 0.0, flat).tolist()
+
+
+TOGETHER = {"x": "place", "y": "place", "z": "place", "pitch": "attitude", "roll": "attitude", "yaw": "attitude"}
+
+
+def of_json(name: str, told: dict):
+    """An entry for each list of numbers, or number, of an answer; components of one vector make one."""
+    found: dict[str, list] = {}
+    for key, value in told.items():
+        if isinstance(value, dict):
+            yield from of_json(f"{name}, {key}", value)
+        elif np.array(value).dtype.kind in "if" and not re.fullmatch("seconds|residual|evaluations|kept", key):
+            found.setdefault(TOGETHER.get(key, re.sub("_[xyz]$", "", key)), []).extend(digest(value))
+    yield from ((f"{name}, {key}", values) for key, values in found.items())
+
+
+def intruders():
+    """The intruder scenes that ship, as they are."""
+    for name in shipped("intruder"):
+        yield from of_json(f"intruder, {name}", json.loads(command("intrude", name, "--json")))
+
+
+def walkers():
+    """The robots that ship, coarsely: a fifth of a second, in few steps."""
+    coarse = "[numerics]\nsteps = 8\nelements = 4\nrounding = 0.02\nduration = 0.2\n"
+    with tempfile.TemporaryDirectory() as folder:
+        for name in shipped("walker"):
+            text = re.sub(r"\[numerics\][^[]*", "", command("scenes", "--show", name))
+            (pathlib.Path(folder) / f"{name}.toml").write_text(f"{text}\n{coarse}")
+            told = json.loads(command("walk", f"{folder}/{name}.toml", "--json"))
+            yield from of_json(f"walker, {name}", told)
+
+
+def measurements():
+    """Tables and measured gaits of data/frozen: what they predict, and what is fitted to measurements."""
+    lines = {
+        "table.toml": "displacement table.toml --amplitudes 0.4,0.8 --json",
+        "matrix.toml": "displacement matrix.toml --amplitudes 0.4,0.8 --json",
+        "snake.toml": "displacement snake.toml --amplitudes 0.5,1 --json",
+        "log.csv": "fit log.csv --harmonics 1 --json",
+        "plates.csv": "calibrate plates.csv --json",
+        "push.csv": "calibrate push.csv --json",
+        "rod.csv": "calibrate rod.csv --json",
+    }
+    with frozen.place():
+        for name, line in lines.items():
+            told = json.loads(command(*line.split()))
+            if "--amplitudes" in line:  # the rest says these numbers again
+                told = {key: told[key] for key in (*told["estimate"], "estimate")}
+            yield from of_json(f"measured, {name}", told)
 
 
 # The quick ones first, each with what the names of its entries begin with.
@@ -163,7 +224,10 @@ PARTS = {
     marches: ("march",),
     intrusions: ("intrusion",),
     solids: ("solid",),
-    walks: ("walk",),
+    walks: ("walk,",),
+    intruders: ("intruder",),
+    walkers: ("walker",),
+    measurements: ("measured",),
 }
 
 
@@ -191,7 +255,9 @@ def change(old: list[float] | None, new: list[float] | None) -> float:
 def changed(old: dict, new: dict) -> dict[str, float]:
     """Entries that are not what they were, and by how much."""
     every = {name: change(old.get(name), new.get(name)) for name in sorted({*old, *new})}
-    loose = lambda name: name.endswith("estimate") or name.startswith("walk,")
+    loose = lambda name: (
+        "estimate" in name or name.startswith(("walk", "measured, log", "measured, rod", "measured, plates"))
+    )
     return {k: x for k, x in every.items() if not x <= (OF_ESTIMATES if loose(k) else TOLERANCE)}
 
 
@@ -221,8 +287,8 @@ if __name__ == "__main__":
     print(table(old, new))
     if "--write" in sys.argv[1:]:
         write(old, new)
-        print(
-            f"recorded in {FILE}; raise rft.SOLVER too (now {rft.SOLVER}): unfinished sweeps of before are not gone on with"
-        )
+        frozen.write()
+        raised = f"raise rft.SOLVER too (now {rft.SOLVER}): unfinished sweeps of before are not gone on with"
+        print(f"recorded in {FILE.parent}; {raised}")
     elif changed(old, new):
         sys.exit("not as recorded; if that is meant: python tests/golden.py --write")

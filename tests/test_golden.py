@@ -31,6 +31,15 @@ def test_nothing_changed_that_nobody_meant_to_change(part, least):
         )
 
 
+@pytest.mark.parametrize(
+    ("part", "least"),
+    [(golden.intruders, 40), (golden.walkers, 20), (golden.measurements, 80)],
+    ids=lambda x: getattr(x, "__name__", ""),
+)
+def test_nor_of_what_ships_and_was_measured(part, least):
+    test_nothing_changed_that_nobody_meant_to_change(part, least)
+
+
 def test_the_comparison_notices(tmp_path, monkeypatch):
     """A change in the twelfth digit of the largest number, a missing, a new and a shorter entry; and not less than that."""
     old = {"a": [1.0, -200.0], "b": [0.0], "c": [1.0], "d": [1.0, 2.0], "e, estimate": [1.0]}

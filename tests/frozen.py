@@ -1,0 +1,577 @@
+"""Frozen words and files: what commands print, write and refuse, kept under data/ beside the numbers of `golden`.
+
+    python tests/golden.py --write    records these, too; entries that still hold stay as they are
+
+commands.txt has command lines with their output and what they wrote, refusals.toml what is refused and what its message
+names, keys.txt every key of a scene file, the schema and the names in Python. They are run in a copy of data/frozen,
+which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later ones read them.
+
+Names, numbers, keys and exit codes are fixed, wording is free: of a text its numbers count, in their order, and the
+names in it, of a refusal what it names and that it says what to do. Times and facts of the machine are masked. Everything
+goes through the command line, files and names of `geomech`; a move of modules needs changes in `namespace` at most.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import itertools
+import json
+import math
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import tomllib
+import warnings
+from collections.abc import Iterator
+from unittest import mock
+
+import numpy as np
+import typer.main
+from scipy.io import loadmat, netcdf_file
+
+DATA = pathlib.Path(__file__).parent / "data"
+FOLDER, COMMANDS, REFUSALS, KEYS = DATA / "frozen", DATA / "commands.txt", DATA / "refusals.txt", DATA / "keys.txt"
+TOLERANCE, FLOOR = 1e-6, 1e-9  # relative, of the largest number of a line; what is smaller is rounding
+
+# The files in data/frozen that a command wrote, and which; `python tests/frozen.py --files` writes them anew.
+FILES = {
+    "field.nc": "connection swim.toml --grid 5 -o field.nc",
+    "field.mat": "connection swim.toml --grid 5 -o field.mat --sign - --order meshgrid",
+    "sand.toml": "calibrate dem-rod-drag -o sand.toml",
+    "grains.toml": "calibrate plates.csv -o grains.toml",
+    "best.toml": "optimize three-link-viscous --for efficiency --harmonics 1 -o best.toml",
+}
+
+
+# What a command does.
+
+MADE = functools.cache(typer.main.get_command)  # 20 ms, and the same each time
+
+
+def geomech(*args: str) -> tuple[str, str, str]:
+    """(exit code, standard output, standard error) of a command in this process."""
+    from geomech import cli
+
+    out, err, before = io.StringIO(), io.StringIO(), sys.argv
+    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    sys.argv = ["geomech", *args]
+    try:
+        made = mock.patch.object(typer.main, "get_command", MADE)
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), made:
+            cli.main()
+    except SystemExit as left:
+        return str(left.code or 0), out.getvalue(), err.getvalue()
+    except Exception as fault:  # of the program, whose traceback Python prints
+        return f"raises {type(fault).__name__}", out.getvalue(), err.getvalue()
+    finally:
+        sys.argv = before
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    raise AssertionError("a command ends by SystemExit")
+
+
+@contextlib.contextmanager
+def place() -> Iterator[pathlib.Path]:
+    """A copy of data/frozen, in which commands run."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        here = pathlib.Path(shutil.copytree(FOLDER, folder, dirs_exist_ok=True))
+        (here / "folder").mkdir()
+        (here / "loop").symlink_to("loop")
+        yield here
+
+
+# Words: names and numbers.
+
+PLAIN_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.I)
+WORD = re.compile(r"[^\s()\[\]{},;:=<>|*/^\"'`]+")
+UNITS = {"BL", "m", "rad", "deg", "degrees", "s", "Hz", "N", "J", "W", "kg", "Pa", "N/cm^3", "N/m^3", "kg/m^3", "m/s"}
+LISTED = {  # words of an answer that programs look for
+    "area", "adapted", "path", "harmonic", "direct", "sliding", "stuck", "walking", "algebraic", "planar", "mujoco",
+    "granular", "viscous", "coulomb", "circle", "ellipse", "butterfly", "fourier", "points", "chain", "serpenoid",
+}  # fmt: skip
+FILE = re.compile(r"[\w./~-]*\w\.(?:toml|nc|mat|csv|png|svg|pdf|gif|mp4|json|txt|stl|obj|ply|xml|py)\b")
+OPTION = re.compile(r"(?<![\w-])--?[a-z][\w-]*")
+QUOTED = re.compile(r"(?<!\w)'([^']+)'(?!\w)|`([^`]+)`|\"([^\"]+)\"")
+CODE = re.compile(r"(?<![\w.])[A-Za-z]\w*_\w+|\b[A-Za-z]+\d\w*")
+# Not the same twice: times, and how a solver came to its end.
+MASKS = [
+    (r"^back end: .*$", "back end: #"),
+    (r"^seconds: .*$", "seconds: #"),
+    (r"\d+ cycles evaluated in [\d.]+ s", "# cycles evaluated in # s"),
+    (r"^ +1e-\d\d  .*$", " #"),
+    (r"[\d.]+ times the time", "# times the time"),
+    (r"residual [\d.e+-]+, \d+ iterations", "residual #, # iterations"),
+    (r"about [\d.]+ (s|min|h|days|years)\b", "about #"),
+    (r"\b[\d,.]+ [kMGT]?B of memory", "# of memory"),
+    (rf"(/private)?{re.escape(tempfile.gettempdir())}/tmp\w+", "#"),
+]
+MASKED_KEYS = re.compile(r"(^|\.)(seconds|evaluations|iterations|residual|kept)($|\.)")
+
+
+def masked(text: str) -> str:
+    for pattern, put in MASKS:
+        text = re.sub(pattern, put, text, flags=re.M)
+    return text
+
+
+def number_of(word: str) -> float | None:
+    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is none."""
+    word = word.removeprefix("+-").rstrip(".%?!").removesuffix("deg")
+    return float(word) if PLAIN_NUMBER.fullmatch(word) else None
+
+
+def numbers(text: str) -> list[tuple[float, float]]:
+    """Every number in a text with one unit of its last decimal, 0 if it has none, in their order."""
+    found = []
+    for word in WORD.findall(text):
+        if (x := number_of(word)) is not None:
+            digits, _, power = word.rstrip(".%?!").removesuffix("deg").lower().partition("e")
+            decimals = len(digits.partition(".")[2])
+            found.append((x, 10.0 ** (int(power or 0) - decimals) if decimals else 0.0))
+    return found
+
+
+def names(text: str) -> set[str]:
+    """What a text calls by name: options, files, what stands in quotes or looks like code, units, and `LISTED`."""
+    words = {word.rstrip(".") for word in WORD.findall(text)} | set(re.findall(r"[^\s(),;:]+", text))
+    quoted = {next(filter(None, found)) for found in QUOTED.findall(text)}
+    return {*OPTION.findall(text), *FILE.findall(text), *CODE.findall(text), *quoted, *(words & (UNITS | LISTED))}
+
+
+def near(one: float, other: float, unit: float = 0.0, size: float = 0.0) -> bool:
+    """Equal, but for a last digit or rounding."""
+    if not (math.isfinite(one) and math.isfinite(other)):
+        return one == other or (math.isnan(one) and math.isnan(other))
+    return abs(one - other) <= max(1.01 * unit, TOLERANCE * max(abs(one), abs(other), size), FLOOR)
+
+
+def text_holds(old: str, new: str) -> bool:
+    """Whether the numbers of a text are as they were, and what it named is named."""
+    was, now = numbers(old), numbers(new)
+    same = len(was) == len(now) and all(near(a, b, unit) for (a, unit), (b, _) in zip(was, now))
+    return same and names(old) <= names(new)
+
+
+def line_holds(old: str, new: str) -> bool:
+    """Whether a line of a structure is the same but for the digits of its numbers."""
+    if old == new:
+        return True
+    was, now = numbers(old), numbers(new)
+    size = max((abs(x) for x, _ in was), default=0.0)
+    bare = lambda text: WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], text)
+    return bare(old) == bare(new) and all(near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now))
+
+
+# Structures: JSON and files, as lines.
+
+
+def short(x) -> str:
+    return x if isinstance(x, str) else f"{x:.8g}" if isinstance(x, (float, np.floating)) else str(x)
+
+
+def of_array(values) -> str:
+    """An array on a line: all of up to twelve numbers; of more its shape, some of them, the root mean square, and a sum with
+    alternating weights, which tells what moved."""
+    array = np.asarray(values)
+    flat = array.ravel()
+    if flat.dtype.kind not in "iufb" or flat.size <= 12:
+        return " ".join(map(short, flat.tolist())) if array.ndim else short(array.item())
+    flat = flat.astype(float)
+    some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
+    good = np.nan_to_num(flat)
+    mean = [np.sqrt((good**2).mean()), (good * np.cos(1.0 + np.arange(good.size))).mean()]
+    return f"{'x'.join(map(str, array.shape))} numbers: {' '.join(map(short, [*some, *mean]))}"
+
+
+def flat(value, path: str = "") -> Iterator[str]:
+    """JSON or TOML as lines "path = value", numbers of a list together."""
+    if isinstance(value, dict) and value:
+        for key, inner in value.items():
+            yield from flat(inner, f"{path}.{key}" if path else str(key))
+    elif MASKED_KEYS.search(path):
+        yield f"{path} = #"
+    elif isinstance(value, list) and not is_array(value):
+        for k, inner in enumerate(value):
+            yield from flat(inner, f"{path}[{k}]")
+    else:
+        yield f"{path} = {of_array(value) if isinstance(value, list) else short(value)}"
+
+
+def is_array(value: list) -> bool:
+    try:
+        return np.asarray(value).dtype.kind in "iufU"
+    except ValueError:
+        return False
+
+
+def of_text(name: str, text: str) -> Iterator[str]:
+    """An attribute: a scene in TOML by its keys, other text as it is."""
+    try:
+        yield from (f"= {line}" for line in flat(tomllib.loads(text), name) if "\n" in text)
+    except tomllib.TOMLDecodeError:
+        yield f"~ {name} = {' '.join(text.split())}"
+    else:
+        if "\n" not in text:
+            yield f"~ {name} = {text}"
+
+
+def of_netcdf(file: pathlib.Path) -> Iterator[str]:
+    with netcdf_file(file, mmap=False) as data:
+        decoded = lambda x: x.decode() if isinstance(x, bytes) else x
+        for key in sorted(data._attributes):
+            yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
+        for name in sorted(data.variables):
+            variable = data.variables[name]
+            yield f"= {name}({', '.join(f'{d} {n}' for d, n in zip(variable.dimensions, variable.shape))}) " + (
+                f"{variable.data.dtype.kind}{variable.data.dtype.itemsize} in {decoded(getattr(variable, 'units', b'-'))}"
+            )
+            for key in sorted(set(variable._attributes) - {"units"}):
+                yield f"~ {name}:{key} = {decoded(variable._attributes[key])}"
+            text = variable.data.dtype.kind == "S"
+            rows = [b"".join(row).decode() for row in variable.data] if text else variable.data
+            yield f"= {name} = {' '.join(rows) if text else of_array(np.array(rows))}"
+
+
+def of_file(file: pathlib.Path) -> Iterator[str]:
+    """What is in a file, as lines: "= " of structure, "~ " of text."""
+    match file.suffix:
+        case ".nc":
+            yield from of_netcdf(file)
+        case ".mat":
+            for key, value in sorted(loadmat(file).items()):
+                if not key.startswith("__"):
+                    yield f"= {key} {value.dtype.kind}{value.dtype.itemsize} = {of_array(value)}"
+        case ".toml":
+            yield from (f"= {line}" for line in flat(tomllib.loads(masked(file.read_text()))))
+        case ".json":
+            yield from (f"= {line}" for line in flat(json.loads(masked(file.read_text()))))
+        case ".csv":
+            rows = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+            yield f"= {len(rows)} lines of {rows[0]}"
+            with contextlib.suppress(ValueError):
+                for name, column in zip(rows[0].split(","), np.array([row.split(",") for row in rows[1:]], float).T):
+                    yield f"= {name} = {of_array(column)}"
+        case ".png" | ".gif" | ".pdf" | ".svg":
+            begin = file.read_bytes()[:6]
+            kinds = {b"\x89PNG\r\n": "PNG", b"GIF89a": "GIF", b"%PDF-1": "PDF", b"<?xml ": "XML"}
+            yield f"= {kinds.get(begin, 'something else')}"
+        case _:
+            yield from (f"~ {line}" for line in masked(file.read_text()).splitlines() if line)
+
+
+# commands.txt
+
+
+def ran(line: str) -> list[str]:
+    """A command in the folder where we are, or several with " ; " between them, and what came of it, as lines."""
+    if " ; " in line:
+        return [told for part in line.split(" ; ") for told in ran(part)]
+    before = {p: p.stat().st_mtime_ns for p in pathlib.Path().rglob("*") if p.is_file()}
+    code, out, err = geomech(*shlex.split(line))
+    told = []
+    if line.endswith("--help"):
+        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*(?: <[^>]*>)?|[a-z]+)(?:  |$)", out, re.M)]
+    else:
+        try:
+            told += [f"= {x}" for x in flat(json.loads(out))]
+        except ValueError:
+            told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
+    told += [f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))]
+    for file in sorted(p for p in pathlib.Path().rglob("*") if p.is_file() and before.get(p) != p.stat().st_mtime_ns):
+        told += [f"> {file}", *of_file(file)]
+    return [*told, f"exit {code}"]
+
+
+def ran_apart(lines: list[str]) -> list[list[str]]:
+    """`ran` by a process of its own: what a --plugin registers would stay in this one."""
+    path = os.pathsep.join([str(DATA.parents[1]), os.environ.get("PYTHONPATH", "")])
+    asked = [sys.executable, __file__, "--apart", *lines]
+    told = subprocess.run(asked, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path})
+    return json.loads(told.stdout.splitlines()[-1])
+
+
+def outcomes(lines: list[str]) -> dict[str, list[str]]:
+    """What comes of commands, each in a fresh copy of data/frozen."""
+    apart = [line for line in lines if "--plugin" in line]
+    found = {}
+    for line in lines:
+        if line not in apart:
+            with place():
+                found[line] = ran(line)
+    if apart:
+        with place():
+            found |= zip(apart, ran_apart(apart))
+    return {line: found[line] for line in lines}
+
+
+def read_commands() -> dict[str, list[str]]:
+    """What is recorded of every command."""
+    found: dict[str, list[str]] = {}
+    for line in COMMANDS.read_text().splitlines():
+        if line.startswith("$ geomech "):
+            found[line.removeprefix("$ geomech ")] = lines = []
+        elif line and not line.startswith("#"):
+            lines.append(line)
+    return found
+
+
+def parts(lines: list[str]) -> list[str]:
+    """Lines as they count: what is printed as one text, all others by themselves."""
+    printed = "\n".join(line for line in lines if line.startswith("| "))
+    return [*([printed] if printed else []), *(line for line in lines if not line.startswith("| "))]
+
+
+def differs(old: list[str], new: list[str]) -> str:
+    """What of a command's outcome is not as it was; "" where that is at most wording."""
+    was, now = parts(old), parts(new)
+    for a, b in itertools.zip_longest(was, now, fillvalue="nothing"):
+        if a[:1] != b[:1] or not (text_holds(a, b) if a[0] in "|!~" else line_holds(a, b)):
+            return f"was {a}\nnow {b}"
+    return ""
+
+
+# refusals.txt: under [a command, and the file that is changed] what is done to that, under [geomech] whole commands, under
+# [python] expressions; each with how it ends, what its message names, and "cure" where that says what to do.
+
+CURE = re.compile(  # words of a cure, or of what a value must be
+    r"\?$|did you mean|\b(must|such as|possible|takes?|use|give|say|add|put|write|raise|lower|widen|leave|drop|keep|choose"
+    r"|name|close|check|install|wait|start|turn|split|end|see|mend|clean|shrink|convert|restore|rename|copy|needs?|belongs"
+    r"|from|only|at least|at most|one of|in place of|it has|too few|order|below|above|beyond|within)\b",
+    re.I,
+)
+ORDINARY = {  # words of a sentence as much as of a scene
+    "body", "gait", "medium", "motion", "robot", "system", "file", "a", "of", "the", "to", "in", "on", "and", "no", "from", "x",
+    "kind", "law", "name", "effects", "numerics", "array", "format", "text", "not", "one", "is", "type", "with", "header", "be",
+}  # fmt: skip
+TYPES = {
+    "array",
+    "float",
+    "int",
+    "str",
+    "bool",
+    "object",
+    "null",
+    "float | null",
+    "s",
+    "m",
+}  # words for what a key takes
+ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "\\": b"\\"}
+
+
+def namespace() -> dict:
+    """Names that refusals from Python are written in."""
+    import geomech as top
+    import rft
+
+    found: dict = {"np": np, "math": math, "rft": rft, "geomech": top}
+    for module in (rft, top.systems, top.gaits, top.bodies, top.media, top.effects):
+        found |= {name: x for name, x in vars(module).items() if isinstance(x, type)}
+    return found | {name: getattr(top, name) for name in dir(top) if not name.startswith("_")}
+
+
+def raw(text: str) -> bytes:
+    """A side of an edit as bytes: \\n, \\r, \\t, \\0, \\\\ and \\xNN are escapes."""
+    pieces = re.split(r"\\(x[0-9a-f]{2}|.)", text)
+    return b"".join(
+        piece.encode() if not k % 2 else bytes.fromhex(piece[1:]) if len(piece) == 3 else ESCAPES[piece]
+        for k, piece in enumerate(pieces)
+    )
+
+
+def edited(content: bytes, edits: str) -> bytes:
+    """What a file holds after "old => new", the first time that old is there; "* => new" replaces all of it, " => new" is
+    added at its end, and " && " goes between several."""
+    for edit in edits.split(" && "):
+        old, _, new = edit.partition("=>")
+        old, new = raw(old.strip(" ")), raw(new.strip(" "))
+        assert old == b"*" or old in content, f"{old!r} is not there to be changed"
+        content = new if old == b"*" else content.replace(old, new, 1) if old else content + new
+    return content
+
+
+def refused(section: str, case: str) -> tuple[str, str]:
+    """(exit code, or the error's class; the message) of a case."""
+    if section == "python":
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                eval(case, namespace())
+        except Exception as error:
+            kind = next(c for c in type(error).__mro__ if c.__module__ == "builtins")
+            return kind.__name__, str(error)
+        return "nothing", ""
+    if section == "geomech":
+        code, _, err = geomech(*shlex.split(case))
+    else:
+        command, _, name = section.partition(" | ")
+        file = pathlib.Path(name or next(word for word in command.split() if (FOLDER / word).is_file()))
+        before = file.read_bytes()
+        try:
+            file.write_bytes(edited(before, case))
+            code, _, err = geomech(*shlex.split(command))
+        finally:
+            file.write_bytes(before)
+    return code, " ".join(line for line in masked(err).splitlines() if line.startswith("error: "))
+
+
+def named(message: str, given: str) -> list[str]:
+    """What a refusal calls by name, in its order: what `names` finds, [sections], numbers, words and keys that were given."""
+    given = given.replace("\\n", " ")
+    words = {*re.findall(r"[A-Za-z][\w-]+", given), *re.findall(r"(\w+) =", given)} - ORDINARY
+    words &= set(re.findall(r"[A-Za-z](?:[\w-]*\w)?", message))
+    found = {word.strip("./") for word in names(message) | words} | set(re.findall(r"\[+[a-z.]+\]+", message))
+    found = {
+        word
+        for word in found
+        if 0 < len(word) <= 60 and not re.search("#|_plugin_", word) and (word[1:] or word in words)
+    } - TYPES
+    figures = {word.rstrip(".%") for word in WORD.findall(message) if number_of(word) is not None}
+    found = {word for word in found if not any(word in other for other in found - {word})} | figures
+    return sorted(found, key=lambda word: (message.find(word), word))[:14]
+
+
+def outcome(section: str, case: str) -> str:
+    """A case's end as it is recorded."""
+    code, message = refused(section, case)
+    cure = " cure" * bool(CURE.search(message.partition(": ")[2] or message))
+    return f"{code} {json.dumps(named(message, f'{section} {case}'), ensure_ascii=False)}{cure}"
+
+
+def still(recorded: str, section: str, case: str) -> str:
+    """What of a case is not as it was, "" for nothing: its end, a name that is named no more, a cure that is missing."""
+    code, message = refused(section, case)
+    was, _, rest = recorded.partition(" ")
+    wanted, end = json.JSONDecoder().raw_decode(rest)
+    values = [x for x, _ in numbers(message)]
+    lost = [
+        name
+        for name in wanted
+        if name not in message and not ((x := number_of(name)) is not None and any(near(x, y) for y in values))
+    ]
+    if code != was:
+        return f"ends with {code} in place of {was}: {message}"
+    if lost:
+        return f"does not name {', '.join(lost)}: {message}"
+    return f"says no cure: {message}" if rest[end:] and not CURE.search(message) else ""
+
+
+def read_refusals() -> dict[tuple[str, str], str]:
+    """(section, case): what is recorded of it, "" for a case that is new."""
+    found, section = {}, ""
+    for line in REFUSALS.read_text().splitlines():
+        if line.startswith("[") and line.endswith("]"):
+            section = line[1:-1]
+        elif line and not line.startswith("#"):
+            case, _, recorded = line.partition(" :: ")
+            found[section, case] = recorded
+    return found
+
+
+# keys.txt: what scenes may say, and programs lean on.
+
+
+def keys() -> Iterator[str]:
+    """Every key of a scene file with its type, unit and default; the schema, less its descriptions; names in Python."""
+    import geomech as top
+
+    table = ""
+    for line in geomech("keys")[1].splitlines():
+        if line.startswith("  ") and (found := re.match(r"  (\w+)  +(\S.*?)  +(\S.*?)  +(\S.*?)(?:  |$)", line)):
+            yield f"key {table}: {' | '.join(found.groups())}"
+        elif line.startswith("["):
+            table = line
+        elif line == "above all tables":
+            table = "[]"
+    yield from (
+        f"schema {line}".replace("/$defs/", "") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
+    )
+    yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
+
+
+def of_schema(node, path: str = "") -> Iterator[str]:
+    """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
+    a list by their kind where they have one."""
+    text = compact(undescribed(node))
+    if len(text) <= 200 or not isinstance(node, (dict, list)):
+        yield f"{path} {text}"
+    elif isinstance(node, list):
+        for k, inner in enumerate(node):
+            yield from of_schema(inner, f"{path}/{kind_of(inner) or k}")
+    else:
+        small = {k: x for k, x in undescribed(node).items() if len(compact(x)) <= 60}
+        yield f"{path} {compact(small)}"
+        for key in sorted(set(node) - set(small) - {"description"}):
+            yield from of_schema(node[key], f"{path}/{key}".replace("/properties", "").replace("/oneOf", ""))
+
+
+def compact(node) -> str:
+    return json.dumps(node, sort_keys=True, separators=(",", ":"))
+
+
+def kind_of(node: dict) -> str:
+    consts = [x["const"] for x in node.get("properties", {}).values() if isinstance(x, dict) and "const" in x]
+    return " ".join(consts)
+
+
+def undescribed(node):
+    if isinstance(node, dict):
+        return {k: undescribed(x) for k, x in node.items() if k != "description" or not isinstance(x, str)}
+    return [undescribed(x) for x in node] if isinstance(node, list) else node
+
+
+# All of it.
+
+
+def words_of(lines: list[str]) -> list[str]:
+    """Lines without their numbers, to see whether wording changed."""
+    return [WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], line) for line in lines]
+
+
+def write(say=print) -> None:
+    """Records all that does not hold, and new wording; what holds keeps its digits and names."""
+    lines = [line for line in COMMANDS.read_text().splitlines() if line.startswith("#")]
+    recorded = read_commands()
+    for command, new in outcomes(list(recorded)).items():
+        old = recorded[command]
+        if found := differs(old, new):
+            say(f"geomech {command}: {found if old else 'new'}")
+        lines += [f"$ geomech {command}", *(new if found or words_of(old) != words_of(new) else old)]
+    COMMANDS.write_text("\n".join(lines) + "\n")
+    lines, last = [line for line in REFUSALS.read_text().splitlines() if line.startswith("#")], ""
+    with place():
+        for (section, case), old in read_refusals().items():
+            if not old or (found := still(old, section, case)):
+                say(f"[{section}] {case}: {found if old else 'new'}")
+                old = outcome(section, case)
+            lines += [f"[{section}]"] * (section != last) + [f"{case} :: {old}"]
+            last = section
+    REFUSALS.write_text("\n".join(lines) + "\n")
+    old, new = KEYS.read_text().splitlines() if KEYS.exists() else [], list(keys())
+    for sign, some in (("no more", set(old) - set(new)), ("new", set(new) - set(old))):
+        for line in sorted(some):
+            say(f"{sign}: {line}")
+    KEYS.write_text("\n".join(new) + "\n")
+
+
+def write_files() -> None:
+    """Writes `FILES` anew, into data/frozen."""
+    with place() as here:
+        for name, command in FILES.items():
+            code, _, err = geomech(*command.split())
+            assert code == "0", err
+            shutil.copy(here / name, FOLDER / name)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--apart"]:
+        print(json.dumps([ran(line) for line in sys.argv[2:]]))
+    elif sys.argv[1:] == ["--files"]:
+        write_files()
