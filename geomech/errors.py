@@ -73,7 +73,7 @@ def named(place: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        if str(error).startswith((f"{place}: ", f"{line(place)}: ")):
+        if str(error).startswith((f"{place}: ", f"{line(str(place))}: ")):
             raise
         raise SceneError(f"{place}: {error}") from None
 

@@ -308,7 +308,7 @@ SIDES = np.array([
         (CUBE, np.concatenate([SIDES, SIDES[:1]]), "doubles"),
         (CUBE, np.concatenate([SIDES[:-1], [(1, 1, 3)]]), "no area"),
         (CUBE * np.nan, SIDES, "finite"),
-        (CUBE[:-1], SIDES, "name vertex 7"),
+        (CUBE[:-1], SIDES, "names vertex 7"),
         (CUBE[:, :2], SIDES, r"\(V, 3\)"),
         (CUBE, SIDES[:, :2], r"\(F, 3\)"),
         (CUBE, SIDES[:0], "1 to"),
