@@ -168,14 +168,62 @@ def test_more_harmonics_bring_more_and_converge():
     assert values[3] - values[2] < 0.1 * (values[2] - values[0])
 
 
-def test_a_gait_in_sand_beats_nelder_mead():
-    """0.336 BL, six coefficients from the butterfly; here from the circle, within 3 rad."""
-    found = optimise(geomech.load("three-link-glass"), "displacement", within=3.0)
-    assert found.value > 0.336 + found.estimate
-    assert Stroke.is_one(found.request.loops, found.request.loops.of(found.gait))
-    assert found.active == ()
-    assert np.abs(found.gait.cycle(2000)[0]).max() <= 3.0 + 1e-9
-    assert abs(found.best.displacement[2]) < 0.02
+@pytest.fixture(scope="module", params=[("displacement", 2.5), ("displacement", 3.0), ("efficiency", 2.5)], ids=str)
+def sand(request):
+    aim, within = request.param
+    return optimise(geomech.load("three-link-glass"), aim, within=within)
+
+
+LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.223}
+
+
+def test_best_gaits_in_sand(sand):
+    """As good as the best of 250 random starts without rules between phases (0.4435, 0.6986, 0.2237), less what these cost."""
+    asked = sand.request.aim.name, sand.request.loops.within
+    assert sand.value > LEAST[asked]
+    assert sand.value == sand.answers[0][0]
+    assert len(sand.active) == (4 if asked[0] == "displacement" else 2)
+    assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
+    assert sum(times for _, times in sand.answers + sand.others) == 9 + 4
+    told = optima.text(sand)
+    assert "9 starts, and 4 that narrower limits led to, answers that differ: " in told
+    assert "by a table alone, less: " in told
+    assert sand.numbers()["answers"] == [list(x) for x in sand.answers + sand.others]
+
+
+def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
+    """At every phase: the angle about the centre, by itself."""
+    p = sand.request.loops.of(sand.gait)
+    u, v = (series.waves(20_000, 5)[:, 1:] @ p[1:]).T
+    steps = np.angle((np.roll(u, -1) + 1j * np.roll(v, -1)) * (u - 1j * v))
+    steps = steps * np.sign(steps.sum())
+    assert steps.min() >= 0
+    assert steps.sum() == pytest.approx(2 * np.pi)
+
+
+def test_best_gaits_in_sand_turn_no_more_than_the_scene_and_so_have_one_net_distance(sand):
+    assert abs(sand.start.displacement[2]) < 1e-12
+    assert abs(sand.best.displacement[2]) < 1e-8
+    far = np.hypot(*sand.best.displacement[:2])
+    for frame in ("link-1", "link-2", "link-3"):
+        system = Swimmer(SAND, Chain((1, 1, 1), frame=frame))
+        net = displacement(system.velocity(*sand.gait.cycle(sand.request.phases)))
+        assert np.hypot(*net[:2]) == pytest.approx(far, abs=1e-7)
+
+
+def test_a_stroke_goes_back_nowhere_between_phases():
+    """Of e^(i t) + b e^(-3 i t) the sweep is 1 - 3 b^2 - 2 b cos 4 t: here above 0 at all 32 phases and below it between."""
+    loops, b = Loops(2, 3, 2.5, 32), 0.34
+    p = np.zeros(loops.shape)
+    p[1], p[2], p[5], p[6] = (1.0, 0.0), (0.0, 1.0), (b, 0.0), (0.0, -b)
+    q = series.shifted(p, np.pi / 32)
+    (u, v), (du, dv) = (x.T for x in loops.cycle(q))
+    assert (u * dv - v * du).min() == pytest.approx(1 - 3 * b**2 - 2 * b * np.cos(np.pi / 8))
+    assert (u * dv - v * du).min() > 0.02
+    assert Stroke(loops, q).swept(q).min() == pytest.approx(1 - 3 * b**2 - 2 * b, abs=1e-9)
+    assert not Stroke.is_one(loops, q)
+    q[5:] *= 0.333 / b
+    assert Stroke.is_one(loops, q)
 
 
 def test_limits_hold_and_are_named():
@@ -265,6 +313,21 @@ def test_loops_that_are_one():
     assert loops.of(gait) == pytest.approx(p, abs=1e-12)
 
 
+def test_starts_go_along_the_limits_where_many_a_loop_is_the_best_near_by():
+    """By default: in sand, of which those that others are in a mirror are left out; in a fluid the scene's gait alone."""
+    lopsided = ((-2.5, 1.0), (-2.5, 2.5))
+    assert checked(viscous(), "displacement").starts == 1
+    assert checked(geomech.load("three-link-glass"), "displacement").starts == 9
+    asked = checked(geomech.load("three-link-glass"), "displacement", within=lopsided)
+    assert asked.starts == 11
+    _, rim, *others = asked.loops.starts(asked.loops.of(Circle()), 11)
+    assert asked.loops.active(rim) == ["alpha_1 >= -2.5", "alpha_1 <= 1", "alpha_2 >= -2.5", "alpha_2 <= 2.5"]
+    for p in (rim, *others):
+        assert Stroke.is_one(asked.loops, p)
+        low, high = asked.loops.reach(p)
+        assert (low >= asked.loops.box[0]).all() and (high <= asked.loops.box[1]).all()
+
+
 def test_starts_are_the_same_every_time_and_answers_are_counted():
     found = optimise(viscous(), harmonics=2, within=1.4, starts=3)
     assert sum(count for _, count in found.answers) == 3
@@ -285,7 +348,7 @@ def serpenoid(body=None):
     "body", [Serpenoid(elements=8, waves=1.0), ConstantCurvature(elements=8)], ids=["modes", "arcs"]
 )
 def test_bodies_of_few_shape_variables(body):
-    found = optimise(serpenoid(body), "efficiency", harmonics=2)
+    found = optimise(serpenoid(body), "efficiency", harmonics=2, starts=1)
     assert found.value > 1.02 * found.start.value
     assert found.best.length == found.best.work
     assert np.abs(found.gait.cycle(500)[0]).max() <= 7.0
@@ -392,7 +455,7 @@ def test_where_one_sense_brings_more_it_is_the_one_found():
     found = optimise(scene, harmonics=1, within=1.2)
     back = found.request.loops.gait(series.reversed_(found.request.loops.of(found.gait)))
     assert found.value > 0.48 > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
-    assert len(found.answers) == 2
+    assert len(found.answers) > 1
 
 
 def test_a_cycle_without_slopes_is_that_with():
@@ -445,7 +508,7 @@ def test_the_loop_on_the_map(stroke, cheap, tmp_path):
     assert share(short, "limit") > 0.15
     field = along(stroke)
     assert field.values[0, 15, 15] == pytest.approx(0.0204, abs=2e-4)  # against the sense of the CCF's x
-    for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1), "three.png")):
+    for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png")):
         plots.save(plots.optimum_figure(found), tmp_path / name)
         assert (tmp_path / name).stat().st_size > 10_000
 
@@ -510,6 +573,7 @@ def test_strokes():
     assert not Stroke.is_one(loops, twice)
     assert not Stroke.is_one(loops, loops.of(Ellipse(semi_axes=(1.0, 0.01))))
     assert not Stroke.is_one(loops, back + twice)
+    round_[5] += 0.1  # else its sweep is the same all round, and least nowhere
     way, h = np.random.default_rng(0).normal(size=round_.shape), 1e-6
     rise = (own.swept(round_ + h * way) - own.swept(round_ - h * way)) / (2 * h)
     assert (own.slopes(round_) * way).sum((1, 2)) == pytest.approx(rise, abs=1e-8)
@@ -607,7 +671,7 @@ def test_several_answers_are_told_from_one_found_again():
     assert found.value == values[0] > 1.01 * values[1]
     edge = np.arccos(-0.2 / 3) / 3  # of the strip in the middle, which is 4 rad long
     middle = 2 * (np.sin(3 * edge) + 0.2 * edge) * 4
-    assert 0.8 * middle < values[1] < middle
+    assert any(0.8 * middle < value < middle for value in values[1:])
 
 
 def test_all_starts_keep_off_singular_shapes():

@@ -25,6 +25,11 @@ from geomech.systems.base import Premise, System
 JOINTS = 12  # more make more numbers than a search without a model of them can find
 PHASES = 128  # of a cycle in the search
 FINISHED = 3  # answers of the table that the direct tier goes on from
+BESIDE, MORE = (
+    (0.1, 0.2),
+    3,
+)  # rad, if joints have 2.5: how far off the best it goes on beside it, by the table first from the
+# second; and from how many loops each
 SHARE, LED = 0.8, 4  # of the limits: narrower ones, that the search begins within; and how many of its answers lead on
 ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
 NEAR, FINISH, POLISH, RUNS = (
@@ -133,7 +138,8 @@ class Request:
         jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
             jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
-            steps = finished * FINISH + POLISH * self.phases / loops.phases
+            polished = 1 + 2 * MORE * (self.starts > 1)
+            steps = finished * FINISH + polished * POLISH * self.phases / loops.phases
         else:
             steps = self.starts * (RUNS if self.whole else NEAR)
         gaits = int(steps * TRIES * each)
@@ -143,11 +149,12 @@ class Request:
 
     @property
     def climbs(self) -> int:
-        """How many it takes: from its starts and, where a table leads near, by the direct tier and of its best; from
-        several starts, within narrower limits and on from there, too."""
+        """How many it takes: from its starts and, where a table leads near, by the direct tier and once more from its
+        best; from several starts, within narrower limits, on from there, and from beside the best, too."""
         if not self.looks_up:
             return self.starts
-        return self.starts + (self.starts + LED) * (self.starts > 1) + min(FINISHED, self.starts) + 1
+        more = self.starts + LED + 3 * MORE if self.starts > 1 else 0
+        return self.starts + min(FINISHED, self.starts) + 1 + more
 
     @property
     def extent(self) -> float:

@@ -24,7 +24,20 @@ from geomech.optimise.limits import Asked
 from geomech.optimise.loops import Loops
 from geomech.optimise.optimum import Optimum, Told
 from geomech.optimise.problem import EVEN
-from geomech.optimise.request import CLIMB, FINISH, FINISHED, LED, NEAR, POLISH, RUNS, SHARE, Request, checked
+from geomech.optimise.request import (
+    BESIDE,
+    CLIMB,
+    FINISH,
+    FINISHED,
+    LED,
+    MORE,
+    NEAR,
+    POLISH,
+    RUNS,
+    SHARE,
+    Request,
+    checked,
+)
 from geomech.optimise.telling import told
 from geomech.reconstruct import turning
 from geomech.scene.model import Scene
@@ -119,16 +132,26 @@ class _Search:
         better = self._better(turn)
         finished = [(better(q, p), times) for q, (p, times, _) in zip(further, best)]
         k = max(range(len(finished)), key=lambda k: self._worth(tier, finished[k][0], turn))
-        (p,) = self._each([finished[k][0]], turn, None, POLISH, POLISHED, phases=r.phases)
-        finished[k] = better(p, finished[k][0]), finished[k][1]
+        p, times = finished[k]
+        near, further = self._beside(p)
+        further = self._each(further, turn, looked_up, NEAR, NEAR_TOLERANCE) if further else []
+        polished = self._each([p, *near, *further], turn, None, POLISH, POLISHED, phases=r.phases)
+        finished[k] = better(p, *polished), times
         return finished, tuple((worth, times) for _, times, worth in rest)
 
     def _better(self, turn: float) -> Callable:
-        """A function that settles two loops and returns the better."""
+        """A function that settles loops and returns the best."""
         tier = ways.direct(self.r, self.r.phases)
-        return lambda p, q: max(
-            self._settled(p, turn), self._settled(q, turn), key=lambda x: self._worth(tier, x, turn)
-        )
+        return lambda *some: max((self._settled(p, turn) for p in some), key=lambda p: self._worth(tier, p, turn))
+
+    def _beside(self, p: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """(loops next to p, others further off), without its symmetry: a way up from a symmetric loop comes to what is
+        best among these, be it a saddle among all, and there are others about the best. None for one start."""
+        rng, loops = np.random.default_rng(0), self.r.loops
+        falling = 1 / np.repeat(np.arange(loops.harmonics + 1), 2)[1:].clip(1)[:, None]
+        off = lambda size: self.keeping.start(loops.fitted(p + size * loops.unit * falling * rng.normal(size=p.shape)))
+        near, further = ([off(size) for _ in range(MORE if self.r.starts > 1 else 0)] for size in BESIDE)
+        return near, further
 
     def _led_on(self, looked_up: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
         """The best loops within narrower limits, from which the search goes on: what is best there is so far from
