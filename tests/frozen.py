@@ -454,7 +454,11 @@ def still(recorded: str, section: str, case: str) -> str:
     lost = [
         name
         for name in wanted
-        if name not in message and not ((x := number_of(name)) is not None and any(near(x, y) for y in values))
+        if not (
+            name in message
+            if (x := number_of(name)) is None
+            else any(math.isclose(x, y, rel_tol=TOLERANCE) for y in values)
+        )
     ]
     if code != was:
         return f"ends with {code} in place of {was}: {message}"
