@@ -2,7 +2,7 @@
 
     python tests/golden.py --write    records these, too; entries that still hold stay as they are
 
-commands.txt has command lines with their output and what they wrote, refusals.toml what is refused and what its message
+commands.txt has command lines with their output and what they wrote, refusals.txt what is refused and what its message
 names, keys.txt every key of a scene file, the schema and the names in Python. They are run in a copy of data/frozen,
 which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later ones read them.
 
@@ -278,7 +278,7 @@ def ran(line: str) -> list[str]:
     code, out, err = geomech(*shlex.split(line))
     told = []
     if line.endswith("--help"):
-        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*(?: <[^>]*>)?|[a-z]+)(?:  |$)", out, re.M)]
+        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*|[a-z]+)(?: <|  |$)", out, re.M)]
     else:
         try:
             told += [f"= {x}" for x in flat(json.loads(out))]
@@ -495,25 +495,28 @@ def keys() -> Iterator[str]:
         elif line == "above all tables":
             table = "[]"
     yield from (
-        f"schema {line}".replace("/$defs/", "") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
+        f"schema {line}".replace("/$defs/", "/") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
     )
     yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
 
 
-def of_schema(node, path: str = "") -> Iterator[str]:
+def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
     """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
-    a list by their kind where they have one."""
-    text = compact(undescribed(node))
+    a list by their kind where they have one. before: what was told already, and where."""
+    text, before = compact(undescribed(node)), {} if before is None else before
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
+    elif before.setdefault(text, path) != path:
+        yield f"{path} as {before[text]}"
     elif isinstance(node, list):
         for k, inner in enumerate(node):
-            yield from of_schema(inner, f"{path}/{kind_of(inner) or k}")
+            yield from of_schema(inner, f"{path}/{kind_of(inner) or k}", before)
     else:
         small = {k: x for k, x in undescribed(node).items() if len(compact(x)) <= 60}
         yield f"{path} {compact(small)}"
         for key in sorted(set(node) - set(small) - {"description"}):
-            yield from of_schema(node[key], f"{path}/{key}".replace("/properties", "").replace("/oneOf", ""))
+            here = f"{path}/{key}".replace("/properties", "").replace("/oneOf", "")
+            yield from of_schema(node[key], here, before)
 
 
 def compact(node) -> str:
