@@ -2,13 +2,13 @@
 
     python tests/golden.py --write    records these, too; entries that still hold stay as they are
 
-commands.txt has command lines with their output and what they wrote, refusals.toml what is refused and what its message
+commands.txt has command lines with their output and what they wrote, refusals.txt what is refused and what its message
 names, keys.txt every key of a scene file, the schema and the names in Python. They are run in a copy of data/frozen,
 which has scenes, and a file of every format as the first version with this net wrote it (`FILES`): later ones read them.
 
-Names, numbers, keys and exit codes are fixed, wording is free: of a text its numbers count, in their order, and the
-names in it, of a refusal what it names and that it says what to do. Times and facts of the machine are masked. Everything
-goes through the command line, files and names of `geomech`; a move of modules needs changes in `namespace` at most.
+Names, numbers, keys and exit codes are fixed, wording is free (`words`): of a refusal counts what it names, and that it
+says what to do. Everything goes through the command line, files and names of `geomech`; a move of modules needs changes
+in `namespace` at most.
 """
 
 from __future__ import annotations
@@ -28,18 +28,16 @@ import signal
 import subprocess
 import sys
 import tempfile
-import tomllib
 import warnings
 from collections.abc import Iterator
 from unittest import mock
 
 import numpy as np
 import typer.main
-from scipy.io import loadmat, netcdf_file
+from words import TOLERANCE, WORD, flat, line_holds, masked, names, number_of, numbers, of_file, text_holds
 
 DATA = pathlib.Path(__file__).parent / "data"
 FOLDER, COMMANDS, REFUSALS, KEYS = DATA / "frozen", DATA / "commands.txt", DATA / "refusals.txt", DATA / "keys.txt"
-TOLERANCE, FLOOR = 1e-6, 1e-9  # relative, of the largest number of a line; what is smaller is rounding
 
 # The files in data/frozen that a command wrote, and which; `python tests/frozen.py --files` writes them anew.
 FILES = {
@@ -88,185 +86,6 @@ def place() -> Iterator[pathlib.Path]:
         yield here
 
 
-# Words: names and numbers.
-
-PLAIN_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.I)
-WORD = re.compile(r"[^\s()\[\]{},;:=<>|*/^\"'`]+")
-UNITS = {"BL", "m", "rad", "deg", "degrees", "s", "Hz", "N", "J", "W", "kg", "Pa", "N/cm^3", "N/m^3", "kg/m^3", "m/s"}
-LISTED = {  # words of an answer that programs look for
-    "area", "adapted", "path", "harmonic", "direct", "sliding", "stuck", "walking", "algebraic", "planar", "mujoco",
-    "granular", "viscous", "coulomb", "circle", "ellipse", "butterfly", "fourier", "points", "chain", "serpenoid",
-}  # fmt: skip
-FILE = re.compile(r"[\w./~-]*\w\.(?:toml|nc|mat|csv|png|svg|pdf|gif|mp4|json|txt|stl|obj|ply|xml|py)\b")
-OPTION = re.compile(r"(?<![\w-])--?[a-z][\w-]*")
-QUOTED = re.compile(r"(?<!\w)'([^']+)'(?!\w)|`([^`]+)`|\"([^\"]+)\"")
-CODE = re.compile(r"(?<![\w.])[A-Za-z]\w*_\w+|\b[A-Za-z]+\d\w*")
-# Not the same twice: times, and how a solver came to its end.
-MASKS = [
-    (r"^back end: .*$", "back end: #"),
-    (r"^seconds: .*$", "seconds: #"),
-    (r"\d+ cycles evaluated in [\d.]+ s", "# cycles evaluated in # s"),
-    (r"^ +1e-\d\d  .*$", " #"),
-    (r"[\d.]+ times the time", "# times the time"),
-    (r"residual [\d.e+-]+, \d+ iterations", "residual #, # iterations"),
-    (r"about [\d.]+ (s|min|h|days|years)\b", "about #"),
-    (r"\b[\d,.]+ [kMGT]?B of memory", "# of memory"),
-    (rf"(/private)?{re.escape(tempfile.gettempdir())}/tmp\w+", "#"),
-]
-MASKED_KEYS = re.compile(r"(^|\.)(seconds|evaluations|iterations|residual|kept)($|\.)")
-
-
-def masked(text: str) -> str:
-    for pattern, put in MASKS:
-        text = re.sub(pattern, put, text, flags=re.M)
-    return text
-
-
-def number_of(word: str) -> float | None:
-    """A word as a number, of "+-1e-3", "30deg", "5%" and "8." the same; None if it is none."""
-    word = word.removeprefix("+-").rstrip(".%?!").removesuffix("deg")
-    return float(word) if PLAIN_NUMBER.fullmatch(word) else None
-
-
-def numbers(text: str) -> list[tuple[float, float]]:
-    """Every number in a text with one unit of its last decimal, 0 if it has none, in their order."""
-    found = []
-    for word in WORD.findall(text):
-        if (x := number_of(word)) is not None:
-            digits, _, power = word.rstrip(".%?!").removesuffix("deg").lower().partition("e")
-            decimals = len(digits.partition(".")[2])
-            found.append((x, 10.0 ** (int(power or 0) - decimals) if decimals else 0.0))
-    return found
-
-
-def names(text: str) -> set[str]:
-    """What a text calls by name: options, files, what stands in quotes or looks like code, units, and `LISTED`."""
-    words = {word.rstrip(".") for word in WORD.findall(text)} | set(re.findall(r"[^\s(),;:]+", text))
-    quoted = {next(filter(None, found)) for found in QUOTED.findall(text)}
-    return {*OPTION.findall(text), *FILE.findall(text), *CODE.findall(text), *quoted, *(words & (UNITS | LISTED))}
-
-
-def near(one: float, other: float, unit: float = 0.0, size: float = 0.0) -> bool:
-    """Equal, but for a last digit or rounding."""
-    if not (math.isfinite(one) and math.isfinite(other)):
-        return one == other or (math.isnan(one) and math.isnan(other))
-    return abs(one - other) <= max(1.01 * unit, TOLERANCE * max(abs(one), abs(other), size), FLOOR)
-
-
-def text_holds(old: str, new: str) -> bool:
-    """Whether the numbers of a text are as they were, and what it named is named."""
-    was, now = numbers(old), numbers(new)
-    same = len(was) == len(now) and all(near(a, b, unit) for (a, unit), (b, _) in zip(was, now))
-    return same and names(old) <= names(new)
-
-
-def line_holds(old: str, new: str) -> bool:
-    """Whether a line of a structure is the same but for the digits of its numbers."""
-    if old == new:
-        return True
-    was, now = numbers(old), numbers(new)
-    size = max((abs(x) for x, _ in was), default=0.0)
-    bare = lambda text: WORD.sub(lambda word: "#" if number_of(word[0]) is not None else word[0], text)
-    return bare(old) == bare(new) and all(near(a, b, 0.0, size) for (a, _), (b, _) in zip(was, now))
-
-
-# Structures: JSON and files, as lines.
-
-
-def short(x) -> str:
-    return x if isinstance(x, str) else f"{x:.8g}" if isinstance(x, (float, np.floating)) else str(x)
-
-
-def of_array(values) -> str:
-    """An array on a line: all of up to twelve numbers; of more its shape, some of them, the root mean square, and a sum with
-    alternating weights, which tells what moved."""
-    array = np.asarray(values)
-    flat = array.ravel()
-    if flat.dtype.kind not in "iufb" or flat.size <= 12:
-        return " ".join(map(short, flat.tolist())) if array.ndim else short(array.item())
-    flat = flat.astype(float)
-    some = flat[np.linspace(0, flat.size - 1, 7).astype(int)]
-    good = np.nan_to_num(flat)
-    mean = [np.sqrt((good**2).mean()), (good * np.cos(1.0 + np.arange(good.size))).mean()]
-    return f"{'x'.join(map(str, array.shape))} numbers: {' '.join(map(short, [*some, *mean]))}"
-
-
-def flat(value, path: str = "") -> Iterator[str]:
-    """JSON or TOML as lines "path = value", numbers of a list together."""
-    if isinstance(value, dict) and value:
-        for key, inner in value.items():
-            yield from flat(inner, f"{path}.{key}" if path else str(key))
-    elif MASKED_KEYS.search(path):
-        yield f"{path} = #"
-    elif isinstance(value, list) and not is_array(value):
-        for k, inner in enumerate(value):
-            yield from flat(inner, f"{path}[{k}]")
-    else:
-        yield f"{path} = {of_array(value) if isinstance(value, list) else short(value)}"
-
-
-def is_array(value: list) -> bool:
-    try:
-        return np.asarray(value).dtype.kind in "iufU"
-    except ValueError:
-        return False
-
-
-def of_text(name: str, text: str) -> Iterator[str]:
-    """An attribute: a scene in TOML by its keys, other text as it is."""
-    try:
-        yield from (f"= {line}" for line in flat(tomllib.loads(text), name) if "\n" in text)
-    except tomllib.TOMLDecodeError:
-        yield f"~ {name} = {' '.join(text.split())}"
-    else:
-        if "\n" not in text:
-            yield f"~ {name} = {text}"
-
-
-def of_netcdf(file: pathlib.Path) -> Iterator[str]:
-    with netcdf_file(file, mmap=False) as data:
-        decoded = lambda x: x.decode() if isinstance(x, bytes) else x
-        for key in sorted(data._attributes):
-            yield from of_text(f":{key}", masked(short(decoded(data._attributes[key]))))
-        for name in sorted(data.variables):
-            variable = data.variables[name]
-            yield f"= {name}({', '.join(f'{d} {n}' for d, n in zip(variable.dimensions, variable.shape))}) " + (
-                f"{variable.data.dtype.kind}{variable.data.dtype.itemsize} in {decoded(getattr(variable, 'units', b'-'))}"
-            )
-            for key in sorted(set(variable._attributes) - {"units"}):
-                yield f"~ {name}:{key} = {decoded(variable._attributes[key])}"
-            text = variable.data.dtype.kind == "S"
-            rows = [b"".join(row).decode() for row in variable.data] if text else variable.data
-            yield f"= {name} = {' '.join(rows) if text else of_array(np.array(rows))}"
-
-
-def of_file(file: pathlib.Path) -> Iterator[str]:
-    """What is in a file, as lines: "= " of structure, "~ " of text."""
-    match file.suffix:
-        case ".nc":
-            yield from of_netcdf(file)
-        case ".mat":
-            for key, value in sorted(loadmat(file).items()):
-                if not key.startswith("__"):
-                    yield f"= {key} {value.dtype.kind}{value.dtype.itemsize} = {of_array(value)}"
-        case ".toml":
-            yield from (f"= {line}" for line in flat(tomllib.loads(masked(file.read_text()))))
-        case ".json":
-            yield from (f"= {line}" for line in flat(json.loads(masked(file.read_text()))))
-        case ".csv":
-            rows = [line for line in file.read_text().splitlines() if not line.startswith("#")]
-            yield f"= {len(rows)} lines of {rows[0]}"
-            with contextlib.suppress(ValueError):
-                for name, column in zip(rows[0].split(","), np.array([row.split(",") for row in rows[1:]], float).T):
-                    yield f"= {name} = {of_array(column)}"
-        case ".png" | ".gif" | ".pdf" | ".svg":
-            begin = file.read_bytes()[:6]
-            kinds = {b"\x89PNG\r\n": "PNG", b"GIF89a": "GIF", b"%PDF-1": "PDF", b"<?xml ": "XML"}
-            yield f"= {kinds.get(begin, 'something else')}"
-        case _:
-            yield from (f"~ {line}" for line in masked(file.read_text()).splitlines() if line)
-
-
 # commands.txt
 
 
@@ -278,7 +97,7 @@ def ran(line: str) -> list[str]:
     code, out, err = geomech(*shlex.split(line))
     told = []
     if line.endswith("--help"):
-        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*(?: <[^>]*>)?|[a-z]+)(?:  |$)", out, re.M)]
+        told += [f"= {x}" for x in re.findall(r"^  (-\S.*?|[\[{A-Z]\S*|[a-z]+)(?: <|  |$)", out, re.M)]
     else:
         try:
             told += [f"= {x}" for x in flat(json.loads(out))]
@@ -454,7 +273,11 @@ def still(recorded: str, section: str, case: str) -> str:
     lost = [
         name
         for name in wanted
-        if name not in message and not ((x := number_of(name)) is not None and any(near(x, y) for y in values))
+        if not (
+            name in message
+            if (x := number_of(name)) is None
+            else any(math.isclose(x, y, rel_tol=TOLERANCE) for y in values)
+        )
     ]
     if code != was:
         return f"ends with {code} in place of {was}: {message}"
@@ -491,25 +314,28 @@ def keys() -> Iterator[str]:
         elif line == "above all tables":
             table = "[]"
     yield from (
-        f"schema {line}".replace("/$defs/", "") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
+        f"schema {line}".replace("/$defs/", "/") for line in of_schema(json.loads(geomech("keys", "--json-schema")[1]))
     )
     yield from (f"geomech.{name}" for name in sorted(dir(top)) if not name.startswith("_"))
 
 
-def of_schema(node, path: str = "") -> Iterator[str]:
+def of_schema(node, path: str = "", before: dict | None = None) -> Iterator[str]:
     """A JSON Schema without its descriptions: a line for what takes little room, else one for each of its entries, those of
-    a list by their kind where they have one."""
-    text = compact(undescribed(node))
+    a list by their kind where they have one. before: what was told already, and where."""
+    text, before = compact(undescribed(node)), {} if before is None else before
     if len(text) <= 200 or not isinstance(node, (dict, list)):
         yield f"{path} {text}"
+    elif before.setdefault(text, path) != path:
+        yield f"{path} as {before[text]}"
     elif isinstance(node, list):
         for k, inner in enumerate(node):
-            yield from of_schema(inner, f"{path}/{kind_of(inner) or k}")
+            yield from of_schema(inner, f"{path}/{kind_of(inner) or k}", before)
     else:
         small = {k: x for k, x in undescribed(node).items() if len(compact(x)) <= 60}
         yield f"{path} {compact(small)}"
         for key in sorted(set(node) - set(small) - {"description"}):
-            yield from of_schema(node[key], f"{path}/{key}".replace("/properties", "").replace("/oneOf", ""))
+            here = f"{path}/{key}".replace("/properties", "").replace("/oneOf", "")
+            yield from of_schema(node[key], here, before)
 
 
 def compact(node) -> str:
