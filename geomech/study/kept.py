@@ -90,7 +90,7 @@ def alone(output: Path, what: str = "sweep"):
 
 def _plain(output: Path) -> Path:
     """The same path for all names of a file, links to it among them."""
-    return output.resolve() if ".." in output.parts or output.is_symlink() else output
+    return Path(os.path.realpath(output)) if ".." in output.parts or output.is_symlink() else output
 
 
 class Kept:
