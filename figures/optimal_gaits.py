@@ -3,9 +3,10 @@
 Sand's optima are larger and bring more. Two things differ. Drag in sand does not grow with speed: a link that creeps holds
 as firmly as one that sweeps, so that wide strokes pay, in which one end sweeps while the rest is an anchor, and a fast
 sweep costs no more work than a slow one. With drag like |v|^p and the fluid's ratio of drag across to drag along, 2, the
-stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the limit of 2.5 rad and 0.18 BL at p = 0.3 and 0.32 BL at
-p = 0; that for efficiency 1.44, 1.47 and 1.98 rad. And at small slip sand's drag across is 1 + C / tan gamma0 = 8.3 times
-that along. That alone adds to what a stroke brings and draws the loop in: a fluid of ratio 8.3 has 0.40 BL at 1.77 rad.
+stroke for displacement reaches 1.9 rad and 0.10 BL at p = 1, and the limit of 2.5 rad and 0.23 BL at p = 0.3 and 0.37 BL at
+p = 0; that for efficiency 1.44 rad, and the limit at both. And at small slip sand's drag across is 1 + C / tan gamma0 =
+8.3 times that along. That alone adds to what a stroke brings and draws the loop in: a fluid of that ratio has 0.40 BL at 1.76
+rad.
 
 In the fluid the stroke for displacement follows the zero line of the CCF, and that for efficiency cuts the far ends off,
 where little area is left for much path. In sand the CCF is that of a least-squares connection, which is not all.

@@ -174,11 +174,12 @@ def sand(request):
     return optimise(geomech.load("three-link-glass"), aim, within=within)
 
 
-LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.223}
+LEAST = {("displacement", 2.5): 0.4415, ("displacement", 3.0): 0.6938, ("efficiency", 2.5): 0.2245}
 
 
 def test_best_gaits_in_sand(sand):
-    """As good as the best of 250 random starts without rules between phases (0.4435, 0.6986, 0.2237), less what these cost."""
+    """As good as the best of 250 other starts, random or grids of ellipses: 0.4435, 0.6986 and 0.2237 without rules between
+    phases, which cost the first two 0.3 % and 0.6 %."""
     asked = sand.request.aim.name, sand.request.loops.within
     assert sand.value > LEAST[asked]
     assert sand.value == sand.answers[0][0]
@@ -314,7 +315,7 @@ def test_loops_that_are_one():
 
 
 def test_starts_go_along_the_limits_where_many_a_loop_is_the_best_near_by():
-    """By default: in sand, of which those that others are in a mirror are left out; in a fluid the scene's gait alone."""
+    """By default: in sand, without those that others are in a mirror; in a fluid the scene's gait alone."""
     lopsided = ((-2.5, 1.0), (-2.5, 2.5))
     assert checked(viscous(), "displacement").starts == 1
     assert checked(geomech.load("three-link-glass"), "displacement").starts == 9
@@ -452,10 +453,10 @@ def test_where_one_sense_brings_more_it_is_the_one_found():
     skin = SkinFriction(forward=0.05, backward=0.3, reference=0.2)
     scene = Scene(Swimmer(SAND, Chain((1, 1, 1)), effects=(skin,)), Circle(amplitude=1.0), numerics=Numerics(grid=9))
     assert not scene.system.odd
-    found = optimise(scene, harmonics=1, within=1.2)
+    found = optimise(scene, harmonics=1, within=1.2, starts=1)
     back = found.request.loops.gait(series.reversed_(found.request.loops.of(found.gait)))
     assert found.value > 0.48 > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
-    assert len(found.answers) > 1
+    assert len(found.answers) == 2
 
 
 def test_a_cycle_without_slopes_is_that_with():
@@ -662,16 +663,16 @@ class Strips(Plain):
 
 
 def test_several_answers_are_told_from_one_found_again():
-    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, within=2.0, starts=5)
+    found = optimise(Scene(Strips(), Circle(amplitude=0.5)), harmonics=2, within=2.0, starts=9)
     values, counts = zip(*found.answers)
-    assert sum(counts) == 5
+    assert sum(counts) == 9
     assert max(counts) > 1
-    assert 1 < len(values) < 5
+    assert 1 < len(values) < 9
     assert list(values) == sorted(values, reverse=True)
     assert found.value == values[0] > 1.01 * values[1]
     edge = np.arccos(-0.2 / 3) / 3  # of the strip in the middle, which is 4 rad long
     middle = 2 * (np.sin(3 * edge) + 0.2 * edge) * 4
-    assert any(0.8 * middle < value < middle for value in values[1:])
+    assert any(0.7 * middle < value < middle for value in values[1:])
 
 
 def test_all_starts_keep_off_singular_shapes():

@@ -22,9 +22,9 @@ def climb(
     stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, told: Callable = lambda: None,
     even: float = EVEN,
 ) -> np.ndarray:  # fmt: skip
-    """The loop that ``aim`` leads to from ``p``; cycles: `Phases` or `Runs`. turn (rad): of a cycle, at most, where the
-    aim is to get along. stroke: the loop is a `Stroke`, and stays one. singularity: of shapes, nowhere nearer to 0 than
-    ``away``. even: as of `Problem`."""
+    """The loop that ``aim`` leads to from ``p``; cycles: `Phases` or `Runs`. turn (rad): of a cycle, at most, where the aim is
+    to get along. stroke: the loop is a `Stroke`, and stays one. singularity: of shapes, nowhere nearer to 0 than ``away``.
+    even: as of `Problem`."""
     problem, once = Problem(cycles, aim, p, told, TRIES * most, even), Stroke(cycles.loops, p) if stroke else None
     rules = problem.rules(turn, once, singularity, away)
     same = lambda x: once is None or once.winding(problem.loop(x)) == 1
@@ -45,8 +45,8 @@ def settled(
     cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, stroke: bool = False,
     singularity: Callable | None = None, away: float = 0.0,
 ) -> np.ndarray:  # fmt: skip
-    """The loop next to ``p`` that keeps all rules of `climb` to rounding, and between its phases: by Newton's method,
-    each step the shortest that keeps them by their slopes."""
+    """The loop next to ``p`` that keeps all rules of `climb` to rounding, and between its phases: by Newton's method, each
+    step the shortest that keeps them by their slopes."""
     problem = Problem(cycles, aim, p, lambda: None, np.inf)
     rules = problem.rules(turn, Stroke(cycles.loops, p) if stroke else None, singularity, away, dense=True)
     x = problem.first
@@ -89,8 +89,8 @@ class _Way:
             self.best, self.least = np.array(x), value
 
     def followed(self, x: np.ndarray, stride: float, moving: int, most: int, tolerance: float) -> str:
-        """From x, of which the first ``moving`` numbers go no further than ``stride``, in ``most`` steps. How it ends:
-        "there"; "short" of it; "stuck" at a loop that cannot be run, or is another stroke; or "spent"."""
+        """From x, of which the first ``moving`` numbers go no further than ``stride``, in ``most`` steps. How it ends: "there";
+        "short" of it; "stuck" at a loop that cannot be run, or is another stroke; or "spent"."""
         from scipy.optimize import minimize
 
         room = np.where(np.arange(len(x)) < moving, stride, np.inf)

@@ -74,8 +74,8 @@ class Request:
 
     @cached_property
     def power(self) -> Callable | None:
-        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square
-        of its own metric for a system that has one; None where nothing tells what moving costs."""
+        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square of its
+        own metric for a system that has one; None where nothing tells what moving costs."""
         system, length = self.system, self.system.length
         if self.stored:
             told, degree, box = system.stored("metric"), system.power_degree or 2.0, self.loops.box
@@ -138,8 +138,8 @@ class Request:
         jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
             jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
-            polished = 1 + 2 * MORE * (self.starts > 1)
-            steps = finished * FINISH + polished * POLISH * self.phases / loops.phases
+            beside = 2 * MORE * (self.starts > 1)
+            steps = (finished + 2 * beside) * FINISH + POLISH * self.phases / loops.phases
         else:
             steps = self.starts * (RUNS if self.whole else NEAR)
         gaits = int(steps * TRIES * each)
@@ -149,8 +149,8 @@ class Request:
 
     @property
     def climbs(self) -> int:
-        """How many it takes: from its starts and, where a table leads near, by the direct tier and once more from its
-        best; from several starts, within narrower limits, on from there, and from beside the best, too."""
+        """How many climbs it takes: from its starts and, where a table leads near, by the direct tier and once more from the
+        best; with several starts also within narrower limits, on from there, and from beside the best."""
         if not self.looks_up:
             return self.starts
         more = self.starts + LED + 3 * MORE if self.starts > 1 else 0
@@ -216,8 +216,7 @@ def _in_mirror(request: Request) -> bool:
 
 
 def _stays(system: System) -> bool:
-    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for
-    all."""
+    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
     if system.steps or not system.linear or system.stored("connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
@@ -238,8 +237,7 @@ def _never_turns(request: Request) -> bool:
 
 
 def _own_rate(scene: Scene) -> float:
-    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of
-    time."""
+    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of time."""
     return float(2 * np.pi * (scene.frequency or 0.0) * np.abs(scene.gait.cycle(PHASES)[1]).max()) or 1.0
 
 

@@ -1,8 +1,8 @@
-"""The search for the best gait of a scene: in a table where that is near and cheap, finished and told by the direct
-tier."""
+"""The search for the best gait of a scene: in a table where that is near and cheap, finished and told by the direct tier."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import time
 from collections.abc import Callable
@@ -56,11 +56,11 @@ def optimise(
     within: Asked = None, starts: int | None = None, *, rate: float | None = None, power: float | None = None,
     progress: Callable | None = None,
 ) -> Optimum:  # fmt: skip
-    """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up
-    to ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest)
-    for each, searched for from the scene's own gait and ``starts`` - 1 others: by default none, and in a dry medium,
-    where two joints have many a gait that is the best near by, `OUTLINES` of the limits. A sine is sought among sines.
-    SceneError for what makes no sense."""
+    """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
+    ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest) for each,
+    searched for from the scene's own gait and ``starts`` - 1 others: by default none, and for two joints in a dry medium, where
+    many a gait is the best near by, `OUTLINES` of the limits. A sine is sought among sines. SceneError for what makes no
+    sense."""
     request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
     return search(request, progress)
 
@@ -115,8 +115,8 @@ class _Search:
         )  # fmt: skip
 
     def _climbed(self, starts: list[np.ndarray], turn: float) -> tuple[list, tuple]:
-        """(different loops that the starts lead to, each with how many led there; values of those that a table led to
-        and nobody finished, likewise)."""
+        """(different loops that the starts lead to, each with how many led there; values of those that a table led to and
+        nobody finished, likewise)."""
         r, tier = self.r, ways.direct(self.r)
         if not r.looks_up:
             return self._different(self._near(tier, starts, turn, None, RUNS if r.whole else NEAR)), ()
@@ -127,17 +127,22 @@ class _Search:
         if not r.system.odd:  # where the table, which is, takes either sense for as good
             near += [series.reversed_(p) for p in near]
         ranked = self._ranked(tier, near, turn)
-        best, rest = ranked[:FINISHED], ranked[FINISHED:]
-        further = self._each([p for p, *_ in best], turn, None, FINISH, TOLERANCE)
+        further = self._each([p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE)
         better = self._better(turn)
-        finished = [(better(q, p), times) for q, (p, times, _) in zip(further, best)]
+        finished = [(better(q, p), times) for q, (p, times, _) in zip(further, ranked)]
         k = max(range(len(finished)), key=lambda k: self._worth(tier, finished[k][0], turn))
-        p, times = finished[k]
-        near, further = self._beside(p)
-        further = self._each(further, turn, looked_up, NEAR, NEAR_TOLERANCE) if further else []
-        polished = self._each([p, *near, *further], turn, None, POLISH, POLISHED, phases=r.phases)
-        finished[k] = better(p, *polished), times
-        return finished, tuple((worth, times) for _, times, worth in rest)
+        finished[k] = better(*self._polished(tier, looked_up, finished[k][0], turn)), finished[k][1]
+        return finished, tuple((worth, times) for _, times, worth in ranked[FINISHED:])
+
+    def _polished(self, tier, looked_up: tuple, p: np.ndarray, turn: float) -> tuple[np.ndarray, ...]:
+        """p and where it leads at the phases where it is told, or, with several starts, whatever beside it leads further up."""
+        found = [p]
+        if self.r.starts > 1:
+            near, further = self._beside(p)
+            near += self._each(further, turn, looked_up, NEAR, NEAR_TOLERANCE)
+            found += self._each(near, turn, None, 2 * FINISH, TOLERANCE / 10)
+        best = max(found, key=lambda q: self._worth(tier, q, turn))
+        return p, best, *self._each([best], turn, None, POLISH, POLISHED, phases=self.r.phases)
 
     def _better(self, turn: float) -> Callable:
         """A function that settles loops and returns the best."""
@@ -145,17 +150,17 @@ class _Search:
         return lambda *some: max((self._settled(p, turn) for p in some), key=lambda p: self._worth(tier, p, turn))
 
     def _beside(self, p: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """(loops next to p, others further off), without its symmetry: a way up from a symmetric loop comes to what is
-        best among these, be it a saddle among all, and there are others about the best. None for one start."""
+        """(loops next to p, others further off), without its symmetry: a way up from a symmetric loop comes to what is best
+        among these, be it a saddle among all, and there are others about the best."""
         rng, loops = np.random.default_rng(0), self.r.loops
         falling = 1 / np.repeat(np.arange(loops.harmonics + 1), 2)[1:].clip(1)[:, None]
         off = lambda size: self.keeping.start(loops.fitted(p + size * loops.unit * falling * rng.normal(size=p.shape)))
-        near, further = ([off(size) for _ in range(MORE if self.r.starts > 1 else 0)] for size in BESIDE)
+        near, further = ([off(size) for _ in range(MORE)] for size in BESIDE)
         return near, further
 
     def _led_on(self, looked_up: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
-        """The best loops within narrower limits, from which the search goes on: what is best there is so far from
-        others that wider limits alone may miss it. None for one start."""
+        """The best loops within narrower limits, from which the search goes on: what is best there is so far from others that
+        wider limits alone may miss it. None for one start."""
         if self.r.starts == 1:
             return []
         narrow = dataclasses.replace(self.r, loops=self.r.loops.narrower(SHARE))
@@ -169,8 +174,7 @@ class _Search:
         return sorted(worth, key=lambda x: x[2], reverse=True)
 
     def _near(self, cycles, starts: list[np.ndarray], turn: float, looked_up, most: int) -> list[np.ndarray]:
-        """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near
-        by."""
+        """Where each start leads; the first twice, as it is and with another size, where many a loop is the best near by."""
         twice = [self._larger(starts[0])] if self._rough else []
         near = self._each([*starts, *twice], turn, looked_up, most, NEAR_TOLERANCE)
         if twice:
@@ -188,8 +192,8 @@ class _Search:
         self, starts: list[np.ndarray], turn: float, looked_up, most: int, tolerance: float, r: Request | None = None,
         phases: int | None = None,
     ) -> list[np.ndarray]:  # fmt: skip
-        """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its
-        phases or others. Who computes: `geomech.workers`."""
+        """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its phases or
+        others. Who computes: `geomech.workers`."""
         at_hand = len(starts) == 1 and not workers.far()
         how = Way(r or self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None, phases)
         ends, before, seconds = [], self.done, len(starts) * (CLIMB if looked_up else FINISHING)
@@ -238,16 +242,16 @@ class _Search:
         if not isinstance(r.loops, Loops):
             return p
         cycles = ways.direct(r, r.phases)
-        p = settled(
-            cycles, r.aim, p, turn=turn, stroke=self.keeping.stroke, singularity=r.system.singularity,
-            away=self.keeping.away,
-        )  # fmt: skip
+        with contextlib.suppress(RuntimeError):  # of a loop near by that cannot be run
+            p = settled(
+                cycles, r.aim, p, turn=turn, stroke=self.keeping.stroke, singularity=r.system.singularity,
+                away=self.keeping.away,
+            )  # fmt: skip
         self.count += cycles.count
         return r.loops.fitted(p)  # as it is, but where no loop near by keeps all rules
 
     def _slack(self, this: Told) -> float:
-        """rad: how much more than it may a gait turns by rounding; where its cycles are not those of the search, by its
-        error."""
+        """What a gait may turn more by rounding, rad; where its cycles are not those of the search, by its error, too."""
         return NO_TURN + (this.heading if self.r.whole or self.r.system is not self.r.scene.system else 0.0)
 
     def _tell(self, cycles: int = 1) -> None:
@@ -281,8 +285,7 @@ class _Search:
         return r.gait
 
     def _turned_to(self, p: np.ndarray) -> np.ndarray:
-        """The loop; with a direction, it starts where the body points as in the mean, and goes forwards or to the
-        left."""
+        """The loop; with a direction, it starts where the body points as in the mean, and goes forwards or to the left."""
         r = self.r
         if not (r.aim.direction and isinstance(r.loops, Loops)) or r.whole:
             return p
@@ -329,9 +332,9 @@ class _Search:
 
 
 class Way(NamedTuple):
-    """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`,
-    or None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the
-    direct tier, if others than the search's."""
+    """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`, or
+    None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the direct tier,
+    where it takes others than the loops have, as the last way up does."""
 
     r: Request
     origin: np.ndarray

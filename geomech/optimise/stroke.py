@@ -11,16 +11,15 @@ NEWTON = 3  # steps to the least sweep between two phases
 class Stroke:
     """The sense and the plane, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`.
 
-    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least
-    that it has in each of N intervals between phases, so that a loop which goes back nowhere there goes back
-    nowhere."""
+    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least that it
+    has in each of N intervals between phases, so that a loop which goes back nowhere there goes back nowhere."""
 
     def __init__(self, loops, p: np.ndarray):
         self.plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
         self.thin, self.size = size[-1] < FLAT * size[0] or len(size) < 2, float(np.prod(size)) or 1.0
         self.k, self.width = np.arange(1, loops.harmonics + 1), 2 * np.pi / loops.phases
         self.phases = self.width * np.arange(loops.phases)
-        self.side = 1.0
+        self.side, self._of, self._lowest = 1.0, None, None
         if not self.thin:
             (u, v), (du, dv) = self._going(p, self.phases)[:2]
             self.side = float(np.sign((u * dv - v * du).mean())) or 1.0
@@ -28,11 +27,17 @@ class Stroke:
     def _going(self, p: np.ndarray, phases: np.ndarray) -> list[np.ndarray]:
         """The loop about its centre at the phases (N,), and its first three derivatives, (2, N) each."""
         q = p @ self.plane
-        waves = np.exp(1j * np.outer(phases, self.k))
-        return [((waves * (1j * self.k) ** n) @ (q[1::2] - 1j * q[2::2])).real.T for n in range(4)]
+        each = [(1j * self.k[:, None]) ** n * (q[1::2] - 1j * q[2::2]) for n in range(4)]
+        return np.split((np.exp(1j * np.outer(phases, self.k)) @ np.concatenate(each, 1)).real.T, 4)
 
     def lowest(self, p: np.ndarray) -> np.ndarray:
         """(N,): the phase of least sweep in each interval between phases."""
+        if self._of is None or not np.array_equal(self._of, p):
+            self._of, self._lowest = np.array(p), self._found(p)
+        return self._lowest
+
+    def _found(self, p: np.ndarray) -> np.ndarray:
+        """`lowest`, by Newton's method."""
         cross = lambda a, b: self.side * (a[0] * b[1] - a[1] * b[0])
         off = np.zeros_like(self.phases)
         for _ in range(NEWTON):
@@ -44,8 +49,8 @@ class Stroke:
         return self.phases + off
 
     def swept(self, p: np.ndarray) -> np.ndarray:
-        """(N,): the least area about the centre that the loop p sweeps for a rad of phase, in each interval between
-        phases, over that of its first harmonic."""
+        """(N,): the least area about the centre that the loop p sweeps for each phase, in every interval between phases, over
+        that of its first harmonic."""
         (u, v), (du, dv) = self._going(p, self.lowest(p))[:2]
         return self.side * (u * dv - v * du) / self.size
 
