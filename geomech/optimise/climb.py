@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -96,10 +97,12 @@ class _Way:
         room = np.where(np.arange(len(x)) < moving, stride, np.inf)
         try:
             self(x)
-            found = minimize(
-                self.down, x, jac=True, method="SLSQP", constraints=self.rules,
-                bounds=np.stack([x - room, x + room], -1), options={"maxiter": most, "ftol": tolerance}, callback=self,
-            )  # fmt: skip
+            with warnings.catch_warnings():  # SciPy before 1.13 says so where it clips its own steps to the bounds
+                warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
+                found = minimize(
+                    self.down, x, jac=True, method="SLSQP", constraints=self.rules,
+                    bounds=np.stack([x - room, x + room], -1), options={"maxiter": most, "ftol": tolerance}, callback=self,
+                )  # fmt: skip
         except Enough:
             return "spent"
         except RuntimeError:
