@@ -9,14 +9,15 @@ from rft.effects import (
     EndCaps,
     GrainInertia,
     SkinFriction,
+    Slope,
     TowedSled,
     Transient,
 )
-from rft.media import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
-from rft.time_stepping import TimeSteps, time_steps
+from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
+from rft.stepping import TimeSteps, time_steps
 from rft.work import Work, work_done
 
-SOLVER = 7  # raised with every change that moves a number: what was computed before is not taken up after it
+SOLVER = 8  # raised with every change that moves a number: what was computed before is not taken up after it
 
 __all__ = [
     "CATALOGUE",
@@ -35,6 +36,7 @@ __all__ = [
     "Medium",
     "Serpenoid",
     "SkinFriction",
+    "Slope",
     "Solution",
     "Surface",
     "Table",

@@ -1,12 +1,25 @@
-"""python -m rft: make the compiled code of the solver now, so that no later run has to."""
+"""python -m rft: compile the solver, the contact with the ground and the steps of robots now, so that no later run has to."""
 
 import sys
 
-from rft import compiled
+from rft import CATALOGUE, Chain, body_velocity
+from rft.balance.backend import check, preferring
+from rft.laws.records import record
+from rft.plates import VERTICAL, CLeg, loads
+from rft.walking import Fineness, Rhex, Tripod, Walker, engine
 
 try:
-    kept = compiled.make()
+    check("numba")
 except ValueError as error:
     sys.exit(str(error))
+law, stress, leg = CATALOGUE["glass-0.3mm-loose"].medium, VERTICAL["generic"].stress, CLeg(0.02, 0.01)
+with preferring("numba"):
+    body_velocity(law, Chain(), (1.0, 1.0), (1.0, 1.0))
+    loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
+    engine("planar").pace(Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress), Fineness(), 0.0)
+
+from rft.balance.compiled import kernel  # noqa: E402  # which loads numba
+
+path = kernel(type(record(law)))._cache.path
 none = "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
-print(f"compiled code is kept in {compiled.folder()}" if kept else none)
+print(f"compiled code is kept in {path.parent}" if path.exists() else none)

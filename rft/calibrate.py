@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rft.checks import in_range, require, shown
 from rft.drag import Rod, RodDrag
 from rft.effects.end_caps import EndCaps
-from rft.media.base import Medium, in_range, require, shown
-from rft.media.coulomb import Coulomb
-from rft.media.granular import Granular
-from rft.media.viscous import Viscous
+from rft.laws.base import Medium
+from rft.laws.coulomb import Coulomb
+from rft.laws.granular import Granular
+from rft.laws.viscous import Viscous
 
 CAPS = "end_caps"
 MOST_CAPS = 10.0  # e of a hemisphere is 4

@@ -1,267 +1,233 @@
-"""A body meets the ground in contacts: groups of elements that share a force law. Effects change a `Model` of them.
+"""The balance of forces as a value: records of arrays, which effects change and which both drivers take.
 
-Velocities are true ones everywhere here, body lengths (and rad) per unit of the time of alphadot: an element slides along
-itself with v_t and sideways with v_n + s spin, s in [-1, 1] from its tail's end to its head's, so spin is its rate of
-turning times its half length. A load is (3, 4, n, B) as in `rft.loads`.
-"""
+Every array has the samples on its last axis, or one column there for all of them. So one function each takes samples
+out of a record (`take`), and applies a function to its arrays (`mapped`)."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
-from typing import Protocol, Self
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rft.bodies.base import Kinematics
-from rft.loads import element_load, rule_for
-from rft.media.base import Medium, dry_terms, is_closed, viscous_terms
-from rft.sides import sided
+from rft.balance.newton import Frame
+from rft.bodies.base import Body, Elements, checked_body, pace
+from rft.bodies.pieces import subdivide
+from rft.checks import in_range
+from rft.laws.base import is_linear, power_of, remembered, require_drag
+from rft.laws.records import record
+from rft.link import Factor, Incline, Memory
+from rft.momentum import Momenta
+
+MOST_PIECES = 10_000  # to a body length
+ONE, ZERO = np.ones((1, 1)), np.zeros((1, 1))
+NO_FACTOR = Factor(ONE, ONE, ONE)
+NO_INCLINE = Incline(ONE, ZERO, ONE, ZERO, ZERO)
+NO_MEMORY = Memory(ONE, ONE, ZERO, ONE, ONE, -ONE, ZERO)
 
 
-class PerSample:
-    """Base of what holds parameters: an array has the samples of a batch on its last axis, or one element there for all."""
+class Contact(NamedTuple):
+    """Elements (n, B) on the ground. station: (n, 1), their centres along the body, 0 at its tail, 1 at its head.
+    buried: (n, 1), 1 where they lie at the body's depth, else 0. factor: of their drag. incline: of the ground."""
 
-    def take(self, index) -> Self:
-        """The same for the samples ``index``; itself where nothing differs from sample to sample."""
-        return self.having(**{f.name: x[..., index] for f in fields(self) if _differs(x := getattr(self, f.name))})
+    elements: Elements
+    station: np.ndarray
+    buried: np.ndarray
+    factor: Factor = NO_FACTOR
+    incline: Incline = NO_INCLINE
 
-    def having(self, **values) -> Self:
-        """The same with some parameters set, to arrays for one; checks, which are for single numbers, are not repeated."""
-        if not values:
-            return self
-        new = object.__new__(type(self))
-        new.__dict__.update({**self.__dict__, **values})
-        return new
+    def multiplied(self, forward, backward, across) -> Contact:
+        """Return the contact with its drag times these factors, numbers or arrays that broadcast to (n, B)."""
+        f = self.factor
+        products = f.forward * forward, f.backward * backward, f.across * across
+        return self._replace(factor=Factor(*(np.atleast_2d(x) for x in products)))
 
+    def joined(self, other: Contact) -> Contact:
+        """Return the elements of both contacts, those of the other last."""
 
-def _differs(x) -> bool:
-    return isinstance(x, np.ndarray) and x.ndim > 0 and x.shape[-1] != 1
+        def one(a, b):
+            columns = max(a.shape[-1], b.shape[-1])
+            return np.concatenate([np.broadcast_to(a, (n, columns)), np.broadcast_to(b, (m, columns))])
 
-
-class Law(Protocol):
-    """Averages of the drag on elements, and their tangent, (3, 4, n, B). Its parameters may differ from sample to sample but
-    not from element to element: that is a factor, or another contact. rate_independent: doubled velocities, and eps, give
-    the same drag."""
-
-    rate_independent: bool
-
-    def __call__(self, v_t, v_n, spin, eps) -> np.ndarray: ...
-    def take(self, index) -> Law: ...
+        n, m = len(self.station), len(other.station)
+        return mapped(one, self, other) if n else other
 
 
-class Factor(Protocol):
-    """What a contact's load is multiplied by, (along, across), arrays that broadcast to (n, B) or None for 1. It has no slope
-    but may jump where v_t = 0, and doubled velocities do not change it. Factors commute."""
+class Problem(NamedTuple):
+    """A body in balance.
 
-    def __call__(self, v_t, v_n, spin) -> tuple: ...
-    def take(self, index) -> Factor: ...
+    medium: the law, as given. law: its record (`rft.laws.records`). unit: of force, the drag of the medium on the
+    whole straight body along itself at unit speed (across where it has none along). lateral: the same across.
+    homogeneous, linear: whether doubled velocities have the same drag, or twice of it. sides: the body's own elements,
+    under the law. points: others fixed to them, under dry terms that face along them, point_terms (T, 3, n, 1). square:
+    (1, 1) or (1, B), drag over |v_n| v_n. memory: of the ground beside the sides. momenta: of the body, None without
+    mass. frame: measures of the samples."""
 
-
-class Share(Protocol):
-    """What is left of the drag across on the parts of elements that move to the left, and to the right: (2, n, B), and its
-    slopes in v_n and in spin, or None where there are none. Shares commute, and share one split of every element."""
-
-    def __call__(self, v_n, spin) -> tuple: ...
-    def take(self, index) -> Share: ...
-
-
-class Term(Protocol):
-    """A wrench on the frame that its motion xi (3, B) brings about, and the tangent, (3, 4, B), positive as drag is. size:
-    (B,) or a number, of its largest slope, for the rounding it brings."""
-
-    size: np.ndarray | float
-
-    def __call__(self, xi) -> np.ndarray: ...
-    def take(self, index) -> Term: ...
-    def on_elements(self, xi, motion: Kinematics, v) -> np.ndarray:
-        """(3, n, B): the part of it that each element of the body's side bears, velocities v (3, n, B)."""
-
-
-@dataclass(frozen=True)
-class Averages(PerSample):
-    """A medium's law on straight elements, integrated as ``rule`` says (`rft.loads`). nodes: points it takes an element."""
-
-    medium: Medium
-    rule: str = "exact"
-    averages: Callable = field(init=False, repr=False, compare=False)
-    nodes: int = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self):
-        object.__setattr__(self, "averages", element_load(self.medium, self.rule))
-        object.__setattr__(self, "nodes", rule_for(self.medium, self.rule)[1])
+    medium: Any
+    law: Any
+    unit: float
+    lateral: float
+    homogeneous: bool
+    linear: bool
+    sides: Contact
+    points: Contact
+    point_terms: np.ndarray
+    square: np.ndarray
+    memory: Memory
+    momenta: Momenta | None
+    frame: Frame
 
     @property
-    def rate_independent(self) -> bool:
-        return bool(dry_terms(self.medium)) and not any(viscous_terms(self.medium) or ())
+    def size(self) -> int:
+        """Number of samples."""
+        return self.frame.speed.shape[-1]
 
     @property
-    def numbers(self) -> tuple | None:
-        """For compiled code: dry terms, viscous coefficients, and whether it is a point's; None where it is no closed form."""
-        if self.rule != "exact" or not is_closed(self.medium):
-            return None
-        return sorted(self.medium.dry, key=lambda term: term[1] == 0.0), self.medium.viscous, False
+    def acts(self) -> tuple[bool, bool, bool, bool]:
+        """Whether factors, drag with the square of the speed, memory and a slope act on the body's sides."""
+        sides = self.sides
+        plain = sides.factor is NO_FACTOR, self.square is ZERO, self.memory is NO_MEMORY, sides.incline is NO_INCLINE
+        return tuple(not x for x in plain)
 
-    def __call__(self, v_t, v_n, spin, eps) -> np.ndarray:
-        return self.averages(v_t, v_n, spin, eps)
+    @property
+    def speed(self) -> np.ndarray:
+        """Scale (1, B or 1) that makes velocities true ones: 1 where doubled velocities give the same drag."""
+        same = self.homogeneous and not any(self.acts[1:3]) and self.momenta is None
+        return ONE if same else self.frame.speed
+
+    def take(self, index) -> Problem:
+        """Return the problem of the samples ``index``."""
+        return Problem(*self[:6], *take(self[6:], index))  # a law is the same for all samples
+
+    def with_points(self, points: Contact, terms: Sequence[tuple[float, float, float]]) -> Problem:
+        """Return the problem with more points, all of these dry terms (q, k_t, k_n)."""
+        new = np.repeat(np.array(terms, float)[:, :, None, None], len(points.station), 2)
+        count = max(len(self.point_terms), len(new))
+        missing = lambda x: np.broadcast_to(NO_TERM, (count - len(x), 3, x.shape[2], 1))
+        both = [np.concatenate([x, missing(x)]) for x in (self.point_terms, new)]
+        return self._replace(points=self.points.joined(points), point_terms=np.concatenate(both, 2))
 
 
-def everywhere(motion: Kinematics) -> Kinematics:
-    return motion
+NO_TERM = np.array([1.0, 0.0, 0.0])[:, None, None]  # (q, k_t, k_n)
+NO_POINTS = np.zeros((0, 3, 0, 1))
 
 
-@dataclass(frozen=True)
-class Contact:
-    """A group of elements and what acts on them: factors x (the law, each side of it times its shares) + additions.
+def mapped(function: Callable, *trees):
+    """Return the record of function(array, ...) for the arrays of one record, or of several alike; the same record if
+    none changes."""
+    first = trees[0]
+    if not isinstance(first, tuple):
+        return function(*trees) if isinstance(first, np.ndarray) else first
+    parts = [mapped(function, *same) for same in zip(*trees)]
+    if all(a is b for a, b in zip(parts, first)):
+        return first
+    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
 
-    elements: of the plain body's `Kinematics`, that of the contact's own elements. stations: (n,), where they hang on the body,
-    0 its tail, 1 its head; None for the body's elements themselves, each at its centre. buried: whether it lies at the
-    body's depth.
+
+def take(tree, index) -> Any:
+    """Return the record of the samples ``index``."""
+    return mapped(lambda x: x if x.shape[-1] == 1 and x.ndim > 1 else x[..., index], tree)
+
+
+class Assembly(NamedTuple):
+    """A law, a body as its effects cut it, and the effects: what does not depend on the shape. Made by `assemble`.
+
+    station, fraction: (n, 1), the elements' centres along the body and their shares of its length. elements: how many
+    there are in all, added points among them.
     """
 
-    law: Law
-    elements: Callable[[Kinematics], Kinematics] = everywhere
-    stations: tuple[float, ...] | None = None
-    buried: bool = True
-    factors: tuple[Factor, ...] = ()
-    shares: tuple[Share, ...] = ()
-    additions: tuple[Law, ...] = ()
-
-    @property
-    def rate_independent(self) -> bool:
-        return self.law.rate_independent and not self.shares and not self.additions
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is a law in closed form and no more."""
-        closed = isinstance(self.law, Averages) and self.law.nodes == 1
-        return closed and not (self.factors or self.shares or self.additions)
-
-    def load(self, v_t, v_n, spin, eps) -> np.ndarray:
-        """(3, 4, n, B) at the velocities of its elements, (n, B) each."""
-        out = sided(self.law, self.shares, v_t, v_n, spin, eps) if self.shares else self.law(v_t, v_n, spin, eps)
-        for factor in self.factors:
-            along, across = factor(v_t, v_n, spin)
-            if along is not None:
-                out[0] *= along
-            if across is not None:
-                out[1:] *= across
-        for extra in self.additions:
-            out += extra(v_t, v_n, spin, eps)
-        return out
-
-    def places(self, motion: Kinematics) -> np.ndarray:
-        """(n,): stations of the elements, whose `Kinematics` is given."""
-        if self.stations is not None:
-            return np.array(self.stations)
-        half = motion.half[:, 0]
-        return np.cumsum(2 * half) - half
-
-    def take(self, index) -> Contact:
-        kept = {name: getattr(self, name) for name in ("factors", "shares", "additions")}
-        new = {name: _taken(parts, index) for name, parts in kept.items()}
-        law = self.law.take(index)
-        if law is self.law and all(new[name] is kept[name] for name in kept):
-            return self
-        return replace(self, law=law, **new)
-
-
-def _taken(parts: tuple, index) -> tuple:
-    """The parts for these samples; the very same tuple where none differs from sample to sample."""
-    new = tuple(part.take(index) for part in parts)
-    return parts if all(a is b for a, b in zip(new, parts)) else new
-
-
-SIDE = "side"  # the contact that every body has: its own elements
-
-
-@dataclass(frozen=True)
-class Model:
-    """What touches the ground, by name, and what else pulls at the frame. unit: of forces, the drag of the medium on the
-    whole straight body along itself at unit speed (across where it has none along)."""
-
-    medium: Medium
-    contacts: dict[str, Contact]
+    medium: Any
+    law: Any
     unit: float
-    terms: tuple[Term, ...] = ()
+    lateral: float
+    homogeneous: bool
+    linear: bool
+    body: Body
+    effects: tuple
+    station: np.ndarray
+    fraction: np.ndarray
+    ones: np.ndarray
+    none: Contact
+    elements: int
 
-    @classmethod
-    def of(cls, medium: Medium, rule: str = "exact") -> Model:
-        """A body's sides in a medium, and nothing else."""
-        law = Averages(medium, rule)
-        axial, lateral = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
-        return cls(medium, {SIDE: Contact(law)}, axial or lateral)
+    def at(self, alpha: np.ndarray, alphadot: np.ndarray, site=None) -> Problem:
+        """Return the balance at shapes and rates (joints, B). Effects that add points act first, so that their order is
+        free."""
+        problem = self.plain(alpha, alphadot)
+        for effect in self.effects:
+            problem = effect.apply(problem, site, None)
+        return problem
 
-    def touching(self, name: str, contact: Contact) -> Model:
-        """With one contact more."""
-        return replace(self, contacts={**self.contacts, name: contact})
+    @property
+    def points(self) -> int:
+        """Number of places of a sample at which the law is evaluated."""
+        return self.elements * np.size(getattr(self.law, "nodes", 0.0))
 
-    def changed(self, name: str, **more: tuple) -> Model:
-        """With more factors, shares or additions at a contact."""
-        old = self.contacts[name]
-        new = replace(old, **{what: getattr(old, what) + parts for what, parts in more.items()})
-        return replace(self, contacts={**self.contacts, name: new})
+    def take(self, index) -> Assembly:
+        """Return the same with the effects' parameters for the samples ``index``."""
+        effects = tuple(effect.take(index) for effect in self.effects)
+        same = all(a is b for a, b in zip(effects, self.effects))
+        return self if same else self._replace(effects=effects)
 
-    def pulled(self, term: Term) -> Model:
-        """With one term more."""
-        return replace(self, terms=(*self.terms, term))
+    def plain(self, alpha, alphadot) -> Problem:
+        """Return the balance without effects."""
+        e = self.body.motion(alpha, alphadot)
+        x, y = e.r_t * e.s + e.r_n * e.c, e.r_n * e.s - e.r_t * e.c
+        speed, mean = pace(self.body, alphadot)[None], self.fraction.T
+        frame = Frame(mean @ x, mean @ y, force_unit(self, speed), speed)
+        sides = Contact(e, self.station, self.ones)
+        return Problem(*self[:6], sides, self.none, NO_POINTS, ZERO, NO_MEMORY, None, frame)
 
-    @cached_property
-    def numbers(self) -> dict:
-        """What `rft.numbers` has made of it."""
-        return {}
-
-    @cached_property
-    def lateral(self) -> float:
-        """The drag across at unit speed, (-) as traction has it."""
-        return abs(float(self.medium.traction(0.0, 1.0)[1]))
-
-    @cached_property
-    def rate_independent(self) -> bool:
-        return not self.terms and all(c.rate_independent for c in self.contacts.values())
-
-    def motions(self, plain: Kinematics) -> dict[str, Kinematics]:
-        """Elements of every contact, from those of the plain body."""
-        return {name: contact.elements(plain) for name, contact in self.contacts.items()}
-
-    def load(self, v: np.ndarray, rows: list[slice], eps) -> np.ndarray:
-        """(3, 4, n, B) of all contacts' elements, one contact after the other in the given rows of v (3, n, B)."""
-        loads = [c.load(*v[:, which], eps) for c, which in zip(self.contacts.values(), rows)]
-        return loads[0] if len(loads) == 1 else np.concatenate(loads, 2)
-
-    def drag(self, rows: list[slice], eps: float) -> np.ndarray | None:
-        """(3, 4, n, 1), the load at rest, with its tangents, which is all there is to know of it where it is rounded off so
-        far: of laws in closed form that are the same for all samples, with nothing else; None for other models."""
-        size = rows[-1].stop
-        if (size, eps) not in self._drags:
-            plain = self.alike and not self.terms and all(c.is_plain for c in self.contacts.values())
-            self._drags[size, eps] = self.load(np.zeros((3, size, 1)), rows, np.array([eps])) if plain else None
-        return self._drags[size, eps]
-
-    @cached_property
-    def _drags(self) -> dict:
-        return {}
-
-    def take(self, index) -> Model:
-        """For the samples ``index``; itself where nothing differs from sample to sample."""
-        return self if self.alike else self._taken(index)
-
-    @cached_property
-    def alike(self) -> bool:
-        """Whether it holds the same for all samples of a batch."""
-        return self._taken(slice(0, 0)) is self
-
-    def _taken(self, index) -> Model:
-        old = tuple(self.contacts.values())
-        contacts, terms = _taken(old, index), _taken(self.terms, index)
-        if contacts is old and terms is self.terms:
-            return self
-        return replace(self, contacts=dict(zip(self.contacts, contacts)), terms=terms)
+    def rescaled(self, problem: Problem, speed: np.ndarray) -> Problem:
+        """Return the problem with another scale of speed (B,)."""
+        speed = speed[None]
+        return problem._replace(frame=problem.frame._replace(speed=speed, force=force_unit(self, speed)))
 
 
-def rows(motions: dict[str, Kinematics]) -> list[slice]:
-    """Where every contact's elements are among all of them, one contact after the other."""
-    ends = np.cumsum([0, *(len(m.half) for m in motions.values())]).tolist()
-    return [slice(*pair) for pair in itertools.pairwise(ends)]
+def assemble(medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40) -> Assembly:
+    """Return what is solved for. ValueError for what is no body, for a medium that pushes, or one that an effect does
+    not take.
+
+    The result is remembered for the last few arguments that cannot change, since small batches take no longer to solve
+    than to prepare."""
+    return _assembled(medium, body, tuple(effects), rule, pieces)
+
+
+@remembered
+def _assembled(medium, body, effects, rule, pieces) -> Assembly:
+    require_drag(medium)
+    body = pieced(checked_body(body), effects, pieces)
+    for effect in effects:
+        effect.check(medium)
+    zero = np.zeros((body.joints, 1))
+    e = body.motion(zero, zero)
+    station = np.cumsum(2 * e.half, 0) - e.half
+    none = Contact(Elements(*(x[:0] for x in e)), station[:0], station[:0])
+    ordered = tuple(sorted(effects, key=lambda effect: not effect.adds))
+    fraction = e.half / e.half.sum()
+    along, across = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
+    given = medium, record(medium, rule), along or across, across, power_of(medium) == 0, is_linear(medium)
+    plain = Assembly(
+        *given, body, tuple(e for e in ordered if e.adds), station, fraction, np.ones_like(station), none, 0
+    )
+    count = len(station) + len(plain.at(zero, zero + 1.0).points.station)
+    return plain._replace(effects=ordered, elements=count)
+
+
+def pieced(body: Body, effects: Sequence, pieces: int = 40) -> Body:
+    """Return the body as finely cut as its effects need. ValueError for no number of pieces."""
+    in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
+    return subdivide(body, pieces) if any(e.varies for e in effects) else body
+
+
+def force_unit(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
+    """Return the unit of residuals (1, B): drag at the samples' speeds, in dry media not below the drag at unit
+    speed."""
+    medium, unit = assembly.medium, assembly.unit
+    if assembly.linear:
+        return unit * speed
+    closed = getattr(medium, "viscous", None)
+    if closed is None:
+        along, across = (np.abs(medium.traction(*v)[k]) for k, v in enumerate(((speed, 0 * speed), (0 * speed, speed))))
+        return np.where(along > 0, along, across)
+    return unit + closed[0] * np.maximum(speed - 1.0, 0.0)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.media.base import in_range, real_array, require
-from rft.media.catalogue import GRAVITY
+from rft.checks import in_range, real_array, require
+from rft.laws.catalogue import GRAVITY
 
 NEGATIVE = 0.1  # of the largest force: what may be missing to zero before a force counts as pushing
 LIKE_RADIANS = 7.0  # degrees: angles that stay below are taken for radians

@@ -1,14 +1,15 @@
 """How far time stepping is from its limit cycle, and how a heavy body gets there sooner.
 
 From cycle to cycle the displacement changes by less and less; what is left is the sum of all changes to come, not the
-last of them. Without mass the last few give their ratio. Where the ground remembers in cells, changes at last come and go
-at random: these take turns in sign, and do not add up. A heavy body forgets over many cycles, but only what its three
-velocities at the start of a cycle are: the map from these to those at the next start is affine near its fixed point, and
-the last few cycles tell it along the ways they went (Anderson's mixing, for which nothing but the velocities is touched:
-what the ground remembers follows by itself).
-"""
+last of them. Without mass the last few give their ratio. Where the ground remembers in cells, changes at last come and
+go at random: these take turns in sign, and do not add up. A heavy body forgets over many cycles, but only what its
+three velocities at the start of a cycle are: the map from these to those at the next start is affine near its fixed
+point, and the last few cycles tell it along the ways they went (Anderson's mixing, for which nothing but the velocities
+is touched: what the ground remembers follows by itself)."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,62 +22,73 @@ ASTRAY = 5.0  # times the least change of velocity so far: a kick that led away 
 FAILURES = 10  # after so many of these a sample goes round and round without
 
 
-class Approach:
-    """Cycle after cycle of B samples."""
+class Cycles(NamedTuple):
+    """The last cycles of B samples, the latest at the end, nan where there was none.
 
-    def __init__(self, samples: int):
-        self.moved, self.change, self.drift = None, None, np.full(samples, np.inf)
-        self.ratios: list[np.ndarray] = []
+    pose, start: (3, B), pose and velocity at the start of the cycle under way. moves: (6, 3, B), displacements. known:
+    (3, 6, 3, B), velocities at the start, their changes, and displacements, of a heavy body; calmest: (3, 3, B), those
+    of the cycle that changed least. failures: (1, B), kicks that led away from the limit. kick: (3, B), the change of
+    velocity that leads to the limit. drift: (B,), the largest component of how much displacement will yet change in all
+    cycles to come."""
 
-    def after(self, start, end, moved: np.ndarray) -> np.ndarray:
-        """(B,): how much displacement changes from the cycle before and in all to come, its largest component, after a cycle
-        that moved so, (3, B). start, end: (3, B), body velocities at the ends of the cycle."""
-        last, self.moved = self.moved, moved
-        if last is None:
-            return self.drift
-        before, self.change = self.change, moved - last
-        if before is not None:
-            ratio = self.change / np.where(before == 0, 1.0, before)
-            self.ratios = [*self.ratios[1 - RATIOS :], np.clip(ratio, -1.0, 1.0)]
-        ratio = np.clip(np.mean(self.ratios, axis=0), 0.0, SLOWEST) if self.ratios else UNKNOWN
-        return np.max(np.abs(self.change) / (1 - ratio), axis=0)
+    pose: np.ndarray
+    start: np.ndarray
+    moves: np.ndarray
+    known: np.ndarray
+    calmest: np.ndarray
+    failures: np.ndarray
+    kick: np.ndarray
+    drift: np.ndarray
 
 
-class HeavyApproach(Approach):
-    """The same with mass: from the last cycles' first velocities, their changes and displacements. A kick after which
-    velocities change more than in the calmest cycle so far is taken back, to the end of that."""
+def begin(samples: int) -> Cycles:
+    """Return the record before the first cycle."""
+    none, zero = np.full((3, DEEPEST, 3, samples), np.nan), np.zeros((3, samples))
+    calmest = np.stack([zero, zero + np.inf, zero])
+    return Cycles(zero, zero + np.nan, none[0], none, calmest, zero[:1], zero, np.full(samples, np.inf))
 
-    def __init__(self, samples: int):
-        super().__init__(samples)
-        self.cycles: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-        self.step, self.failures = np.zeros((3, samples)), np.zeros(samples, int)
-        self.calmest = tuple(np.full((3, samples), x) for x in (0.0, np.inf, 0.0))  # start, change and displacement
-        self.astray = np.zeros(samples, bool)
 
-    def after(self, start, end, moved) -> np.ndarray:
-        last, self.moved = self.moved, moved
-        if start is None:  # the first cycle starts from rest
-            return self.drift
-        now = start, end - start, moved
-        size, least = (np.abs(change).max(0) for change in (now[1], self.calmest[1]))
-        self.astray = (size > ASTRAY * least) & (self.step != 0).any(0)
-        self.failures += self.astray
-        self.calmest = tuple(np.where(size < least, x, y) for x, y in zip(now, self.calmest))
-        old = [*self.cycles[1 - DEEPEST :], now]
-        self.cycles = [tuple(np.where(self.astray, x, y) for x, y in zip(self.calmest, cycle)) for cycle in old]
-        if len(self.cycles) < 2:
-            return self.drift
-        starts, changes, moves = (np.diff(np.stack(x), axis=0) for x in zip(*self.cycles))
-        mix = _mix(changes, self.cycles[-1][1])
-        ahead = ((starts + changes) * mix[:, None]).sum(0)
-        self.step = np.where(self.astray, self.calmest[0] + self.calmest[1] - end, ahead)
-        to_come = (moves * mix[:, None]).sum(0)
-        return np.maximum(np.abs(to_come), np.abs(moved - last)).max(0)
+def light(c: Cycles, moved: np.ndarray) -> Cycles:
+    """Return the record after a cycle of a body without mass, with its displacement (3, B)."""
+    c = c._replace(moves=_appended(c.moves, moved))
+    changes = np.diff(c.moves, axis=0)[-RATIOS - 1 :]
+    changes = changes[~np.isnan(changes).any((1, 2))]
+    if not len(changes):
+        return c
+    ratios = np.clip(changes[1:] / np.where(changes[:-1] == 0, 1.0, changes[:-1]), -1.0, 1.0)
+    ratio = np.clip(ratios.mean(0), 0.0, SLOWEST) if len(ratios) else UNKNOWN
+    return c._replace(drift=np.max(np.abs(changes[-1]) / (1 - ratio), axis=0))
 
-    def kick(self, which: np.ndarray) -> np.ndarray:
-        """(3, B): change of velocity that leads the samples ``which`` to the limit, as far as is known."""
-        self.step = np.where(which & (self.astray | (self.failures < FAILURES)), self.step, 0.0)
-        return self.step
+
+def heavy(c: Cycles, moved: np.ndarray, end: np.ndarray, enough: float) -> Cycles:
+    """Return the record after a cycle of a heavy body that ended with a velocity (3, B).
+
+    A kick after which velocities change more than in the calmest cycle so far is taken back, to the end of that.
+    """
+    last, c = c.moves[-1], c._replace(moves=_appended(c.moves, moved))
+    if np.isnan(c.start).any():  # the first cycle starts from rest
+        return c
+    now = np.stack([c.start, end - c.start, moved])
+    size, least = np.abs(now[1]).max(0), np.abs(c.calmest[1]).max(0)
+    astray = (size > ASTRAY * least) & (c.kick != 0).any(0)
+    calmest, failures = np.where(size < least, now, c.calmest), c.failures + astray
+    known = _appended(c.known, now)
+    known = np.where(astray & ~np.isnan(known), calmest[:, None], known)
+    c = c._replace(known=known, calmest=calmest, failures=failures)
+    steps = np.diff(known, axis=1)
+    starts, changes, moves = steps[:, ~np.isnan(steps).any((0, 2, 3))]
+    if not len(starts):
+        return c
+    mix = _mix(changes, known[1, -1])[:, None]
+    drift = np.maximum(np.abs((moves * mix).sum(0)), np.abs(moved - last)).max(0)
+    ahead = np.where(astray, calmest[0] + calmest[1] - end, ((starts + changes) * mix).sum(0))
+    may = (drift > enough) & (astray | (failures[0] < FAILURES))
+    return c._replace(drift=drift, kick=np.where(may, ahead, 0.0))
+
+
+def _appended(old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Return the last cycles with one more, in place of the first."""
+    return np.concatenate([old[..., 1:, :, :], new[..., None, :, :]], -3)
 
 
 def _mix(changes: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -8,11 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import checked_input
-from rft.bodies.base import Body, Kinematics, checked_body, halves, pace
+from rft.balance.arrays import loads as loads_on
+from rft.balance.arrays import moved, velocities
+from rft.balance.newton import times, to_frame
+from rft.bodies.base import Body, Elements, checked_body, halves, pace
 from rft.bodies.pieces import PIECES
-from rft.contact import SIDE, Model
-from rft.effects.base import Effect, broken, folded, pieced
-from rft.media.base import Medium, real_array, require
+from rft.checks import real_array, require
+from rft.contact import Problem, assemble
+from rft.effects.base import Effect, broken
+from rft.laws.base import Medium
+from rft.momentum import on_elements
+from rft.premise import SHAPE_ALONE
 
 
 class Work(NamedTuple):
@@ -51,48 +57,50 @@ def work_done(
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
     require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
     broken(effects)  # refuses what is no effect
-    pieces_of = pieced(body, effects, pieces)
-    model = folded(effects, medium, pieces_of, loads)
+    assembly = assemble(medium, body, effects, loads, pieces)
+    assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    speed = pace(body, alphadot)
-    eps = regularisation * np.where(speed > 0, speed, 1.0)  # a body at rest: any will do
-    done = done_by(model, halves(body), model.motions(pieces_of.motion(alpha, alphadot)), xi, eps)
+    problem, speed = assembly.at(alpha, alphadot), pace(body, alphadot)
+    scale = np.where(speed > 0, speed, 1.0)  # a body at rest: any will do
+    problem = assembly.rescaled(problem, scale)
+    done = done_by(problem, halves(body), xi, regularisation * scale)
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 
 
-def done_by(model: Model, whole: np.ndarray, motions: dict[str, Kinematics], xi, eps) -> Work:
-    """`Work` of B samples at body velocities xi (3, B), in body lengths.
+def done_by(problem: Problem, whole: np.ndarray, xi: np.ndarray, rounding: np.ndarray) -> Work:
+    """Return the work of B samples at body velocities xi (3, B), in body lengths.
 
-    motions: kinematics of the elements of each contact, by its name. whole: half lengths of the body's own elements, of
-    which those of the model may be pieces; bending moments are those between the body's own. eps: (B,), the speed below
-    which dry friction is rounded off.
-    """
-    power, borne = 0.0, {}
-    for name, contact in model.contacts.items():
-        motion = motions[name]
-        v = motion.v + motion.carried(xi)
-        f = contact.load(*v, eps)[:, 0]
-        power = power + (motion.weight * f * v).sum((0, 1))
-        borne[name] = motion.wrenches(f)
-        if name == SIDE:
-            slip = np.average(np.arctan2(np.abs(v[1]), np.abs(v[0])), 0, motion.half[:, 0])
-            borne[name] += sum(term.on_elements(xi, motion, v) for term in model.terms)
-    return Work(power, _moments(model, motions, borne, whole), slip)
+    whole: (n,), half lengths of the body's own elements, of which those of the problem may be pieces; bending moments
+    are those between the body's own. rounding: (B,), the speed below which dry friction is rounded off."""
+    scale = problem.frame.speed
+    v = moved(problem, velocities(problem), *(xi / scale))
+    power, borne, stations = 0.0, [], []
+    for (e, load), u, contact in zip(loads_on(problem, v, rounding / scale[0]), v, (problem.sides, problem.points)):
+        force = [e.weight * x for x in (load.t, load.n, load.w)]
+        weight = [e.weight * contact.incline.weight * x for x in (contact.incline.down_t, contact.incline.down_n)]
+        on_ground = force[0] + weight[0], force[1] + weight[1], force[2]  # gravity's power is none of the ground's
+        power = power + sum(f * scale * x for f, x in zip(on_ground, u)).sum(0)
+        borne.append(np.stack(np.broadcast_arrays(*to_frame(e, *force))))
+        stations.append(contact.station[:, 0])
+    e, (v_t, v_n, _) = problem.sides.elements, v[0]
+    slip = np.average(np.arctan2(np.abs(v_n), np.abs(v_t)), 0, e.half[:, 0])
+    if problem.momenta is not None:
+        borne[0] = borne[0] + on_elements(e, problem.momenta, times(scale, v[0]))
+    return Work(power, _moments(e, np.concatenate(borne, 1), np.concatenate(stations), whole), slip)
 
 
-def _moments(model: Model, motions, borne: dict[str, np.ndarray], whole: np.ndarray) -> np.ndarray:
-    """(B, n - 1) from the wrenches on the frame, (3, k, B) for each contact, that elements oppose to the motion.
+def _moments(sides: Elements, borne: np.ndarray, stations: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Return the bending moments (B, n - 1) from the wrenches (3, k, B) on the frame that elements oppose to the
+    motion.
 
     The medium pushes the other way. At a point between two elements the body must hold the tail's side, and pushes the
-    head's side with the opposite: with the moment about that point of all that hangs on the tail's side.
+    head's side with the opposite: with the moment about that point of all that is attached on the tail's side.
     """
-    side = motions[SIDE]
-    ends = np.cumsum(2 * side.half[:, 0])
+    ends = np.cumsum(2 * sides.half[:, 0])
     last = np.searchsorted(ends, np.cumsum(2 * whole)[:-1] - 1e-9 * whole[0])  # piece on the tail's side of each point
-    stations = np.concatenate([model.contacts[name].places(motions[name]) for name in borne])
     order = np.argsort(stations, kind="stable")
-    so_far = np.cumsum(np.concatenate(list(borne.values()), 1)[:, order], 1)
+    so_far = np.cumsum(borne[:, order], 1)
     x, y, turn = so_far[:, np.searchsorted(stations[order], ends[last]) - 1]
-    point = (side.place + side.half * (side.c + 1j * side.s))[last]
+    point = (sides.place + sides.half * (sides.c + 1j * sides.s))[last]
     return (point.real * y - point.imag * x - turn).T

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import Kinematics, numbered
+from rft.bodies.base import Elements, Length, numbered
 from rft.bodies.chain import Chain
-from rft.media.base import in_range, is_number, require, shown
+from rft.checks import Number, check_numbers, require, shown
 
 
 @dataclass(frozen=True)
@@ -20,17 +21,15 @@ class Backbone:
     """A body of equal elements, bent at every one of the ``elements`` - 1 points between them, as a wave or a measured
     centreline prescribes.
 
-    elements (-): 3 to 2000. length (m): the whole body, in the unit wanted for displacement; 1 for body lengths.
     frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., those of that element.
     """
 
-    elements: int = 100
-    length: float = 1.0
+    elements: Annotated[int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)] = 100
+    length: Length = 1.0
     frame: str = "mean"
 
     def __post_init__(self):
-        in_range("elements", self.elements, 3, 2000, whole=True)
-        object.__setattr__(self, "elements", int(self.elements))
+        check_numbers(self)
         self.chain  # noqa: B018 (checks length and frame)
 
     @cached_property
@@ -52,7 +51,7 @@ class Backbone:
         shape variables themselves."""
         return None
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         """Elements in the body frame while that is held still; alpha, alphadot: (joints, B)."""
         if self.bends is None:
             return self.chain.motion(alpha, alphadot)
@@ -71,18 +70,16 @@ class Backbone:
 
 @dataclass(frozen=True)
 class Serpenoid(Backbone):
-    """Two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s), s from 0 at the
-    tail to 1 at the head. A circle in (alpha_1, alpha_2) is a travelling wave: towards the head, run backwards
+    """Two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s), s from 0 at
+    the tail to 1 at the head. A circle in (alpha_1, alpha_2) is a travelling wave: towards the head, run backwards
     (reverse) towards the tail, which drives the body head first.
-
-    waves (-): on the body, > 0 and at most elements / 4.
     """
 
-    waves: float = 1.0
+    waves: Annotated[float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")] = 1.0
 
     def __post_init__(self):
         super().__post_init__()
-        good = is_number(self.waves) and 0 < self.waves <= self.elements / 4
+        good = 0 < self.waves <= self.elements / 4
         require(good, f"waves must be > 0 and at most elements / 4, got {shown(self.waves)}")
 
     @property
@@ -101,17 +98,12 @@ class Serpenoid(Backbone):
 
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
-    """Sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad).
+    """Sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
 
-    sections (-): arcs, a divisor of elements.
-    """
-
-    sections: int = 2
+    sections: Annotated[int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)] = 2
 
     def __post_init__(self):
         super().__post_init__()
-        in_range("sections", self.sections, 1, self.elements, whole=True)
-        object.__setattr__(self, "sections", int(self.sections))
         fits = self.elements % self.sections == 0
         require(fits, f"sections must divide elements ({self.elements}), got {self.sections!r}")
 

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.media.base import remembered, require, shown
+from rft.checks import Number, require, shown
+from rft.laws.base import remembered
+
+Length = Annotated[
+    float, Number(1e-15, 1e15, "m", "length of the body, in the unit wanted for displacement; 1 for body lengths")
+]
 
 
-class Kinematics(NamedTuple):
-    """Kinematics of n straight elements for B samples, in the body frame and in body lengths; arrays (n, B) if not said.
+class Elements(NamedTuple):
+    """Straight elements of a body in its frame, arrays (n, B) for n elements and B samples, lengths in body lengths.
 
-    c, s: cosine and sine of each element's heading. r_t, r_n: components along and across the element of the velocity
-    that a unit turning rate of the frame gives its centre. half: (n, 1), half lengths, 0 for a point such as an end cap.
-    weight: (n, 1), the factor of an element's drag per unit length, its length for a piece of body. v: (3, n, B), the
-    velocities (v_t, v_n, spin) of `rft.loads` that the change of shape alone gives the element, the frame being held.
-    """
+    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
+    turning rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
+    which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
+    and turning rate times half length."""
 
     c: np.ndarray
     s: np.ndarray
@@ -25,91 +29,35 @@ class Kinematics(NamedTuple):
     r_n: np.ndarray
     half: np.ndarray
     weight: np.ndarray
-    v: np.ndarray
+    v_t: np.ndarray
+    v_n: np.ndarray
+    v_w: np.ndarray
 
     @classmethod
-    def of(cls, along, place, velocity, turn, half) -> Kinematics:
-        """From complex headings, places and velocities (n, B), turning rates (n, B) and half lengths (n, 1)."""
+    def of(cls, along, place, velocity, turn, half) -> Elements:
+        """Return the elements with complex headings, places and velocities (n, B), turning rates (n, B) and half
+        lengths (n, 1)."""
         back = along.conj()
         own, lever = velocity * back, place * back
-        v = np.array([own.real, own.imag, turn * half])
-        return cls(along.real.copy(), along.imag.copy(), -lever.imag, lever.real.copy(), half, 2.0 * half, v)
+        c, s = along.real.copy(), along.imag.copy()
+        return cls(
+            c, s, -lever.imag, lever.real.copy(), half, 2.0 * half, own.real.copy(), own.imag.copy(), turn * half
+        )
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocities with the frame held, (3, n, B)."""
+        return np.stack([self.v_t, self.v_n, self.v_w])
 
     @property
     def place(self) -> np.ndarray:
-        """(n, B), complex: the elements' centres; the lever (r_t, r_n) is i place conj(heading)."""
+        """Complex places of the centres in the frame, (n, B); the lever (r_t, r_n) is i place conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
-    @property
-    def centre(self) -> np.ndarray:
-        """(2, B): the mean place of the body's length."""
-        part = self.half / self.half.sum()
-        x, y = self.r_t * self.s + self.r_n * self.c, self.r_n * self.s - self.r_t * self.c
-        return np.array([(part * x).sum(0), (part * y).sum(0)])
-
-    def points(self, elements: list[int], ahead: np.ndarray, weight: np.ndarray) -> Kinematics:
-        """Of points (k,) that are fixed to some of the elements, so far ahead of their centres, (k, 1) each."""
-        at = np.array(elements)
-        v_t, v_n, spin = self.v[:, at]
-        v = np.stack([v_t, v_n + spin * ahead / self.half[at], np.zeros_like(v_t)])
-        return Kinematics(self.c[at], self.s[at], self.r_t[at], self.r_n[at] + ahead, np.zeros_like(ahead), weight, v)
-
-    @staticmethod
-    def stacked(motions: list[Kinematics]) -> Kinematics:
-        """The elements of several motions of the same samples, one after the other."""
-        if len(motions) == 1:
-            return motions[0]
-        *parts, v = zip(*motions)
-        return Kinematics(*(np.concatenate(x) for x in parts), np.concatenate(v, 1))
-
-    def wrenches(self, force: np.ndarray) -> np.ndarray:
-        """(3, n, B): force and moment on the frame of each element, from its averages; `wrench` is their sum."""
-        f_t, f_n, f_s = self.weight * force
-        c, s = self.c, self.s
-        return np.stack([c * f_t - s * f_n, s * f_t + c * f_n, self.r_t * f_t + self.r_n * f_n + self.half * f_s])
-
-    def take(self, keep: np.ndarray) -> Kinematics:
-        """The samples that ``keep`` (an index or mask over B) selects."""
-        c, s, r_t, r_n, half, weight, v = self
-        return Kinematics(c[:, keep], s[:, keep], r_t[:, keep], r_n[:, keep], half, weight, v[:, :, keep])
-
-    @staticmethod
-    def join(motions: list[Kinematics]) -> Kinematics:
-        """The samples of several motions of one body, side by side."""
-        c, s, r_t, r_n, halves, weights, v = zip(*motions)
-        fixed = halves[0], weights[0]
-        return Kinematics(*(np.concatenate(x, -1) for x in (c, s, r_t, r_n)), *fixed, np.concatenate(v, -1))
-
-    def carried(self, xi: np.ndarray) -> np.ndarray:
-        """(3, n, B): what the body velocity xi (3, B) adds to every element's (v_t, v_n, spin)."""
-        x, y, turn = xi
-        out = np.empty_like(self.v)
-        np.add(self.c * x + self.s * y, self.r_t * turn, out=out[0])
-        np.add(self.c * y - self.s * x, self.r_n * turn, out=out[1])
-        np.multiply(self.half, turn, out=out[2])
-        return out
-
-    def wrench(self, force: np.ndarray) -> np.ndarray:
-        """(3, ..., B): force and moment on the frame from element averages (3, ..., n, B); the transpose of `carried`."""
-        f_t, f_n, f_s = force
-        weight = self.weight
-        c, s = weight * self.c, weight * self.s
-        parts = np.empty_like(force)
-        np.subtract(c * f_t, s * f_n, out=parts[0])
-        np.add(s * f_t, c * f_n, out=parts[1])
-        np.add(weight * self.r_t * f_t + weight * self.r_n * f_n, weight * self.half * f_s, out=parts[2])
-        return parts.sum(-2)
-
-    def assembled(self, load: np.ndarray) -> np.ndarray:
-        """(3, 4, B) from element loads (3, 4, n, B) as `rft.loads` gives them: net force and moment in column 0, their
-        derivative with respect to xi, sum of J^T H J with J the matrix of `carried`, in columns 1 to 3."""
-        to_t, to_n, to_w = load[:, 1], load[:, 2], load[:, 3]
-        columns = np.empty_like(load)
-        columns[:, 0] = load[:, 0]
-        np.subtract(self.c * to_t, self.s * to_n, out=columns[:, 1])
-        np.add(self.s * to_t, self.c * to_n, out=columns[:, 2])
-        np.add(self.r_t * to_t + self.r_n * to_n, self.half * to_w, out=columns[:, 3])
-        return self.wrench(columns)
+    def fixed(self, owner: list[int], ahead: np.ndarray, weight: np.ndarray) -> Elements:
+        """Return points fixed to some of the elements, ``ahead`` of their centres, (k, 1); weight: (k, 1)."""
+        c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[owner] for x in self)
+        return Elements(c, s, r_t, r_n + ahead, 0.0 * ahead, weight, v_t, v_n + v_w * ahead / half, 0.0 * v_w)
 
 
 class Body(Protocol):
@@ -122,7 +70,7 @@ class Body(Protocol):
     @property
     def joints(self) -> int: ...
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics: ...
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements: ...
 
 
 def checked_body(body) -> Body:
@@ -134,14 +82,13 @@ def checked_body(body) -> Body:
 
 @remembered
 def is_reversible(body: Body) -> bool:
-    """Whether a body with its head taken for its tail is the same one, its frame too: tried at a few shapes. Then the frame
-    is turned by pi, and the joints of -alpha backwards are those of alpha."""
+    """Whether a body with its head taken for its tail is the same one, its frame too: tried at a few shapes. Then the
+    frame is turned by pi, and the joints of -alpha backwards are those of alpha."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
     one, other = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
-    turned = Kinematics(one.c, one.s, -one.r_t, -one.r_n, one.half, one.weight, one.v * [[[-1.0]], [[-1.0]], [[1.0]]])
-    pairs = zip([*turned[:6], *turned.v], [*other[:6], *other.v])
-    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in pairs)
+    turned = one._replace(r_t=-one.r_t, r_n=-one.r_n, v_t=-one.v_t, v_n=-one.v_n)
+    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(turned, other))
 
 
 def numbered(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
@@ -173,7 +120,8 @@ def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
 
 
 def pace(body: Body, alphadot: np.ndarray) -> np.ndarray:
-    """(B,): the size of rates (joints, B), by which velocities are scaled; of the joints' own where a body has modes."""
+    """(B,): the size of rates (joints, B), by which velocities are scaled; of the joints' own where a body has
+    modes."""
     rates = _joint_angles(body, alphadot)
     return np.sqrt((rates * rates).sum(0))
 

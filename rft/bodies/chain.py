@@ -6,12 +6,13 @@ import math
 import re
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import Kinematics, numbered
+from rft.bodies.base import Elements, Length, numbered
 from rft.bodies.modes import checked, rows
-from rft.media.base import in_range, real_array, require, shown
+from rft.checks import Number, check_numbers, real_array, require, shown
 from rft.se2 import rotated
 
 
@@ -19,21 +20,21 @@ from rft.se2 import rotated
 class Chain:
     """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
 
-    lengths (-): relative link lengths, all > 0, at least two. length (m): the whole body, in the unit wanted for
-    displacement; 1 for body lengths. frame (-): "mean", centre of mass of a uniform body and length-weighted mean heading
-    (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
+    lengths (-): relative link lengths, all > 0, at least two. frame (-): "mean", centre of mass of a uniform body and
+    length-weighted mean heading (the paper's), or "link-1", "link-2" ..., centre and heading of that link.
 
-    modes (-): rows of joint angles; then the shape variables are the modes' amplitudes m_1, m_2 ... in place of the joint
-    angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on the body
-    (`rft.bodies.modes`), of which a circle is a travelling wave. Speeds, and with them the regularisation, stay those of
-    the joints. waves (-): on the body, of serpenoid modes, 1 if left out.
-    """
+    modes (-): rows of joint angles; then the shape variables are the modes' amplitudes m_1, m_2 ... in place of the
+    joint angles, alpha_k = sum over j of m_j modes[j][k]. "serpenoid": the cosine and the sine of ``waves`` waves on
+    the body (`rft.bodies.modes`), of which a circle is a travelling wave. Speeds, and with them the regularisation,
+    stay those of the joints."""
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
-    length: float = 1.0
+    length: Length = 1.0
     frame: str = "mean"
     modes: tuple[tuple[float, ...], ...] | str | None = None
-    waves: float | None = None
+    waves: Annotated[float | None, Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out")] = (
+        None
+    )
 
     def __post_init__(self):
         lengths = real_array("lengths", self.lengths)
@@ -44,9 +45,9 @@ class Chain:
         require(good, f"lengths must all be finite and > 0, got {shown(list(self.lengths))}")
         short = min(self.lengths) / sum(self.lengths)
         require(short >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {short:.3g}")
-        in_range("length", self.length, 1e-15, 1e15)
-        self._link_of(self.frame)
         object.__setattr__(self, "modes", checked(self.modes, self.waves, len(self.lengths)))
+        check_numbers(self)
+        self._link_of(self.frame)
 
     def __getstate__(self) -> dict:
         """What a copy or a worker is sent: the fields, without what is worked out from them."""
@@ -110,8 +111,8 @@ class Chain:
         return x
 
     def _links(self, alpha, alphadot):
-        """Of the links in the body frame: complex headings (n, B), the headings' rates, and complex places and velocities of
-        the centres; and heading angles."""
+        """Of the links in the body frame: complex headings (n, B), the headings' rates, and complex places and
+        velocities of the centres; and heading angles."""
         size, link = alpha.shape[1], self._link
         both = self._in_frame(np.concatenate([self.joint_angles(alpha), self.joint_angles(alphadot)], 1), link)
         heading, turn = both[:, :size], both[:, size:]
@@ -124,15 +125,15 @@ class Chain:
         centres = self._in_frame(halves[:-1] + halves[1:], link)
         return along, turn, centres[:, :size], centres[:, size:], heading
 
-    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Kinematics:
+    def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
         """Links in the body frame while that is held still. alpha (rad), alphadot (rad per unit time): (joints, B)."""
         along, turn, place, velocity, _ = self._links(alpha, alphadot)
-        return Kinematics.of(along, place, velocity, turn, self._halves)
+        return Elements.of(along, place, velocity, turn, self._halves)
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """Pose h of another frame of this body in the body's own, and dh/dt: each (..., 3), in length units and rad.
 
-        alpha, alphadot: (..., joints). With `geomech.coordinates` this changes velocities and connections of frame.
+        alpha, alphadot: (..., joints). With `geomech.geometry.coordinates` this changes velocities and connections of frame.
         """
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
         _, *links = self._links(*(x.reshape(-1, self.joints).T for x in (alpha, alphadot)))
@@ -145,8 +146,8 @@ class Chain:
     def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Ends of the links in the world, tail to head, (..., links + 1, 2), in length units.
 
-        alpha: (..., joints), rad. pose: (..., 3), of the body's own frame in the world, (x, y) in length units, theta in rad.
-        """
+        alpha: (..., joints), rad. pose: (..., 3), of the body's own frame in the world, (x, y) in length units, theta
+        in rad."""
         alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
         require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last, got {alpha.shape}")
         require(pose.shape[-1:] == (3,), f"pose must be (x, y, theta), got {pose.shape}")

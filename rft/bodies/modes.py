@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rft.media.base import in_range, real_array, require, shown
+from rft.checks import in_range, real_array, require, shown
 
 LARGEST = 1e3  # of an entry: angles of larger modes have few digits left
 ROUNDING = 1e-12  # of the largest mode: one below it is nothing but rounding

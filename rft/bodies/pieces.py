@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rft.bodies.base import Body, Kinematics, Wrapped, halves
+from rft.bodies.base import Body, Elements, Wrapped, halves
 
 PIECES = 40  # to a body length, where nothing else is asked for; what they leave is estimated, not assumed
 
@@ -20,21 +20,18 @@ class Pieces(Wrapped):
 
     @cached_property
     def _cuts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(owner, centre, share): of each piece its element, and its middle and half length in the element's [-1, 1]."""
+        """(owner, centre, share): of each piece its element, and its middle and half length in the element's [-1,
+        1]."""
         counts = np.maximum(1, np.ceil(2 * halves(self.inner) / self.longest - 1e-9).astype(int))
         owner = np.repeat(np.arange(counts.size), counts)
         rank = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
         return owner, ((2 * rank + 1) / counts[owner] - 1)[:, None], (1 / counts[owner])[:, None]
 
-    def motion(self, alpha, alphadot) -> Kinematics:
+    def motion(self, alpha, alphadot) -> Elements:
         owner, centre, share = self._cuts
-        c, s, r_t, r_n, half, weight, v = self.inner.motion(alpha, alphadot)
-        v_t, v_n, spin = v[:, owner]
-        at = half[owner] * centre
-        v = np.stack([v_t, v_n + spin * centre, spin * share])
-        return Kinematics(
-            c[owner], s[owner], r_t[owner], r_n[owner] + at, half[owner] * share, weight[owner] * share, v
-        )
+        c, s, r_t, r_n, half, weight, v_t, v_n, v_w = (x[owner] for x in self.inner.motion(alpha, alphadot))
+        v_n = v_n + v_w * centre
+        return Elements(c, s, r_t, r_n + half * centre, half * share, weight * share, v_t, v_n, v_w * share)
 
 
 def subdivide(body: Body, pieces: int) -> Body:

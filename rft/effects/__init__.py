@@ -1,16 +1,17 @@
 """Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
 
-from rft.effects.base import ENGINES, Effect, Process, Site, broken, engine, folded, pieced, side_by_side, under_way
+from rft.effects.base import ENGINES, Effect, Site, broken, by_steps, engine, side_by_side
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
 from rft.effects.end_caps import EndCaps
 from rft.effects.grain_inertia import GrainInertia
 from rft.effects.skin import SkinFriction
+from rft.effects.slope import Slope
 from rft.effects.towed import TowedSled
 from rft.effects.transient import Transient
 
-ALL = (SkinFriction, EndCaps, TowedSled, DepthProfile, GrainInertia, BodyInertia, Transient, DisturbedGround)
+ALL = (SkinFriction, EndCaps, TowedSled, DepthProfile, Slope, GrainInertia, BodyInertia, Transient, DisturbedGround)
 KINDS = {effect.kind: effect for effect in ALL}
 
 __all__ = [
@@ -22,15 +23,13 @@ __all__ = [
     "Effect",
     "EndCaps",
     "GrainInertia",
-    "Process",
     "Site",
     "SkinFriction",
+    "Slope",
     "TowedSled",
     "Transient",
     "broken",
+    "by_steps",
     "engine",
-    "folded",
-    "pieced",
     "side_by_side",
-    "under_way",
 ]

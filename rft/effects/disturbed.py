@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.contact import SIDE, Model, PerSample
-from rft.effects.base import Process, Site
-from rft.media.base import check_ranges
+from rft.checks import Number, check_numbers
+from rft.contact import Problem
+from rft.effects.base import Effect, Site
 from rft.premise import Premise
 
-PATCH = 4.0  # body lengths: the ground is remembered on a square of this size that goes with the body
+PATCH = (
+    4.0  # body lengths: the ground is remembered on a square of this size, or a little more, that goes with the body
+)
 CELLS = 2.0  # cells of that square to a radius
+TILE = 32  # cells along a side of the tiles that the square consists of; those that a step does not mark are not copied
 AHEAD = 2.0  # radii from the body's axis at which the ground it will meet is looked up
 
 
 @dataclass(frozen=True)
-class DisturbedGround(Process):
+class DisturbedGround(Effect):
     """Drag across times 1 - weakening x disturbance of the ground on the side an element moves to.
 
-    radius (body lengths): half width of the track that the body leaves, 0.01 to 0.25. weakening (-): the share of drag lost
-    in fully disturbed ground, 0 to 1.
+    The track is fully disturbed up to half a radius from its axis, untouched beyond one and a half; disturbance, 0 to
+    1, does not heal (grains do not settle by themselves). The ground an element will meet is looked up two radii to its
+    left and right, outside its own present track. Drag near disturbed ground falls substantially by experiment (paper
+    Sec. IV B); the form, and every number, are assumed. Ground further than two body lengths off may be forgotten."""
 
-    The track is fully disturbed up to half a radius from its axis, untouched beyond one and a half; disturbance, 0 to 1,
-    does not heal (grains do not settle by themselves). The ground an element will meet is looked up two radii to its left
-    and right, outside its own present track. Drag near disturbed ground falls substantially by experiment (paper Sec. IV
-    B); the form, and every number, are assumed. Ground further than two body lengths off may be forgotten.
-    """
-
-    radius: float
-    weakening: float
+    radius: Annotated[float, Number(0.01, 0.25, "body lengths", "half width of the track that the body leaves")]
+    weakening: Annotated[float, Number(0, 1, "-", "share of the drag lost in fully disturbed ground")]
 
     kind = "disturbed-ground"
     breaks = Premise.MEMORYLESS
@@ -41,104 +41,93 @@ class DisturbedGround(Process):
     settles = 1e-3  # the map has cells, and no two cycles meet them alike
 
     def __post_init__(self):
-        check_ranges(self, radius=(0.01, 0.25), weakening=(0, 1))
+        check_numbers(self)
 
     @property
     def held(self) -> int:
-        return 2 * _cells(self.radius / CELLS) ** 2
-
-    def begin(self, site: Site) -> Ground:
-        return Ground(self.radius / CELLS, site.pose.shape[1])
-
-    def at(self, state: Ground, site: Site) -> Weakened:
-        points, side = self._points(site), 1j * AHEAD * self.radius * site.along(SIDE)
-        found = [state.at(points + offset).mean(0) for offset in (side, -side)]  # averaged over each element
-        return Weakened(1 - self.weakening * np.stack(found))
-
-    def after(self, state: Ground, site: Site, v) -> Ground:
-        if site.dt > 0:  # the first step is on untouched ground
-            state.mark(self._points(site), self.radius)
-        return state
-
-    def numbers(self, state: Ground) -> tuple:
-        """Of the cells that were marked, which are few."""
-        some = np.flatnonzero(state.owner >= 0)
-        cells = np.stack([some, state.owner.ravel()[some], state.value.ravel()[some]])  # owners are 2^42 at most
-        return state.sample.size, cells
-
-    def state(self, numbers: tuple) -> Ground:
-        samples, (some, owner, value) = numbers
-        ground, some = Ground(self.radius / CELLS, samples), some.astype(np.int64)
-        ground.owner.ravel()[some], ground.value.ravel()[some] = owner.astype(np.int64), value
-        return ground
-
-    def _points(self, site: Site) -> np.ndarray:
-        """(k, n, B): points along every element, at most half a radius apart."""
-        half = site.motions[SIDE].half
-        k = int(np.ceil(4 * half.max() / self.radius))
-        return site.place(SIDE) + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * half * site.along(SIDE)
-
-
-@dataclass(frozen=True)
-class Weakened(PerSample):
-    """What is left of the drag across at one step, to the left and to the right, (2, n, B)."""
-
-    left: np.ndarray
-
-    def apply(self, model: Model) -> Model:
-        return model.changed(SIDE, shares=(self,))
+        return self.tiles_along**2 * TILE**2
 
     @property
-    def numbers(self) -> tuple:
-        """For compiled code (`rft.backend`)."""
-        return self.left, None
+    def cell(self) -> float:
+        """Side of a cell of the map, body lengths."""
+        return self.radius / CELLS
 
-    def __call__(self, v_n, spin) -> tuple[np.ndarray, None, None]:
-        return self.left, None, None
+    @property
+    def tiles_along(self) -> int:
+        """Tiles along a side of the square that is remembered."""
+        return int(np.ceil(PATCH / self.cell / TILE))
 
+    def begin(self, problem: Problem, site: Site) -> Tiles:
+        count, samples = self.tiles_along**2, site.pose.shape[1]
+        return Tiles((np.zeros((TILE**2, samples)),) * count, np.full((count, samples), -1, np.int64))
 
-def _cells(cell: float) -> int:
-    """Along a side of the square that is remembered."""
-    return int(np.ceil(PATCH / cell))
+    def apply(self, problem: Problem, site: Site, past: Tiles) -> Problem:
+        points, m = self.points(problem, site), problem.memory
+        aside = 1j * AHEAD * self.radius * site.along(problem.sides.elements)
+        left, right = (1 - self.weakening * self.disturbance(past, points + x).mean(0) for x in (aside, -aside))
+        return problem._replace(memory=m._replace(given_left=m.given_left * left, given_right=m.given_right * right))
 
+    def after(self, problem: Problem, site: Site, past: Tiles, v) -> Tiles:
+        if site.count == 0:  # the first step is on untouched ground
+            return past
+        return self.marked(past, self.points(problem, site))
 
-class Ground:
-    """Disturbance on a square grid that wraps round: a cell knows which patch of the plane it holds, and a new one starts
-    untouched."""
+    def points(self, problem: Problem, site: Site) -> np.ndarray:
+        """Return complex points (k, n, B) along every element, at most half a radius apart."""
+        e = problem.sides.elements
+        k = int(np.ceil(4 * e.half.max() / self.radius))
+        return site.place(e) + (np.arange(k)[:, None, None] * 2 + 1 - k) / k * e.half * site.along(e)
 
-    def __init__(self, cell: float, samples: int):
-        self.cell, self.size = cell, _cells(cell)
-        self.value = np.zeros((self.size * self.size, samples))
-        self.owner = np.full((self.size * self.size, samples), -1, np.int64)
-        self.sample = np.arange(samples)
+    def location(self, i, j) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return where the map holds the cells (i, j) of the plane: tile, row in the tile, and patch of the plane."""
+        (tile_i, i), (tile_j, j) = np.divmod(i, TILE), np.divmod(j, TILE)
+        (patch_i, tile_i), (patch_j, tile_j) = np.divmod(tile_i, self.tiles_along), np.divmod(tile_j, self.tiles_along)
+        return tile_i * self.tiles_along + tile_j, i * TILE + j, (patch_i + 2**20) * 2**21 + (patch_j + 2**20)
 
-    def _cells(self, i, j):
-        """Flat places in the arrays of the cells (i, j) of the plane, and the patches they belong to."""
-        (row_patch, row), (column_patch, column) = np.divmod(i, self.size), np.divmod(j, self.size)
-        return row * self.size + column, (row_patch + 2**20) * 2**21 + (column_patch + 2**20)
-
-    def at(self, place: np.ndarray) -> np.ndarray:
-        """Disturbance at complex places (..., B), bilinear between cell centres."""
+    def disturbance(self, tiles: Tiles, place: np.ndarray) -> np.ndarray:
+        """Return the disturbance at complex places (..., B), bilinear between cell centres."""
         x, y = place.real / self.cell - 0.5, place.imag / self.cell - 0.5
         i, j = np.floor(x), np.floor(y)
         x, y = x - i, y - j
         i, j = i.astype(np.int64), j.astype(np.int64)
-        where, patch = self._cells(np.stack([i, i + 1])[:, None], np.stack([j, j + 1]))  # (2, 2, ..., B)
-        share = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y])
-        here = self.owner[where, self.sample] == patch
-        return np.where(here, share * self.value[where, self.sample], 0.0).sum((0, 1))
+        tile, row, patch = self.location(np.stack([i, i + 1])[:, None], np.stack([j, j + 1]))  # (2, 2, ..., B)
+        share, sample = np.stack([1 - x, x])[:, None] * np.stack([1 - y, y]), np.arange(tiles.owner.shape[1])
+        _, value, index = tiles.copied(tile)
+        return np.where(tiles.owner[tile, sample] == patch, share * value[index, row, sample], 0.0).sum((0, 1))
 
-    def mark(self, place: np.ndarray, radius: float) -> None:
-        """Disturb the ground around complex places (..., B): wholly up to radius / 2, not at all beyond 3 radius / 2."""
-        reach = int(np.ceil(1.5 * radius / self.cell))
+    def marked(self, tiles: Tiles, place: np.ndarray) -> Tiles:
+        """Return the map with a track at complex places (..., B): fully disturbed up to radius / 2, not at all beyond
+        3 radius / 2."""
+        reach = int(np.ceil(1.5 * self.radius / self.cell))
         around = np.arange(-reach, reach + 1).reshape(-1, *[1] * place.ndim)
         i, j = (np.floor(x / self.cell).astype(np.int64) + around for x in (place.real, place.imag))
         i = i[:, None]
         distance = np.hypot((i + 0.5) * self.cell - place.real, (j + 0.5) * self.cell - place.imag)
-        value = np.clip(1.5 - distance / radius, 0.0, 1.0)
-        where, patch = self._cells(i, j)  # (cells along, cells across, ..., B)
-        sample = np.broadcast_to(self.sample, where.shape)
-        stale = self.owner[where, sample] != patch
-        self.value[where[stale], sample[stale]] = 0.0
-        self.owner[where, sample] = patch
-        np.maximum.at(self.value, (where, sample), value)
+        tile, row, patch = self.location(i, j)  # (cells along, cells across, ..., B)
+        owner, sample = tiles.owner.copy(), np.arange(tiles.owner.shape[1])
+        owner[tile, sample] = patch
+        touched, value, index = tiles.copied(tile)
+        value *= (owner == tiles.owner)[touched, None]
+        np.maximum.at(value, (index, row, sample), np.clip(1.5 - distance / self.radius, 0.0, 1.0))
+        new = list(tiles.value)
+        for k, x in zip(touched, value):
+            new[k] = x.copy()
+        return Tiles(tuple(new), owner)
+
+
+class Tiles(NamedTuple):
+    """A square map of the ground that wraps round, tile by tile; maps share the tiles in which they do not differ.
+
+    value: disturbance, 0 to 1, (cells, B) for each tile. owner: (tiles, B), the patch of the plane whose tile is held,
+    -1 for none: a tile of another patch is untouched."""
+
+    value: tuple[np.ndarray, ...]
+    owner: np.ndarray
+
+    def copied(self, tile: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the numbers of the tiles (K,) that ``tile`` names, copies of their values (K, cells, B), and the index
+        into these of each name."""
+        touched = np.flatnonzero(np.bincount(tile.ravel(), minlength=len(self.value)))
+        index = np.zeros(len(self.value), int)
+        index[touched] = np.arange(len(touched))
+        return touched, np.stack([self.value[k] for k in touched]), index[tile]

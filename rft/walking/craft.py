@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from rft.media.base import check_ranges, require, shown
-from rft.spatial import Mesh, Screw, shapes
-from rft.vertical.outline import LARGEST, check_metres
-from rft.walking.robot import MASSES, Robot
+from rft.checks import check_numbers, require, shown
+from rft.meshes import Mesh, Screw, shapes
+from rft.metres import LARGEST, metres
+from rft.walking.robot import Mass, Robot
 
 PAIRS = ("mirrored", "alike")
 PER_SQUARE = 10  # triangles of a screw
@@ -19,30 +20,27 @@ PER_SQUARE = 10  # triangles of a screw
 class Screws(Robot):
     """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
 
-    mass (kg): of the whole craft. length, width, height (m): of the box about the centre of mass. screw (-): that on the left;
-    both drive forwards. track (m): from one axis to the other. drop (m): of the axes below the centre of mass. pair (-):
-    "mirrored", the one on the right is its mirror image and turns the other way, or "alike", the same and turns the same way.
+    screw (-): that on the left; both drive forwards. pair (-): "mirrored", the one on the right is its mirror image and
+    turns the other way, or "alike", the same and turns the same way.
     """
 
-    mass: float
-    length: float
-    width: float
-    height: float
+    mass: Mass
+    length: Annotated[float, metres("length of the box about the centre of mass")]
+    width: Annotated[float, metres("width of the box about the centre of mass")]
+    height: Annotated[float, metres("height of the box about the centre of mass")]
     screw: Screw
-    track: float
-    drop: float = 0.0
+    track: Annotated[float, metres("distance from one axis to the other")]
+    drop: Annotated[float, metres("depth of the axes below the centre of mass", -LARGEST)] = 0.0
     pair: str = "mirrored"
     part = "screw"
     parts = "screws"
     period = 1.0
 
     def __post_init__(self):
-        check_ranges(self, mass=MASSES)
+        check_numbers(self)
         require(
             isinstance(self.screw, Screw), f"a robot without screws: screw must be a Screw, got {shown(self.screw)}"
         )
-        check_metres(self, "length", "width", "height", "track")
-        check_metres(self, "drop", low=-LARGEST)
         require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}, got {shown(self.pair)}")
         told = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
         require(self.track > 2 * self.screw.radius, told)

@@ -9,8 +9,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from rft.media.catalogue import GRAVITY
-from rft.spatial.mesh import Mesh
+from rft.laws.catalogue import GRAVITY
+from rft.meshes.mesh import Mesh
 from rft.walking.craft import Screws
 from rft.walking.facets import Surface
 from rft.walking.hexapod import COLOURS, GIVES, LIGHT, QUICK, UNTOUCHED, begun, boxed, inertial, text

@@ -1,25 +1,26 @@
-"""Legs and belly of many robots as one list of straight elements, of which those that reach into the ground are summed.
+"""Legs and belly of many robots as straight elements, of which those that reach into the ground are summed.
 
-An element belongs to a part, a leg or the belly, that turns about its hip. The sum is that of `rft.vertical.loads`:
-midpoints of what is below the surface and, of the faces of closed outlines, leads. Elements of all robots stand in one
-row, so that a sum costs what they have in the ground, not what they are.
-"""
+Legs and belly are parts that turn about a hip. Their contact with the ground is that of `rft.plates.contact`; by
+NumPy the elements of all robots that reach into it stand in one row, so that a sum costs what they have in the ground,
+not what they are."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from rft.vertical.loads import Parts, _below
-from rft.walking.ground import Ground, Outlines
-
-SIDES = {"keep": (0,), "cut": (1, -1)}  # of sheets: both at once, or one by one where it matters which leads
+from rft.ground import Ground
+from rft.plates.contact import Element, Force, Motion, elements, load, record, sides
+from rft.plates.outline import Outline
+from rft.plates.stress import PlateStress
+from rft.vectors import formula
 
 
 class Sums(NamedTuple):
-    """(C, B): force (x, z), N, and moment, N m, on bodies about their centres of mass; power of the motors and into the
-    ground, W."""
+    """Force (x, z), N, and moment, N m, on bodies about their centres of mass; power of the motors and into the ground,
+    W."""
 
     f_x: np.ndarray
     f_z: np.ndarray
@@ -28,98 +29,113 @@ class Sums(NamedTuple):
     into: np.ndarray
 
 
+@formula
+def part_motion(pose, twist, hip_x, hip_z, angle, rate):
+    """Return the motion of a part that turns at a rate about a hip of a body, and x and z from the body's centre of
+    mass to the hip. pose, twist: (x, z, pitch) and rates."""
+    cos, sin, spin = np.cos(pose[2]), np.sin(pose[2]), twist[2]
+    r_x, r_z = cos * hip_x + sin * hip_z, cos * hip_z - sin * hip_x
+    turn = pose[2] + angle
+    at = Motion(
+        pose[0] + r_x, pose[1] + r_z, np.cos(turn), np.sin(turn), twist[0] + spin * r_z, twist[1] - spin * r_x, spin + rate
+    )  # fmt: skip
+    return at, r_x, r_z
+
+
+@formula
+def on_body(f, at, r_x, r_z, rate):
+    """Return what a part with a force on it adds to `Sums`."""
+    power = f.x * at.v_x + f.z * at.v_z + f.moment * at.rate
+    return Sums(f.x, f.z, f.moment + r_z * f.x - r_x * f.z, -rate * f.moment, -power)
+
+
+class Outlines(NamedTuple):
+    """Outlines of equally many elements, all closed or none, of B robots, or one that is the same for all. points: (B or
+    1, N + 1, 2). elements: (B or 1, N)."""
+
+    points: np.ndarray
+    elements: Element
+    closed: bool
+
+    @classmethod
+    def of(cls, outlines: list[Outline]) -> Outlines:
+        first = outlines[0]
+        some = [first] if all(o is first for o in outlines) else outlines
+        return cls(np.stack([o.points for o in some]), Element(*map(np.stack, zip(*map(elements, some)))), first.closed)
+
+    def lowest(self, angle) -> np.ndarray:
+        """(B,): height of the lowest point over the origin, turned by angles (B,)."""
+        x, z = self.points[..., 0], self.points[..., 1]
+        return (np.cos(angle)[:, None] * z - np.sin(angle)[:, None] * x).min(-1)
+
+
 class Elements:
     """Of B robots with as many legs and elements. hips: (2, B, legs), x and z from the centre of mass, m.
 
-    part: (E,), to which leg an element belongs, or to the belly as the last. side: (E,), 1 and -1 for faces along and
-    against its normal, 0 for that which leads. numbers: (9, B or 1, E), in the part's frame: x of both ends and of the
-    normals there, z of the same, and area.
-    """
+    A part is one side of the elements of a leg, or of the belly: leg: (P,), which one, the belly as the last."""
 
-    def __init__(self, legs: Outlines, belly: Outlines | None, hips: np.ndarray, tension: str):
-        count, sides = hips.shape[2], lambda outlines: (1,) if outlines.closed else SIDES[tension]
-        some = [(k, legs, side) for k in range(count) for side in sides(legs)]
-        some += [(count, belly, side) for side in sides(belly)] if belly else []
-        size = max(len(outlines.points) for _, outlines, _ in some)
-        numbers = [np.broadcast_to(x, (9, size, x.shape[2])) for x in (_numbers(o) for _, o, _ in some)]
-        self.numbers = np.concatenate(numbers, 2)
-        each = lambda values: np.repeat(values, [x.shape[2] for x in numbers])
-        self.part, self.side = each([k for k, _, _ in some]), each([side for _, _, side in some])
-        self.closed = each([o.closed for _, o, _ in some])
-        self.hips = np.concatenate([hips, np.zeros_like(hips[..., :1])], 2) if belly else hips
-        self.span = np.hypot(*self.hips).max(-1) + 2 * np.abs(self.numbers[[0, 1, 4, 5]]).max()
+    def __init__(self, legs: Outlines, belly: Outlines | None, hips: np.ndarray, stress: PlateStress):
+        count, self.law = hips.shape[2], record(stress)
+        some = [(k, legs, side) for side in sides(legs.closed, stress.tension) for k in range(count)]
+        some += [(count, belly, side) for side in sides(belly.closed, stress.tension)] if belly else []
+        self.leg, outlines, self.side = np.array([k for k, *_ in some]), *([x[j] for x in some] for j in (1, 2))
+        self.outlines, self.side = outlines, np.array(self.side)
+        self.closed = np.array([float(x.closed) for x in outlines])
+        self.hips = np.concatenate([hips, np.zeros_like(hips[..., :1])], 2)[..., self.leg]
+        self.span = np.hypot(*self.hips).max(-1) + 2 * max(np.abs(x.points).max() for x in outlines)
+        size = max(len(x.points) for x in outlines)
+        joined = lambda *of: np.concatenate([np.broadcast_to(x, (size, x.shape[1])) for x in of], 1)
+        self.elements = Element(*map(joined, *(x.elements for x in outlines)))
+        self.part = np.repeat(np.arange(len(some)), [x.elements.area.shape[1] for x in outlines])
 
     def sums(self, ground: Ground, rows, pose, twist, angle, rate) -> Sums:
-        """For robots ``rows``, (B,), at poses and twists (C, B, 3) that hardly differ, whose legs are at angles (B,
-        legs), rad, and turn at rates (B, legs), rad/s. ground: of these robots."""
-        parts = self._parts(self.hips[:, rows], pose, twist, angle, rate)
-        own = self.numbers[:, rows] if self.numbers.shape[1] > 1 else self.numbers
-        room = np.ptp(pose[..., 1], axis=0) + self.span[rows] * np.ptp(pose[..., 2], axis=0)
-        cos, sin, z = (x[0][:, self.part] for x in (parts[0], parts[1], parts[4]))
-        low = np.minimum(cos * own[4] - sin * own[0], cos * own[5] - sin * own[1])
-        sample, element = np.nonzero(z + low <= room[:, None])
+        """For robots ``rows``, (B,), at poses and twists (x, z, pitch), triples of (C, B), that hardly differ, whose
+        legs are at angles (B, legs), rad, and turn at rates (B, legs), rad/s: (C, B). ground: of these robots, (B,)."""
+        still = np.zeros((len(rows), 1))
+        angle, rate = (np.concatenate([x, still], 1)[:, self.leg] for x in (angle, rate))
+        pose, twist = (tuple(x[..., None] for x in y) for y in (pose, twist))
+        at, r_x, r_z = part_motion(pose, twist, *self.hips[:, rows], angle, rate)
+        motions = np.empty((len(at), *r_x.shape))
+        for row, x in zip(motions, at):
+            row[:] = x
+        force = Force(*self._summed(ground, rows, motions))
+        return Sums(*(x.sum(-1) for x in on_body(force, at, r_x, r_z, rate)))
+
+    @cached_property
+    def table(self) -> tuple[np.ndarray, np.ndarray]:
+        """The elements in rows of eight (R, 9, 8), and the first and last row (B, P, 2) of every part."""
+        from rft.plates.compiled import rows
+
+        tables, begins, first = [], {}, 0
+        for one in self.outlines:
+            if id(one) not in begins:
+                tables.append(rows(one.elements))
+                robots, length = tables[-1].shape[:2]
+                begin = first + length * np.broadcast_to(np.arange(robots), len(self.span))
+                begins[id(one)], first = np.stack([begin, begin + length], -1), first + robots * length
+        blocks = np.stack([begins[id(one)] for one in self.outlines], 1)
+        return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in tables]), blocks
+
+    def _summed(self, ground: Ground, rows, motions) -> np.ndarray:
+        """(3, C, B, P): force (x, z) and moment about its hip on every part, at motions (7, C, B, P)."""
+        out = np.zeros((3, *motions.shape[1:]))
+        turns = np.abs(np.diff(motions[2:4], axis=1)).sum((0, 1))
+        room = np.ptp(motions[1], axis=0) + self.span[rows, None] * turns
+        own, more = self.elements, len(self.elements.area) > 1
+        z, cos, sin = motions[1:4, 0][..., self.part]
+        x1, z1, x2, z2 = (x[rows] if more else x for x in own[:4])
+        sample, element = np.nonzero(z + np.minimum(cos * z1 - sin * x1, cos * z2 - sin * x2) <= room[:, self.part])
         if not sample.size:
-            return Sums(*np.zeros((5, *pose.shape[:2])))
-        place = element + sample * own.shape[2] if own.shape[1] > 1 else element
-        own = np.take(own.reshape(len(own), -1), place, axis=1)[:, None]
-        here = np.take(parts.reshape(*parts.shape[:2], -1), sample * parts.shape[3] + self.part[element], axis=2)
-        each = self._each(ground.take(sample, self.closed[element]), own, here, self.side[element])
-        return Sums(*_by_sample(each, sample, pose.shape[1]))
-
-    def _parts(self, hips, pose, twist, angle, rate):
-        """(9, C, B, parts): cos and sin of a part's angle, its hip from the centre of mass and over the surface, the hip's
-        velocity, the part's spin, and what of it is the motor's."""
-        if angle.shape[1] < hips.shape[2]:
-            angle, rate = (np.concatenate([x, np.zeros_like(x[:, :1])], 1) for x in (angle, rate))
-        turn, spin = pose[..., 2:], twist[..., 2:]
-        cos, sin = np.cos(turn), np.sin(turn)
-        out = np.empty((9, *pose.shape[:2], hips.shape[2]))
-        out[0], out[1] = np.cos(turn + angle), np.sin(turn + angle)
-        out[2], out[3] = cos * hips[0] + sin * hips[1], cos * hips[1] - sin * hips[0]
-        out[4] = pose[..., 1:2] + out[3]
-        out[5], out[6] = twist[..., :1] + spin * out[3], twist[..., 1:2] - spin * out[2]
-        out[7], out[8] = spin + rate, rate
+            return out
+        part = self.part[element]
+        e = Element(*(x[rows[sample] if more else 0, element] for x in own))
+        at, side, sine = Motion(*motions[:, :, sample, part]), self.side[part], ground.sine
+        under = Ground(
+            ground.strength[sample], ground.flux[sample], ground.rounding[sample],
+            self.closed[part] * (sine[sample] if np.ndim(sine) else sine), ground.fall, ground.disturbed,
+        )  # fmt: skip
+        force = np.array(load(self.law, under, e, at, side, bool(side.any()), True))
+        place = sample * motions.shape[3] + part
+        begins = np.flatnonzero(np.diff(place, prepend=-1))
+        out.reshape(*out.shape[:2], -1)[..., place[begins]] = np.add.reduceat(force, begins, axis=-1)
         return out
-
-    def _each(self, ground: Ground, numbers, parts, side):
-        """(5, C, n): what every element adds to `Sums`."""
-        cos, sin, r_x, r_z, height, v_x, v_z, spin, rate = parts
-        ends = np.empty((6, 2, *cos.shape))  # arm, velocity and normal, each as x and z, at both ends
-        x, z = numbers[:4], numbers[4:8]
-        turned_x, turned_z = cos * x + sin * z, cos * z - sin * x
-        ends[0], ends[1], ends[4], ends[5] = turned_x[:2], turned_z[:2], turned_x[2:], turned_z[2:]
-        ends[2], ends[3] = v_x + spin * ends[1], v_z - spin * ends[0]
-        across = side * (ends[4] * ends[2] + ends[5] * ends[3]) + (side == 0)
-        first, last = _below(*np.stack([height + ends[1], -across], 1))
-        first, last = np.maximum(*first), np.minimum(*last)
-        part, middle = np.maximum(last - first, 0.0), (first + last) / 2
-        a_x, a_z, v_x, v_z, n_x, n_z = ends[:, 0] + middle * (ends[:, 1] - ends[:, 0])
-        speed, size = np.sqrt(v_x * v_x + v_z * v_z), np.sqrt(n_x * n_x + n_z * n_z)
-        still = speed == 0.0
-        per, size = 1.0 / np.where(still, 1.0, speed), np.where(side < 0, -size, size)
-        depth = np.where((part > 0.0) & ~still, -(height + a_z), 0.0)
-        n, v, area = (n_x / size, n_z / size), (v_x * per, v_z * per), numbers[8] * part
-        t_x, t_z = ground.on(Parts(a_x, (a_x, a_z), depth, area, n, v, speed))
-        f_x, f_z = area * t_x, area * t_z
-        out = np.empty((5, *f_x.shape))
-        hip = a_z * f_x - a_x * f_z
-        out[0], out[1], out[2] = f_x, f_z, hip + r_z * f_x - r_x * f_z
-        out[3], out[4] = -rate * hip, -(f_x * v_x + f_z * v_z)
-        return out
-
-
-def _numbers(outlines: Outlines) -> np.ndarray:
-    """(9, B or 1, E)."""
-    p, area = outlines.points, outlines.width * outlines.lengths
-    n = outlines.normals[:, :, None].repeat(2, 2) if outlines.bends is None else outlines.bends
-    size = max(len(p), len(area))
-    columns = [of[..., k] for k in (0, 1) for of in (p[:, :-1], p[:, 1:], n[:, :, 0], n[:, :, 1])]
-    return np.stack([np.broadcast_to(x, (size, area.shape[1])) for x in (*columns, area)])
-
-
-def _by_sample(values, sample, count: int) -> np.ndarray:
-    """(5, C, count): sums of values (5, C, n) of samples (n,) in order."""
-    begins = np.flatnonzero(np.diff(sample, prepend=-1))
-    out = np.zeros((*values.shape[:2], count))
-    out[..., sample[begins]] = np.add.reduceat(values, begins, axis=-1)
-    return out

@@ -5,14 +5,14 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from rft.media.base import check_ranges, in_range, require, shown
-from rft.spatial.law import Spatial
-from rft.vertical.effects import Aeration, GrainInertia, GroundEffect, checked, pressure, strength
-from rft.vertical.stress import PlateStress
+from rft.checks import Number, check_numbers, require, shown
+from rft.ground import Ground, GroundEffect, checked, ground_of
+from rft.meshes.law import Spatial
+from rft.plates.stress import PlateStress
 from rft.walking.robot import SMALLEST, Robot, Tripod
-from rft.walking.stride import Walk
+from rft.walking.stride import Walk, advanced
 
 
 @dataclass(frozen=True)
@@ -31,40 +31,40 @@ class Walker:
             require(isinstance(value, kind), f"{name} must be a {such}, got {shown(value)}")
         object.__setattr__(self, "effects", checked(self.effects))
         for effect in self.effects:
-            good = isinstance(effect, Aeration | GrainInertia)
-            require(good, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
+            require(effect.walks, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
 
     @property
-    def strength(self) -> float:
-        """Of the ground, times that of its map at zeta = 1."""
-        return self.stress.zeta * float(strength(self.effects, 0.0))
-
-    @property
-    def flux(self) -> float:
-        """lambda rho of the grains' inertia, kg/m^3: a face that leads with v_n feels lambda rho v_n^2 besides."""
-        return float(pressure(self.effects, 1.0))
+    def ground(self) -> Ground:
+        """What the effects make of it."""
+        return ground_of(self.effects)
 
 
 @dataclass(frozen=True)
 class Fineness:
-    """steps (-): of a cycle. elements (-): of a leg's outline; the belly has as many. rounding (m/s): below which drag
-    falls off in proportion to speed; of slow legs it is no more than 5 % of the speed of their ends. duration (s): of
-    walking from rest, at most. engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three
-    dimensions."""
+    """Numerical settings of a walk.
 
-    steps: int = 32
-    elements: int = 12
-    rounding: float = 3e-3
-    duration: float = 10.0
+    engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three dimensions.
+    """
+
+    steps: Annotated[int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)] = 32
+    elements: Annotated[int, Number(4, 1000, "-", "elements of a leg's outline; the belly has as many", whole=True)] = (
+        12
+    )
+    rounding: Annotated[
+        float,
+        Number(
+            SMALLEST, 0.1, "m/s",
+            "speed below which drag falls off in proportion to speed; of slow legs it is no more than 5 % of the speed of "
+            "their ends",
+        ),
+    ] = 3e-3  # fmt: skip
+    duration: Annotated[float, Number(1e-3, 1e4, "s", "time of walking from rest, at most")] = 10.0
     engine: str | None = None
 
     def __post_init__(self):
         good = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
         require(good, f"engine must be one of {', '.join(ENGINES)}, got {shown(self.engine)}")
-        for name, low, high in (("steps", 8, 10_000), ("elements", 4, 1000)):
-            in_range(name, getattr(self, name), low, high, whole=True)
-            object.__setattr__(self, name, int(getattr(self, name)))
-        check_ranges(self, rounding=(SMALLEST, 0.1), duration=(1e-3, 1e4))
+        check_numbers(self)
 
 
 class Engine(Protocol):
@@ -80,13 +80,19 @@ class Engine(Protocol):
         numerics: Fineness,
         settling: int | None = None,
         progress: Callable | None = None,
+        advance: Callable = advanced,
     ) -> list[Walk]:
         """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle.
-        progress: told the fraction done."""
+        progress: told the fraction done. advance: takes the strides, as `rft.walking.stride.advanced`."""
         ...
 
     def again(
-        self, walkers: Sequence[Walker], numerics: Fineness, walks: Sequence[Walk], settling: int | None = None
+        self,
+        walkers: Sequence[Walker],
+        numerics: Fineness,
+        walks: Sequence[Walk],
+        settling: int | None = None,
+        advance: Callable = advanced,
     ) -> list[Walk]:
         """The speeds with other numerics, of walks that are known."""
         ...

@@ -9,43 +9,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.media.base import check_ranges, require, shown
-from rft.spatial.extruded import Extruded
-from rft.spatial.law import Spatial
-from rft.spatial.mesh import Mesh
-from rft.spatial.submerged import submerged
-from rft.vertical.outline import Outline
+from rft.checks import Number, check_numbers, require, shown
+from rft.ground import Ground
+from rft.meshes.contact import Motion, Part, cross, load
+from rft.meshes.extruded import Extruded
+from rft.meshes.law import Spatial
+from rft.meshes.mesh import Mesh
+from rft.meshes.submerged import submerged
+from rft.plates.outline import Outline
 
 NUDGE = 1e-3  # times the rounding, for differences
 
 
 @dataclass(frozen=True)
 class Grains:
-    """What the bodies touch. law: `Extruded`, a map of the vertical plane, or `Spatial`. strength: times its stress. flux:
-    lambda rho, kg/m^3, of the grains' inertia. rounding: m/s, below which stress falls off in proportion to speed."""
+    """The ground under the bodies. law: `Extruded`, a map of the vertical plane, or `Spatial`."""
 
     law: Extruded | Spatial
-    strength: float = 1.0
-    flux: float = 0.0
-    rounding: float = 3e-3
+    strength: Annotated[float, Number(0, 1e9, "-", "factor of the law's stress")] = 1.0
+    flux: Annotated[float, Number(0, 1e9, "kg/m^3", "lambda rho of the grains' inertia")] = 0.0
+    rounding: Annotated[float, Number(1e-7, 10, "m/s", "speed below which stress falls off in proportion to speed")] = (
+        3e-3
+    )
 
     def __post_init__(self):
         require(isinstance(self.law, Extruded | Spatial), f"law must be an Extruded or Spatial, got {shown(self.law)}")
-        check_ranges(self, strength=(0.0, 1e9), flux=(0.0, 1e9), rounding=(1e-7, 10.0))
+        check_numbers(self)
 
-    def stress(self, n, v, sheet) -> tuple[np.ndarray, np.ndarray]:
-        """Of faces with unit normals n (3, N) and velocities v (3, N): stress per depth, N/m^3 (3, N), and stress besides,
-        Pa (3, N). sheet (N,): whether they are of a thin sheet, either side of which may lead."""
-        speed = np.sqrt((v * v).sum(0))
-        fast, along = np.sqrt(speed * speed + self.rounding**2), (n * v).sum(0)
-        share = speed / fast * self.law.share(along / fast, sheet) * self.strength
-        per = self.law.traction(n, v / np.where(speed > 0.0, speed, 1.0)) * share
-        into = np.where(sheet, along, np.maximum(along, 0.0))
-        return per, -self.flux * into * np.abs(into) * n
+    @property
+    def ground(self) -> Ground:
+        """Under every face."""
+        return Ground(self.strength, self.flux, self.rounding, self.law.sine)
 
 
 class Surface(NamedTuple):
@@ -146,9 +144,9 @@ class Facets:
             for j in range(3):
                 dv[j, 1 + j], dw[j, 4 + j] = nudge[0, of], nudge[1, of]
             turned = k * dw
-            r = r + _cross(turned[:, None], r)
+            r = r + cross(turned[:, None], r)
             heights = heights + k * dv[2] + (r[2] - r[2, :, :1])
-            n, v, spin = n + _cross(turned, n), v + dv, spin + dw
+            n, v, spin = n + cross(turned, n), v + dv, spin + dw
         wrench = self._summed(grains, some, of, r, heights, n, v, spin)
         if k is None:
             return wrench[:, 0], None
@@ -158,15 +156,9 @@ class Facets:
     def _summed(self, grains, some, of, r, heights, n, v, spin) -> np.ndarray:
         """(B, C, 6): of C columns."""
         share, middle, moments = submerged(heights)
-        x, arms = (middle * r).sum(1), (moments * r).sum(1)
-        v, n = np.broadcast_arrays(v + _cross(spin, x), n)
-        flat = lambda y: y.reshape(3, -1)
-        sheet = np.broadcast_to(self.sheet[some], share.shape).ravel()
-        per, besides = (y.reshape(v.shape) * self.areas[some] for y in grains.stress(flat(n), flat(v), sheet))
-        force, moment = per * moments.sum(0), _cross(arms, per)
-        if grains.flux:
-            besides = besides * share
-            force, moment = force + besides, moment + _cross(x, besides)
+        middle, arms, areas = (middle * r).sum(1), (moments * r).sum(1), self.areas[some]
+        part = Part(n, middle, areas * share, areas * moments.sum(0), areas * arms)
+        force, moment, _ = load(grains.law, grains.ground, part, Motion(v, spin), self.sheet[some])
         out = np.zeros((len(self.bodies), share.shape[0], 6))
         first = np.flatnonzero(np.diff(of, prepend=-1))
         sums = np.add.reduceat(np.concatenate([force, moment]), first, axis=2)
@@ -175,11 +167,3 @@ class Facets:
 
     def rounded(self, grains: Grains, wider: float) -> Grains:
         return replace(grains, rounding=wider * grains.rounding)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a x b, components first."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.subtract(a[j] * b[k], a[k] * b[j], out=out[i])
-    return out

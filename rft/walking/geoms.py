@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from rft.media.base import require, shown
-from rft.spatial import shapes
-from rft.spatial.mesh import Mesh
-from rft.spatial.smooth import smooth
+from rft.checks import require, shown
+from rft.meshes import shapes
+from rft.meshes.mesh import Mesh
+from rft.meshes.smooth import smooth
 from rft.walking.facets import Surface
 
 MOST_FACES = 20_000  # of a geom's mesh

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.walking.march import solved
 from rft.walking.planar import State
 from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, Strides
 
@@ -156,3 +155,14 @@ def _late(strides: Strides, limits: list[Limit], r, found: Found) -> Found:
     for k, one in enumerate(r):
         found.limits[one] = Limit(state.take([k]), 1)
     return found
+
+
+def solved(slopes, residual) -> np.ndarray:
+    """(B, n); none where there is no solution."""
+    try:
+        return np.linalg.solve(slopes, residual[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        good = np.linalg.det(slopes) != 0.0
+        found = np.zeros_like(residual)
+        found[good] = np.linalg.solve(slopes[good], residual[good][..., None])[..., 0]
+        return found

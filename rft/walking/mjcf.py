@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.media.base import in_range, real_array, require, shown
+from rft.checks import in_range, real_array, require, shown
 from rft.walking.facets import Surface
 from rft.walking.robot import Robot
 

@@ -15,17 +15,15 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from rft import in_turn
-from rft.limit_cycle import Approach
-from rft.spatial.extruded import Extruded
-from rft.spatial.law import Spatial
-from rft.vertical.effects import strength
+from rft import limit_cycle
+from rft.meshes.extruded import Extruded
+from rft.meshes.law import Spatial
 from rft.walking.engines import Fineness, Walker
 from rft.walking.facets import Grains
 from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
 from rft.walking.robot import parts, rounded
-from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk, cycles_to_settle
+from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk, advanced, cycles_to_settle
 
 REPEATED = (
     1e-2  # of the speed of the legs' ends: what the start of a stride may differ from the last one's, to repeat it
@@ -41,30 +39,38 @@ def refuse(walker: Walker) -> None:
 
 
 def walk(
-    walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None, progress: Callable | None = None
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    settling: int | None = None,
+    progress: Callable | None = None,
+    advance: Callable = advanced,
 ) -> list[Walk]:
     """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle. progress: told
-    the fraction done."""
+    the fraction done. advance: takes the strides, as `rft.walking.stride.advanced`."""
     found: list[Walk] = []
     for walker in walkers:
         duration = settling / walker.gait.frequency if settling else numerics.duration
         most = math.ceil(duration * walker.gait.frequency - 1e-9) + MOST_STRIDES
         told = (lambda done: progress((len(found) + done) / len(walkers))) if progress else None
-        found.append(Course(walker, numerics).walk(most, duration, progress=told))
+        found.append(Course(walker, numerics, advance=advance).walk(most, duration, progress=told))
     return found
 
 
 def again(
-    walkers: Sequence[Walker], numerics: Fineness, walks: Sequence[Walk], settling: int | None = None
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    walks: Sequence[Walk],
+    settling: int | None = None,
+    advance: Callable = advanced,
 ) -> list[Walk]:
     """The same with other numerics, a few strides from where a stride begins at the end of each walk, and nothing but what is
     said of those is new."""
     found = []
     for walker, known in zip(walkers, walks):
         if known.limit is None:
-            found += walk([walker], numerics, settling)
+            found += walk([walker], numerics, settling, advance=advance)
             continue
-        here = Course(walker, numerics).walk(FEW_STRIDES, start=known.limit)
+        here = Course(walker, numerics, advance=advance).walk(FEW_STRIDES, start=known.limit)
         found.append(here._replace(**{name: getattr(known, name) for name in Walk._fields[:6]}))
     return found
 
@@ -90,15 +96,15 @@ class Start(NamedTuple):
 class Course:
     """One walker on its way."""
 
-    def __init__(self, walker: Walker, numerics: Fineness, planar: bool = False):
+    def __init__(self, walker: Walker, numerics: Fineness, planar: bool = False, advance: Callable = advanced):
         refuse(walker)
+        self.made_of, self.advance = (walker, numerics, planar), advance
         self.machine = machine(walker.robot, numerics.elements, planar)
         self.clock, self.gait = Clock(self.machine, walker.gait), walker.gait
         law = walker.stress if isinstance(walker.stress, Spatial) else Extruded(walker.stress)
-        weak = float(strength(walker.effects, 0.0))
-        self.body = Multibody(
-            self.machine.model, self.machine.surfaces, Grains(law, weak, walker.flux, numerics.rounding), self.clock
-        )
+        ground = walker.ground
+        grains = Grains(law, ground.strength, ground.flux, numerics.rounding)
+        self.body = Multibody(self.machine.model, self.machine.surfaces, grains, self.clock)
         self.clock.place(self.body)
         self.segments = parts(self.clock.kinks(), numerics.steps)
         facets, data, root = self.body.facets, self.body.data, self.machine.root
@@ -110,6 +116,9 @@ class Course:
             rounding = float(rounded(numerics.rounding, walker.gait.frequency, self.reach))
             self.body.grains = replace(self.body.grains, rounding=rounding)
         self.own = np.flatnonzero(np.isin(facets.of, np.flatnonzero(~legs)))
+
+    def __reduce__(self) -> tuple:
+        return Course, self.made_of
 
     def walk(
         self,
@@ -123,7 +132,7 @@ class Course:
         if start is not None:
             body.data.qpos[:], body.data.qvel[:] = start
             mujoco.mj_forward(body.model, body.data)
-        approach, moves, periodic, drift, before = Approach(1), [], False, np.inf, 0.0
+        cycles, moves, periodic, drift, before = limit_cycle.begin(1), [], False, np.inf, 0.0
         rows, states, last, ended = [self.row()], [body.data.qpos.copy()], self.section(), self.ended()
         for stride in range(most):
             first, begun, before = rows[-1], len(rows) - 1, body.defect
@@ -133,7 +142,8 @@ class Course:
             if ended:
                 break
             moves.append(_moved(first, rows[-1]))
-            drift = float(approach.after(None, None, np.array([[moves[-1][0]]]))[0])
+            cycles = limit_cycle.light(cycles, np.full((3, 1), moves[-1][0]))
+            drift = float(cycles.drift[0])
             here = self.section()
             change, last = np.abs(here - last).max(), here
             periodic = bool(drift <= SETTLED * self.reach and change < REPEATED)
@@ -177,14 +187,15 @@ class Course:
     def stride(self, stride: int, rows: list, states: list) -> str:
         """The next one; how it ended, or ""."""
         body = self.body
-        more, path, numbers = in_turn.known("stride", lambda: self._stride(stride), lambda: (stride, body.numbers()))
+        more, path, numbers = self.advance(self.steps, stride, body.numbers())
         body.go_on(numbers)
         rows += more.tolist()
         states += list(path)
         return self.ended()
 
-    def _stride(self, stride: int) -> tuple:
-        """(rows, states, what all to come follows from) of its steps, or of those to the robot's end."""
+    def steps(self, stride: int, numbers: tuple) -> tuple[np.ndarray, np.ndarray, tuple]:
+        """Return the rows and states of a stride's steps, or of those to the robot's end, and the numbers that all to come
+        follows from. numbers: those of the body as it is now."""
         rows, states = [], []
         f, data = self.gait.frequency, self.body.data
         for begin, end, steps in self.segments:

@@ -11,22 +11,17 @@ them, as well, once a step.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 
-from rft.media.base import require
+from rft.checks import require
 from rft.walking.facets import Facets, Grains, Poses, Surface
+from rft.walking.sdirk import ENOUGH, FARTHEST, GAMMA, HALVINGS, LEAST, SOLVED
 
-GAMMA = 1.0 - math.sqrt(0.5)  # of SDIRK2
-SOLVED = 1e-3  # m/s, times the rounding: what a stage may be off by
-ITERATIONS, HALVINGS = 12, 3  # of Newton's method, and of a step that it does not solve
+ITERATIONS = 12  # of Newton's method
 WIDER = (30.0, 8.0, 3.0, 1.5, 1.0)  # times the rounding, where Newton's method fails at once
-FARTHEST = 0.5  # of the farthest reach of a body, that a step of Newton's method moves anything by
-LEAST = 0.05  # of a step of Newton's method, below which it is given up
-ENOUGH = 0.1  # of the fall of the correction that Newton's method foretells
 NUDGE = 1e-6  # of a velocity, for differences of MuJoCo's forces
 
 

@@ -6,16 +6,19 @@ The state is the body's pose (x, z, pitch) and its rates; the legs have no mass 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.catalogue import GRAVITY
-from rft.walking.elements import Elements
-from rft.walking.ground import Ground, Outlines
+from rft.balance.newton import plus, times
+from rft.ground import Ground
+from rft.laws.catalogue import GRAVITY
+from rft.plates.stress import PlateStress
+from rft.vectors import formula
+from rft.walking.elements import Elements, Outlines
 from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate, rounded
 
+FIRST = np.eye(4)[1:, :, None]  # of four residuals the first is as it is, in the others one rate is changed
 NUDGE = 1e-3  # of the rates, times the rounding, for differences
 
 
@@ -58,9 +61,10 @@ class State(NamedTuple):
 
 
 class Robots:
-    """B robots of equally many legs and elements on the same kind of ground; ``at``: (K,) phases of the legs."""
+    """B robots of equally many legs and elements on the same kind of ground; ``at``: (K,) phases of the legs. ground:
+    (B,), one rounding for all, of which slow legs take less."""
 
-    def __init__(self, robots: list[Robot], gaits: list[Tripod], ground: Ground, elements: int):
+    def __init__(self, robots: list[Robot], gaits: list[Tripod], stress: PlateStress, ground: Ground, elements: int):
         column = lambda of, names: np.array([[getattr(x, name) for name in names] for x in of], float)
         self.weighed = column(robots, ("mass", "mass", "inertia"))
         self.frequency, *self.clock = column(gaits, ("frequency", "duty", "sweep", "middle")).T[..., None]
@@ -70,13 +74,18 @@ class Robots:
         self.hips = np.stack([hip_x, np.zeros_like(hip_x) + column(robots, ("hip_height",))])
         self.legs, belly = Outlines.of(_each(robots, "leg", elements)), _each(robots, "belly", elements)
         self.belly = None if belly[0] is None else Outlines.of(belly)
-        self.elements = Elements(self.legs, self.belly, self.hips, ground.stress.tension)
+        self.elements = Elements(self.legs, self.belly, self.hips, stress)
         self.reach = np.abs(self.legs.points).max((1, 2)) + np.zeros(len(robots))
-        self.ground = replace(ground, rounding=rounded(ground.rounding, self.frequency[:, 0], self.reach))
-        self.size = np.stack([np.ones_like(self.reach)] * 2 + [self.reach], 1)  # what a rate moves at the hips
+        self.ground = ground._replace(rounding=rounded(ground.rounding, self.frequency[:, 0], self.reach))
 
     def __len__(self) -> int:
         return len(self.weighed)
+
+    def ground_under(self, which, width=1.0) -> Ground:
+        """The ground of these robots, (B,), its rounding times a width, and its grazing angle by the root of that."""
+        g = self.ground
+        wide = {"rounding": g.rounding[which] * width, "sine": g.sine * np.sqrt(width)}
+        return g._replace(strength=g.strength[which], flux=g.flux[which], **wide)
 
     def energy(self, state: State, which=slice(None)) -> np.ndarray:
         """(..., B), J: of motion and height, of these robots."""
@@ -106,20 +115,41 @@ class Robots:
         """Accelerations (C, B, 3) of bodies (C, B, 3) of these robots, at hardly different places, with legs at (B, K) that
         turn at (B, K), and power of the motors and into the ground, (C, B)."""
         which = np.arange(len(self)) if which is None else which
-        found = self.elements.sums(ground or self.ground.take(which), which, pose, twist, angle, rate)
-        acceleration = np.stack(found[:3], -1) / self.weighed[which]
-        acceleration[..., 1] -= GRAVITY
-        return acceleration, found.motors, found.into
+        pose, twist = (tuple(np.moveaxis(x, -1, 0)) for x in (pose, twist))
+        found = self.elements.sums(ground or self.ground_under(which), which, pose, twist, angle, rate)
+        a = accelerations(found, self.weighed[which, 0], self.weighed[which, 2])
+        return np.stack(a, -1), found.motors, found.into
 
-    def residual(self, which, pose, twist, v, angle, rate, k, ground: Ground):
-        """Of the rates v = twist + k a(pose + k v, v), (B, 3), of these robots: (what they are off by (B, 3), its slopes
-        (B, 3, 3), by differences, power of the motors and into the ground, (B,))."""
-        nudge = NUDGE * (ground.rounding * ground.width)[:, None] / self.size[which]
-        tried = np.repeat(v[None], 4, 0)
-        tried[[1, 2, 3], :, [0, 1, 2]] += nudge.T
-        a, motors, into = self.forces(pose + k * tried, tried, angle, rate, which, ground)
-        off = tried - twist - k * a
-        return off[0], np.moveaxis((off[1:] - off[0]) / nudge.T[..., None], 0, -1), motors[0], into[0]
+    def residual(self, which, base, start, v, angle, rate, k, ground: Ground):
+        """Of the rates v = start + k a(base + k v, v), triples of (B,), of these robots: (what they are off by, its slopes
+        by differences, three columns, power of the motors and into the ground, (B,))."""
+        nudge = nudges(ground.rounding, self.reach[which])
+        tried = tuple(x + FIRST[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
+        pose = plus(base, times(k, tried))
+        found = self.elements.sums(ground, which, pose, tried, angle, rate)
+        off = imbalance(found, tried, start, k, self.weighed[which, 0], self.weighed[which, 2])
+        slopes = tuple(tuple((x[j + 1] - x[0]) / y for x in off) for j, y in enumerate(nudge))
+        return tuple(x[0] for x in off), slopes, (found.motors[0], found.into[0])
+
+
+@formula
+def accelerations(sums, mass, inertia):
+    """Return those of a body, (x, z, pitch)."""
+    return sums.f_x / mass, sums.f_z / mass - GRAVITY, sums.moment / inertia
+
+
+@formula
+def imbalance(sums, v, start, k, mass, inertia):
+    """Return v - start - k a."""
+    x, z, pitch = accelerations(sums, mass, inertia)
+    return v[0] - start[0] - k * x, v[1] - start[1] - k * z, v[2] - start[2] - k * pitch
+
+
+@formula
+def nudges(rounding, reach):
+    """Return by how much the rates are changed for differences."""
+    nudge = NUDGE * rounding
+    return nudge, nudge, nudge / reach
 
 
 def _each(robots: list[Robot], what: str, elements: int) -> list:

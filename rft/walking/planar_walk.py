@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from rft.media.base import require
-from rft.vertical.stress import PlateStress
+from rft.checks import require
+from rft.ground import Ground
+from rft.plates.stress import PlateStress
 from rft.walking.engines import Fineness, Walker
-from rft.walking.ground import Ground
 from rft.walking.limit import Found, Limit, foretold, limit_cycle
-from rft.walking.march import March
+from rft.walking.march import march
 from rft.walking.planar import Robots, State
 from rft.walking.robot import Rhex, Roller
-from rft.walking.stride import STUCK, Strides, Walk, cycles_to_settle, from_rest
+from rft.walking.stride import STUCK, Strides, Walk, advanced, cycles_to_settle, from_rest
 
 
 def refuse(walker: Walker) -> None:
@@ -27,17 +27,21 @@ def refuse(walker: Walker) -> None:
 
 
 def walk(
-    walkers: Sequence[Walker], numerics: Fineness, settling: int | None = None, progress: Callable | None = None
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    settling: int | None = None,
+    progress: Callable | None = None,
+    advance: Callable = advanced,
 ) -> list[Walk]:
     """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle. progress:
-    told the fraction done."""
+    told the fraction done. advance: takes the strides, as `rft.walking.stride.advanced`."""
     found: list = [None] * len(walkers)
     for walker in walkers:
         refuse(walker)
     groups = _alike(walkers, numerics)
     for k, members in enumerate(groups):
         told = (lambda done, k=k: progress((k + done) / len(groups))) if progress else (lambda done: None)
-        for j, one in zip(members, _walk([walkers[j] for j in members], numerics, settling, told)):
+        for j, one in zip(members, _walk([walkers[j] for j in members], numerics, settling, told, advance)):
             found[j] = one
     return found
 
@@ -53,20 +57,23 @@ def _alike(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
     return list(groups.values())
 
 
-def _strides(walkers: Sequence[Walker], numerics: Fineness) -> Strides:
-    strength, flux = (np.array([getattr(w, name) for w in walkers]) for name in ("strength", "flux"))
-    ground = Ground(replace(walkers[0].stress, zeta=1.0), strength, flux, np.full_like(flux, numerics.rounding))
+def _strides(walkers: Sequence[Walker], numerics: Fineness, advance: Callable = advanced) -> Strides:
+    stress, grounds = replace(walkers[0].stress, zeta=1.0), [w.ground for w in walkers]
+    strength = np.array([g.strength * w.stress.zeta for g, w in zip(grounds, walkers)])
+    ground = Ground(strength, np.array([g.flux for g in grounds]), numerics.rounding, np.sin(stress.grazing))
     robots, gaits = [w.robot for w in walkers], [w.gait for w in walkers]
-    return Strides(Robots(robots, gaits, ground, numerics.elements), robots, gaits, numerics.steps)
+    return Strides(Robots(robots, gaits, stress, ground, numerics.elements), robots, gaits, numerics.steps, advance)
 
 
-def _walk(walkers: Sequence[Walker], numerics: Fineness, settling: int | None, told: Callable) -> list[Walk]:
-    strides = _strides(walkers, numerics)
+def _walk(
+    walkers: Sequence[Walker], numerics: Fineness, settling: int | None, told: Callable, advance: Callable
+) -> list[Walk]:
+    strides = _strides(walkers, numerics, advance)
     durations = settling / strides.frequency if settling else np.full(len(walkers), numerics.duration)
     state, blocks, done, how, fold = from_rest(strides, durations, told)
     on = np.flatnonzero(np.isin(how, ("", "periodic")))
     limits = [Limit(state.take([k]), fold[k]) for k in on]
-    at_limit = dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits))) if on.size else {}
+    at_limit = dict(zip(on, _at_limits([walkers[k] for k in on], numerics, limits, advance))) if on.size else {}
     walks = []
     for k in range(len(walkers)):
         rows = _rows(blocks[k], strides.cycle if how[k] == "periodic" else 0, durations[k])
@@ -92,9 +99,9 @@ def _settled(strides: Strides, k: int, x: list, rest: State | None, walk: Walk) 
     return float(cycles_to_settle(np.diff(x[:: strides.cycle]), walk.speed * cycle) * cycle)
 
 
-def _at_limits(walkers: Sequence[Walker], numerics: Fineness, limits: list[Limit]) -> list[dict]:
+def _at_limits(walkers: Sequence[Walker], numerics: Fineness, limits: list[Limit], advance: Callable) -> list[dict]:
     """What a `Walk` has of its limit cycle, from near that."""
-    strides = _strides(walkers, numerics)
+    strides = _strides(walkers, numerics, advance)
     found = limit_cycle(strides, limits)
     return [_speed(strides, found, k) for k in range(len(limits))]
 
@@ -128,17 +135,22 @@ def _rows(blocks, cycle: int, duration: float) -> np.ndarray:
 
 
 def again(
-    walkers: Sequence[Walker], numerics: Fineness, walks: Sequence[Walk], settling: int | None = None
+    walkers: Sequence[Walker],
+    numerics: Fineness,
+    walks: Sequence[Walk],
+    settling: int | None = None,
+    advance: Callable = advanced,
 ) -> list[Walk]:
     """The same with other numerics; where there is a limit cycle, from there, and nothing but what is said of that is new."""
     found: list = [None] * len(walkers)
     ended = [k for k, w in enumerate(walks) if w.limit is None]
-    for k, one in zip(ended, walk([walkers[k] for k in ended], numerics, settling)):
+    for k, one in zip(ended, walk([walkers[k] for k in ended], numerics, settling, advance=advance)):
         found[k] = one
     rest = [k for k, w in enumerate(walks) if w.limit is not None]
     for members in _alike([walkers[k] for k in rest], numerics):
         here = [rest[m] for m in members]
-        for k, one in zip(here, _at_limits([walkers[k] for k in here], numerics, [walks[k].limit for k in here])):
+        limits = [walks[k].limit for k in here]
+        for k, one in zip(here, _at_limits([walkers[k] for k in here], numerics, limits, advance)):
             found[k] = walks[k]._replace(**one)
     return found
 
@@ -146,11 +158,14 @@ def again(
 def pace(walker: Walker, numerics: Fineness, enough: float) -> tuple[float, float]:
     """(s of computing, times that forces are evaluated) of a time step: of the first ones from rest, till ``enough`` s are
     over or a stride is."""
-    strides, alone, tries, begin = _strides([walker], numerics), np.zeros(1, int), 0, time.process_time()
-    stop = lambda state, which: strides.ended(state, which) != ""
-    one = March(strides.robots, alone, strides.robots.placed(), strides.phases, strides.of, stop)
-    while one.step[0] < len(strides.of) and time.process_time() - begin < enough:
-        one.iterate(alone)
-        tries += 1
-    steps = max(1, int(one.step[0]))
-    return (time.process_time() - begin) / steps, tries / steps
+    strides, alone = _strides([walker], numerics), np.zeros(1, int)
+    ends, state, tries = (strides.top, strides.out_of_reach), strides.robots.placed(), 0
+    on = lambda k, state: march(strides.robots, alone, state, strides.phases[k : k + 2], strides.of[k : k + 1], ends)
+    on(0, state)  # compiled code is loaded
+    begin = time.process_time()
+    for k in range(len(strides.of)):
+        states, more = on(k, state)
+        state, tries = states.take(0), tries + int(more[0])
+        if time.process_time() - begin >= enough or strides.ended(state, alone)[0]:
+            break
+    return (time.process_time() - begin) / (k + 1), tries / (k + 1)

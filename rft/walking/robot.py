@@ -1,6 +1,6 @@
 """Robots of the vertical plane: a rigid body on legs that turn as they are told, and the clock that tells them.
 
-Signs are those of `rft.vertical.loads`: x forwards, z up, angles and rates about the y axis that points away, so a positive
+Signs are those of `rft.plates.loads`: x forwards, z up, angles and rates about the y axis that points away, so a positive
 pitch has the nose down, and a leg that points down and turns at a positive rate drives the body forwards. SI units.
 """
 
@@ -10,21 +10,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from rft.media.base import check_ranges, in_range, real_array, require, shown
-from rft.vertical.outline import LARGEST, Outline, check_metres
-from rft.vertical.shapes import Polygon, Shape
+from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.metres import LARGEST, metres
+from rft.plates.outline import Outline
+from rft.plates.shapes import Polygon, Shape
 
 MOST_HIPS = 20
-MASSES = (1e-6, 1e4)  # kg
-INERTIAS = (1e-12, 1e5)  # kg m^2
-FREQUENCIES = (1e-3, 200.0)  # Hz
 LEAST_PART = 1 / 8  # of a cycle, as which a shorter part of it counts: a robot may be driven in that alone
 SMALLEST = 1e-7  # m/s, that a rounding may be
 CREEP = 0.05  # of the speed of the legs' ends, that it may be: above it legs sink as they stand, the more the slower
+
+Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
+Axle = Annotated[float, metres("height of the axle about which legs turn, above the origin of their outline", -LARGEST)]
 
 
 @dataclass(frozen=True)
@@ -33,32 +34,19 @@ class Tripod:
     angle is ``middle``, for the rest by what a whole turn lacks. 0 is straight down from the body; as it stands, a
     constant rate.
 
-    frequency (Hz): turns a second. duty (-): share of the cycle that a leg stands, 0.01 to 0.99. sweep (rad): by which
-    it turns meanwhile. middle (rad): its angle in the middle of that.
-
     The legs at a hip are half a cycle apart.
     """
 
-    frequency: float
-    duty: float = 0.5
-    sweep: float = math.pi
-    middle: float = 0.0
+    frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns a second")]
+    duty: Annotated[float, Number(0.01, 0.99, "-", "share of the cycle in which a leg stands, 0.01 to 0.99")] = 0.5
+    sweep: Annotated[float, Number(0.01, 2 * math.pi - 0.01, "rad", "angle by which a leg turns as it stands")] = (
+        math.pi
+    )
+    middle: Annotated[float, Number(-math.pi, math.pi, "rad", "angle of a leg in the middle of its stance")] = 0.0
     angles = ("sweep", "middle")
 
     def __post_init__(self):
-        low, high = FREQUENCIES
-        told = f"frequency must be a number from {low:g} to {high:g} turns a second (Hz), got {shown(self.frequency)}"
-        try:
-            in_range("frequency", self.frequency, low, high)
-        except ValueError:
-            raise ValueError(told) from None
-        check_ranges(self, duty=(0.01, 0.99), middle=(-math.pi, math.pi))
-        most = 2 * math.pi - 0.01
-        require(
-            not isinstance(self.sweep, str | bytes | bool),
-            f"sweep must be a number from 0.01 to {most:.2f} rad, got {shown(self.sweep)}",
-        )
-        in_range("sweep", self.sweep, 0.01, most)
+        check_numbers(self)
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -111,8 +99,6 @@ def rounded(rounding: float, frequency, reach):
 class Robot:
     """Base of robots. legs: the outline they share turns about its axle at each of the hips. inertia: kg m^2,
     infinite for one that keeps its pitch.
-
-    mass (kg): of all that moves. axle (m): about which legs turn, above the origin of their outline.
     """
 
     mass: float
@@ -137,40 +123,38 @@ class Robot:
         self.leg(elements)
 
     def _check(self) -> None:
-        check_ranges(self, mass=MASSES)
+        check_numbers(self)
         require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {shown(self.legs)}")
-        check_metres(self, "axle", low=-LARGEST)
 
 
 @dataclass(frozen=True)
 class Rhex(Robot):
     """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
 
-    length, height, width (m): of the box about the centre of mass. hips (m): x of each from there. hip_height (m): of
-    the hips above that. inertia (kg m^2): of pitching; that of the box where none is given.
+    hips (m): x of each hip from the centre of mass.
 
-    aside (m): of the legs at each hip from the middle plane, one on either side, for the engine of three dimensions; where
-    none are given, beside the box, and at every other one of an odd number of hips so much farther out that a tripod whose
-    legs bear alike neither rolls nor yaws the body.
+    aside (m): distance of the legs at each hip from the middle plane, one on either side, for the engine of three
+    dimensions; where none are given, beside the box, and at every other one of an odd number of hips so much farther out
+    that a tripod whose legs bear alike neither rolls nor yaws the body.
     """
 
-    mass: float
-    length: float
-    height: float
-    width: float
+    mass: Mass
+    length: Annotated[float, metres("length of the box about the centre of mass")]
+    height: Annotated[float, metres("height of the box about the centre of mass")]
+    width: Annotated[float, metres("width of the box about the centre of mass")]
     legs: Shape
     hips: tuple[float, ...]
-    hip_height: float = 0.0
-    inertia: float | None = None
-    axle: float = 0.0
+    hip_height: Annotated[float, metres("height of the hips above the centre of mass", -LARGEST)] = 0.0
+    inertia: Annotated[
+        float | None, Number(1e-12, 1e5, "kg m^2", "moment of inertia of pitching; that of the box where none is given")
+    ] = None
+    axle: Axle = 0.0
     aside: tuple[float, ...] | None = None
     apart = (0.0, 0.5)
     period = 1.0
 
     def __post_init__(self):
         self._check()
-        check_metres(self, "length", "height", "width")
-        check_metres(self, "hip_height", low=-LARGEST)
         hips = real_array("hips", self.hips)
         require(hips.ndim == 1, f"hips must be a list of x in m, got {shown(self.hips)}")
         require(
@@ -181,7 +165,7 @@ class Rhex(Robot):
         object.__setattr__(self, "hips", tuple(map(float, hips)))
         if self.inertia is None:
             object.__setattr__(self, "inertia", self.mass * (self.length**2 + self.height**2) / 12)
-        check_ranges(self, inertia=INERTIAS)
+            check_numbers(self)
         if self.aside is not None:
             aside = real_array("aside", self.aside)
             good = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
@@ -208,14 +192,11 @@ class Rhex(Robot):
 @dataclass(frozen=True)
 class Roller(Robot):
     """A wheel, or whatever turns, on an axle that is kept level: a mass that moves forwards and up and down, driven by
-    its own weight.
+    its own weight."""
 
-    mass (kg): of all that the wheel carries, and its own.
-    """
-
-    mass: float
+    mass: Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own")]
     legs: Shape
-    axle: float = 0.0
+    axle: Axle = 0.0
     hips = (0.0,)
     hip_height = 0.0
     inertia = math.inf

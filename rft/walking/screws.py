@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import in_range, real_array, require, shown
-from rft.spatial import Screw, Spatial, wrench
-from rft.spatial.motions import _turned
+from rft.checks import in_range, real_array, require, shown
+from rft.meshes import Screw, Spatial, wrench
+from rft.meshes.motions import _turned
 from rft.walking.craft import Screws
 from rft.walking.planar import GRAVITY
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rft.in_turn import known
 from rft.walking.march import march
 from rft.walking.planar import GRAVITY, Robots, State
 from rft.walking.robot import Robot, Tripod, parts
@@ -65,11 +64,17 @@ class Walk(NamedTuple):
         return float(abs(left) / self.work[-1]) if self.work[-1] > 0.0 else 0.0
 
 
+def advanced(step: Callable, *at) -> Any:
+    """Return step(*at), a stride from a state of numbers; another one in its place may store what that gives."""
+    return step(*at)
+
+
 class Strides:
     """Strides of B robots whose clocks have their kinks at the same phases. steps: of a cycle, about. Where two legs at
-    a hip are half a cycle apart, a stride is half a cycle: in the plane they are alike."""
+    a hip are half a cycle apart, a stride is half a cycle: in the plane they are alike. advance: as `advanced`."""
 
-    def __init__(self, robots: Robots, makers: list[Robot], gaits: list[Tripod], steps: int):
+    def __init__(self, robots: Robots, makers: list[Robot], gaits: list[Tripod], steps: int, advance=advanced):
+        self.advance = advance
         self.robots, self.period = robots, makers[0].period / len(makers[0].apart)
         self.cycle = round(1 / self.period)  # strides
         self.frequency, self.reach = robots.frequency[:, 0], robots.reach
@@ -86,10 +91,13 @@ class Strides:
 
     def run(self, state: State, stride: int, which: np.ndarray) -> tuple[np.ndarray, State]:
         """The next stride of these samples: (phases (S,), states (S, B) after each step); who is at an end stays there."""
-        begin, phases = stride * self.period, stride * self.period + self.phases
-        stop = lambda at, some: self.ended(at, which[some]) != ""
-        states = lambda: march(self.robots, which, state, phases, self.of + begin, stop).packed()
-        return phases[1:], State.unpacked(known("stride", states, lambda: (stride, which, state.packed())))
+        return stride * self.period + self.phases[1:], self.advance(self.states, stride, which, state)
+
+    def states(self, stride: int, which: np.ndarray, state: State) -> State:
+        """Return the states after each step of a stride, as in `run`."""
+        begin = stride * self.period
+        ends = self.top[which], self.out_of_reach[which]
+        return march(self.robots, which, state, begin + self.phases, begin + self.of, ends)[0]
 
     def scaled(self, state: State, which) -> np.ndarray:
         """(n, B): what tells all that is to come, over what is large for these robots."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.media.base import in_range, real_array, require, shown
-from rft.vertical.effects import GroundEffect, folded
-from rft.vertical.loads import loads
-from rft.vertical.shapes import Shape
-from rft.vertical.stress import PlateStress
+from rft.checks import in_range, real_array, require, shown
+from rft.ground import GroundEffect
+from rft.plates.loads import loads
+from rft.plates.shapes import Shape
+from rft.plates.stress import PlateStress
 
 HALVINGS = 40  # of the interval that holds the hub's height
 TURN = 24  # angles of a wheel that is not round
@@ -46,11 +46,10 @@ def rolling(
     reach = float(np.hypot(*points.points.T).max())
     angle = np.linspace(0.0, 2 * np.pi, TURN if getattr(wheel, "lugs", 1) else 1, endpoint=False)
     twist = np.stack([(1.0 - slip) * rate * radius, np.zeros_like(slip), np.full_like(slip, rate)], -1)[..., None, :]
-    ground = folded(stress, effects)
 
     def at(height):
         pose = np.stack(np.broadcast_arrays(0.0, height[..., None], angle), -1)
-        found = loads(ground, points, pose, np.broadcast_to(twist, pose.shape))
+        found = loads(stress, points, pose, np.broadcast_to(twist, pose.shape), effects)
         return found.force.mean(-2), found.moment.mean(-1)
 
     low, high = np.full(slip.shape, -2 * reach), np.full(slip.shape, reach)

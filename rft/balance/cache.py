@@ -1,0 +1,161 @@
+"""Compiled kernels on disk, each under a digest of everything it is computed with.
+
+numba's own cache knows the file of the function alone: a changed formula in another file, or another law, would be
+given the old code. The key here covers the code and the constants of every function that a kernel names, the versions
+of numba and LLVM, and the processor. A file that is damaged, or cannot be read or written, counts as none."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import secrets
+import sys
+import types
+import warnings
+from pathlib import Path
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+from numba.misc.appdirs import user_cache_dir
+
+from rft import simd, vectors
+from rft.balance.backend import Note
+
+
+def folder() -> Path:
+    """Return the folder of compiled code: NUMBA_CACHE_DIR where that is set, else the user's own."""
+    return Path(numba.config.CACHE_DIR or user_cache_dir("geomech")) / "rft"
+
+
+class Cache(_Cache):
+    """The compiled code of one function in one file, as numba asks for it; whatever goes wrong with the file, the
+    function runs."""
+
+    def __init__(self, function):
+        self.key = digest(function)
+        self.path = folder() / f"{self.key}.code"
+
+    @property
+    def cache_path(self) -> str:
+        return str(self.path.parent)
+
+    def read(self) -> bytes | None:
+        """Return the code; None if there is none. A damaged file is renamed."""
+        try:
+            raw = self.path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            return self.rename(error.strerror)
+        if hashlib.sha256(raw[32:]).digest() != raw[:32]:
+            return self.rename("it is damaged")
+        return raw[32:]
+
+    def load_overload(self, sig, target_context) -> CompileResult | None:
+        """Return the compiled code for a signature; None if it has to be compiled."""
+        if (data := self.read()) is None:
+            return None
+        target_context.refresh()
+        try:
+            saved, reduced = pickle.loads(data)
+            return CompileResult._rebuild(target_context, *reduced) if saved == str(sig) else None
+        except Exception as error:  # undamaged, and yet nothing that LLVM or pickle can load
+            return self.rename(f"it cannot be loaded ({type(error).__name__})")
+
+    def save_overload(self, sig, data) -> None:
+        """Write the compiled code whole, if there is a folder that has room for it."""
+        body = dumps((str(sig), data._reduce()))
+        part = self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            part.write_bytes(hashlib.sha256(body).digest() + body)
+            os.replace(part, self.path)
+        except OSError as error:
+            cure = "make room there, or set NUMBA_CACHE_DIR"
+            note(f"compiled code is not kept in {self.path.parent}: {error.strerror}; {cure}")
+        finally:
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+
+    def rename(self, why: str) -> None:
+        """Give a file that is not taken another name, and say so."""
+        other = self.path.with_name(self.path.name + ".damaged")
+        try:
+            os.replace(self.path, other)
+        except FileNotFoundError:  # another process has
+            return
+        except OSError as error:
+            done = f"it cannot be renamed ({error.strerror}): remove it"
+        else:
+            done = f"renamed {other.name}; it is compiled anew, python -m rft does that at once"
+        note(f"the compiled code in {self.path} is not taken, {why}: {done}")
+
+    def enable(self) -> None:
+        """Do nothing: the file is always used."""
+
+    def disable(self) -> None:
+        """Do nothing: the file is always used."""
+
+    def flush(self) -> None:
+        """Remove the file."""
+        self.path.unlink(missing_ok=True)
+
+
+def cached(kernel, what: str):
+    """Return a kernel whose compiled code is kept on disk; say so in one line if it has yet to be compiled."""
+    kernel._cache = Cache(kernel.py_func)
+    if not kernel._cache.path.exists():
+        print(f"compiling {what}: some seconds, once", file=sys.stderr)
+    return kernel
+
+
+def note(text: str) -> None:
+    """Warn with a `Note`."""
+    warnings.warn(text, Note, stacklevel=1)
+
+
+def digest(function) -> str:
+    """Return a digest of all that a function computes with: code, constants and every function that it names,
+    recursively."""
+    parts, seen = [Path(module.__file__).read_bytes() for module in (vectors, simd)], set()
+
+    def visit(x):
+        x = getattr(x, "py_func", x)
+        if isinstance(x, types.FunctionType):
+            if id(x) not in seen and x.__module__ not in (vectors.__name__, simd.__name__):
+                seen.add(id(x))
+                visit_code(x.__code__, x)
+                for cell in x.__closure__ or ():
+                    visit(cell.cell_contents)
+                visit(x.__defaults__)
+        elif isinstance(x, type) and issubclass(x, tuple):
+            parts.append(repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode())  # code names its module
+            for name, value in sorted(vars(x).items()):
+                if isinstance(value, types.FunctionType) and not name.startswith("_"):
+                    parts.append(name.encode())
+                    visit(value)
+        elif isinstance(x, np.ndarray):
+            parts.append(x.tobytes())
+        elif isinstance(x, (int, float, str, tuple, type(None))):
+            parts.append(repr(x).encode())
+
+    def visit_code(code, function):
+        parts.append(code.co_code)
+        for constant in code.co_consts:
+            visit_code(constant, function) if isinstance(constant, types.CodeType) else parts.append(
+                repr(constant).encode()
+            )
+        for name in code.co_names:
+            parts.append(name.encode())
+            visit(function.__globals__.get(name))
+
+    visit(function)
+    processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    parts += [repr((numba.__version__, llvm.llvm_version_info, *processor)).encode()]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:32]

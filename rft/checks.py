@@ -1,0 +1,107 @@
+"""Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All raise ValueError with one line.
+
+The bounds, unit and meaning of a number that a class takes stand at the field, in its annotation (`Number`):
+
+    radius: Annotated[float, Number(0, 1, "body lengths", "of the body")]
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple, get_args, get_type_hints
+
+import numpy as np
+
+
+class Number(NamedTuple):
+    """A number in a field. low, high: bounds, allowed themselves. unit: "-" for none. meaning: for lists of keys. whole:
+    whether only whole numbers will do."""
+
+    low: float
+    high: float
+    unit: str
+    meaning: str
+    whole: bool = False
+
+
+@functools.cache
+def numbers_of(kind: type) -> dict[str, Number]:
+    """Return the annotations `Number` of a class by field."""
+    try:
+        hints = get_type_hints(kind, include_extras=True)
+    except (NameError, TypeError):  # of a class of a user's, whose annotations name what is not there
+        return {}
+    marked = {name: [x for x in get_args(hint) if isinstance(x, Number)] for name, hint in hints.items()}
+    return {name: found[0] for name, found in marked.items() if found}
+
+
+def check_numbers(owner: Any) -> None:
+    """Raise ValueError unless the numbers of a dataclass lie within the bounds of their annotations; None may stand
+    where it is the default. Whole numbers are stored as integers."""
+    defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
+    for name, number in numbers_of(type(owner)).items():
+        value = getattr(owner, name)
+        if value is not None or defaults.get(name) is not None:
+            in_range(name, value, number.low, number.high, number.whole, number.unit)
+            if number.whole:
+                object.__setattr__(owner, name, int(value))
+
+
+def real_array(name: str, x) -> np.ndarray:
+    """Return x as an array of floats; ValueError with its name if it is none."""
+    try:
+        array = np.asarray(x)
+        if array.dtype.kind in "iuf" or (array.dtype.kind == "O" and all(map(is_number, array.flat))):
+            return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{name} must be real numbers in equal rows, got {shown(x)}")
+
+
+def is_number(value) -> bool:
+    """Return whether a value is one real number; True and False are none."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def in_range(name: str, value, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
+    """Raise ValueError with the name unless value is a number, or a whole one, from low to high."""
+    if not (is_number(value) and low <= value <= high and (not whole or value == int(value))):
+        bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {shown(value)}")
+
+
+def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
+    """Return a covariance matrix as rows of floats, None as it is. ValueError unless it is one of as many parameters as
+    ``sizes`` allow: square, finite, symmetric and, to roundoff, without a negative eigenvalue."""
+    if value is None:
+        return None
+    matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
+    require(
+        matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
+        f"covariance must be {allowed} finite numbers, got {shown(value)}",
+    )
+    spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    unit = np.where(spread > 0, spread, 1.0)
+    scaled = matrix / unit[:, None] / unit  # correlations
+    sound = bool((np.abs(scaled - scaled.T) <= 1e-9).all() and np.linalg.eigvalsh(scaled)[0] >= -1e-9)
+    require(
+        sound and bool((matrix[:, spread == 0] == 0).all()),
+        f"covariance must be symmetric and without negative eigenvalues, got {shown(value)}",
+    )
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def shown(value) -> str:
+    """Return repr(value) as one line of at most 60 characters."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very long number"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def require(condition: bool, text: str) -> None:
+    """Raise ValueError(text) unless the condition holds."""
+    if not condition:
+        raise ValueError(text)

@@ -1,0 +1,39 @@
+"""Air that rises through the grains: they bear less, up to where they are fluidised and bear nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.checks import Number, check_numbers, require
+from rft.ground.base import Ground, GroundEffect
+
+
+@dataclass(frozen=True)
+class Aeration(GroundEffect):
+    """Strength times 1 - air_speed / fluidisation; the stress map keeps its shape.
+
+    An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength that falls
+    linearly with air speed is a finding about alpha_z(0, 90 degrees); that it holds for all angles alike, and that it
+    falls to nothing, is assumed.
+    """
+
+    air_speed: Annotated[float, Number(0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section")]
+    fluidisation: Annotated[float, Number(1e-6, 1e3, "m/s", "air speed from which the ground is fluidised")]
+
+    kind = "aeration"
+    limit = "air_speed = 0"
+    cost = "one multiplication an element"
+    walks = True
+
+    def __post_init__(self):
+        check_numbers(self)
+        told = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on, and no longer "
+        require(self.air_speed < self.fluidisation, f"{told}bears as this law says; give less")
+
+    def apply(self, ground: Ground) -> Ground:
+        return ground._replace(strength=ground.strength * (1.0 - self.air_speed / self.fluidisation))
+
+    @property
+    def assumes(self) -> str:
+        return "that strength falls to nothing at fluidisation, at all angles alike"

@@ -1,0 +1,52 @@
+"""Ground that something went through before: weaker near there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.ground.base import Ground, GroundEffect
+from rft.premise import Premise
+
+MOST_PLACES = 1000
+
+
+@dataclass(frozen=True)
+class DisturbedGround(GroundEffect):
+    """Strength times 1 - weakening x disturbance, at all depths; disturbance is 1 up to half a ``radius`` along the
+    ground from any of the ``places`` of earlier intrusions, and falls linearly to 0 at one and a half.
+
+    places (m): x of earlier intrusions.
+
+    That grains bear less where something went before is by experiment (paper Sec. IV B); the form and every number are
+    assumed, as is that disturbances do not add up or heal. The motion itself does not disturb: places are given.
+    """
+
+    places: tuple[float, ...]
+    radius: Annotated[float, Number(1e-6, 1e3, "m", "distance along the ground to which intrusions disturb it, about")]
+    weakening: Annotated[float, Number(0, 1, "-", "share of the strength lost in fully disturbed ground")]
+
+    kind = "disturbed-ground"
+    breaks = Premise.SE2_SYMMETRIC
+    limit = "weakening = 0"
+    cost = "six operations an element and place"
+
+    def __post_init__(self):
+        places = real_array("places", self.places)
+        good = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
+        require(good, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {shown(self.places)}")
+        object.__setattr__(self, "places", tuple(places.tolist()))
+        check_numbers(self)
+
+    def apply(self, ground: Ground) -> Ground:
+        rows = [*ground.disturbed, np.array([self.radius, self.weakening, *self.places])]
+        size = max(map(len, rows))
+        padded = [np.append(row, np.full(size - len(row), np.inf)) for row in rows]
+        return ground._replace(disturbed=np.array(padded))
+
+    @property
+    def assumes(self) -> str:
+        return "its form and numbers, and that the motion itself disturbs nothing"

@@ -1,0 +1,28 @@
+"""Force laws, one file each, and the catalogue of named media."""
+
+from rft.laws.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, power_of
+from rft.laws.catalogue import CATALOGUE
+from rft.laws.coulomb import Coulomb
+from rft.laws.granular import Granular
+from rft.laws.surface import Surface
+from rft.laws.table import Table
+from rft.laws.viscous import Viscous
+
+LAWS = {"granular": Granular, "surface": Surface, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
+
+__all__ = [
+    "CATALOGUE",
+    "LAWS",
+    "Coulomb",
+    "Granular",
+    "Medium",
+    "Surface",
+    "Table",
+    "TermLaw",
+    "Viscous",
+    "is_closed",
+    "is_linear",
+    "is_mirror",
+    "is_rate_independent",
+    "power_of",
+]

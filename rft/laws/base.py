@@ -1,0 +1,231 @@
+"""What a medium is: the drag per unit length on a piece of body that slides along and across itself."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from rft.checks import require, shown
+from rft.vectors import formula, sqrt, where
+
+
+class Medium(Protocol):
+    """A force law of the horizontal plane. Forces are in units of the medium's own axial drag.
+
+    ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
+
+        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + eps^2),
+
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the closed-form link
+    integrals of `rft.link`. A law of another form has neither (or None), supplies `traction` alone and is integrated
+    by quadrature. So all but `traction` may be left out (`dry_terms`, `viscous_terms`): ``slopes``, (df_t/dv_t,
+    df_t/dv_n, df_n/dv_t, df_n/dv_n), else by differences; ``mirror``, True where left and right are alike, f_n odd and
+    f_t even in v_n, else not said (`is_mirror`); ``k``, that of Eq. 2 (`Granular`). Compiled code knows a law whose
+    traction, and slopes where it has them, are formulas (`rft.vectors.formula`) of its number fields. A measured medium
+    may have a ``covariance`` (n, n), of the parameters that ``uncertain`` names, in their order; it changes no force
+    (`checked_covariance`)."""
+
+    def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
+        ...
+
+
+@formula
+def terms_traction(law, v_t, v_n, rounding):
+    """Return the traction (f_t, f_n) of a law's viscous and dry terms, zero at rest."""
+    f_t, f_n = law.viscous[0, 0] * v_t, law.viscous[0, 1] * v_n
+    for j in range(len(law.dry)):
+        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
+        R = sqrt(where(R2 > 0.0, R2, 1.0))
+        f_t, f_n = f_t + k_t * v_t / R, f_n + k_n * v_n / R
+    return f_t, f_n
+
+
+@formula
+def terms_slopes(law, v_t, v_n, rounding):
+    """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of viscous and dry terms; infinite slopes at rest are
+    returned as 0."""
+    zero = 0.0 * v_t
+    tt, tn, nt, nn = zero + law.viscous[0, 0], zero, zero, zero + law.viscous[0, 1]
+    for j in range(len(law.dry)):
+        q, k_t, k_n = law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]
+        R2 = q * q * v_t * v_t + v_n * v_n + rounding * rounding
+        inverse = where(R2 > 0.0, 1.0, 0.0) / sqrt(where(R2 > 0.0, R2, 1.0))
+        e_t, e_n, e = v_t * inverse, v_n * inverse, rounding * inverse
+        tt, tn = tt + k_t * (e_n * e_n + e * e) * inverse, tn - k_t * e_t * e_n * inverse
+        nt, nn = nt - k_n * q * q * e_t * e_n * inverse, nn + k_n * (q * q * e_t * e_t + e * e) * inverse
+    return tt, tn, nt, nn
+
+
+class TermLaw:
+    """Base of laws that are a sum of dry and viscous terms: `traction` follows from the terms."""
+
+    dry: tuple[tuple[float, float, float], ...] = ()
+    viscous: tuple[float, float] = (0.0, 0.0)
+    mirror = True
+
+    def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
+        v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
+        return terms_traction(numbers_of_terms(self), v_t, v_n, rounding)
+
+    def slopes(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, ...]:
+        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
+        v_t, v_n = np.broadcast_arrays(np.asarray(v_t, float), np.asarray(v_n, float))
+        return terms_slopes(numbers_of_terms(self), v_t, v_n, rounding)
+
+
+class TermNumbers(NamedTuple):
+    """Numbers of viscous and dry terms. viscous: (1, 2), coefficients (c_t, c_n). dry: (T, 3), terms (q, k_t, k_n)."""
+
+    viscous: np.ndarray
+    dry: np.ndarray
+
+
+def numbers_of_terms(medium) -> TermNumbers:
+    """Return the terms of a medium in closed form as arrays, those that act along the element first."""
+    terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
+    return TermNumbers(np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3))
+
+
+def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
+    """The rate-independent terms (q, k_t, k_n) of a medium's closed form, None where it has none."""
+    return getattr(medium, "dry", None)
+
+
+def viscous_terms(medium) -> tuple[float, float] | None:
+    """(c_t, c_n) of a medium's closed form, None where it has none."""
+    return getattr(medium, "viscous", None)
+
+
+def is_closed(medium) -> bool:
+    """Whether the medium has a closed form, so that its integrals over a link are exact."""
+    return dry_terms(medium) is not None and viscous_terms(medium) is not None
+
+
+def is_mirror(medium) -> bool:
+    """Whether the medium says that left and right are alike; then a field takes half the balances."""
+    return bool(getattr(medium, "mirror", False))
+
+
+def is_frozen(thing) -> bool:
+    """Whether it stays what it is: a frozen dataclass of what can be a key, which an array of parameters cannot."""
+    parameters = getattr(type(thing), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen:
+        return False
+    try:
+        hash(thing)
+    except TypeError:
+        return False
+    return True
+
+
+def remembered(f: Callable) -> Callable:
+    """f, worked out once for the last few arguments of which none can change (`is_frozen`, text, whole numbers,
+    tuples)."""
+    kept = functools.lru_cache(maxsize=32)(f)
+
+    @functools.wraps(f)
+    def of(*args):
+        return (kept if _lasts(args) else f)(*args)
+
+    return of
+
+
+def _lasts(x) -> bool:
+    return type(x) in (str, int) or (all(map(_lasts, x)) if type(x) is tuple else is_frozen(x))
+
+
+SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
+
+
+@remembered
+def is_central(medium: Medium) -> bool:
+    """Whether drag only turns round with the velocity, so that no end of an element is its front: tried at many."""
+    with np.errstate(all="ignore"):
+        forth, back = (
+            np.stack(np.broadcast_arrays(*medium.traction(sign * TRIED[0], sign * TRIED[1]))) for sign in (1, -1)
+        )
+    return bool((np.abs(forth + back) <= 1e-13 * np.abs(forth).max(0)).all())
+
+
+def require_law(medium: Medium) -> None:
+    """Raise ValueError for what is no medium, or whose `traction` cannot be asked for the drag on arrays of
+    elements."""
+    good = hasattr(medium, "traction") and not isinstance(medium, type)
+    require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    if is_closed(medium):
+        return
+    name = f"{type(medium).__name__}.traction"
+    try:
+        with np.errstate(all="ignore"):
+            f_t, f_n = medium.traction(1.0, 0.0)
+            f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), rounding being the speed below which dry "
+            f"friction is rounded off: {error}"
+        ) from error
+    except Exception as error:
+        raise ValueError(f"{name} fails: {type(error).__name__}: {error}") from error
+    shapes = np.shape(f_t), np.shape(f_n)
+    good = set(shapes) <= {(), (1,), (2, 3)}
+    require(good, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
+
+
+def _drags(medium: TermLaw) -> bool:
+    """Whether all terms of a closed form are drags, and there are some; if not, they may yet be drags together."""
+    every = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
+    return min(every) >= 0.0 and 0.0 < max(every) < np.inf
+
+
+def require_drag(medium: Medium) -> None:
+    """Raise ValueError if the medium pushes: if at some velocity, of 48 directions and speeds from 1e-12 to 1e12, its
+    force has a part along the motion, not against it, or if it has none at all."""
+    require_law(medium)
+    if getattr(type(medium), "traction", None) is TermLaw.traction and _drags(medium):
+        return
+    v_t, v_n = TRIED
+    with np.errstate(all="ignore"):
+        f_t, f_n = medium.traction(v_t, v_n)
+        against = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1: straight against the motion
+    name, against = type(medium).__name__, np.nan_to_num(against)
+    require(bool((against > 0).any()), f"{name} has no drag at any velocity: give its traction a positive one")
+    worst = np.unravel_index(np.argmin(against), against.shape)
+    require(
+        against[worst] > -1e-9,  # rounding, in laws that hardly drag along the body
+        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body: "
+        "drag is positive in the direction of the motion it opposes, change its sign there",
+    )
+
+
+def is_linear(medium: Medium) -> bool:
+    """Whether drag is proportional to velocity, so that the body velocity is linear in alphadot."""
+    return dry_terms(medium) == () and is_closed(medium)
+
+
+def is_rate_independent(medium: Medium) -> bool:
+    """Whether it does not matter how fast a gait is run: drag grows with the same power of the speed in all
+    directions."""
+    return power_of(medium) is not None
+
+
+def power_of(medium: Medium) -> float | None:
+    """The power of the speed that drag grows with in all directions: 0 dry, 1 viscous; None if there is no one
+    power."""
+    if is_closed(medium):
+        return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
+    speeds = np.logspace(-3, 1, 5)[:, None]
+    with np.errstate(all="ignore"):
+        f = np.stack(np.broadcast_arrays(*medium.traction(speeds * np.cos(DIRECTIONS), speeds * np.sin(DIRECTIONS))))
+    size = np.sqrt((f**2).sum((0, 2)))
+    if not np.isfinite(size).all() or not size.all():
+        return None
+    form, growth = f / size[:, None], size[1:] / size[:-1]
+    alike = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
+    return round(float(np.log10(growth.mean())), 6) + 0.0 if alike else None

@@ -1,0 +1,51 @@
+"""Dry granular media in the horizontal plane: Eqs. 2 and 3 of Zhang and Goldman (2014)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.checks import Number, check_numbers, checked_covariance, require
+from rft.laws.base import TermLaw
+
+
+@dataclass(frozen=True)
+class Granular(TermLaw):
+    """Resistive force per unit length of a slender body in dry grains, opposing the velocity.
+
+        f_n = (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
+
+    v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
+    Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
+
+    k is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
+
+    covariance (-): that of C, gamma0 (in rad) and, where k is given, k or not, as ``uncertain`` says; it changes no
+    force and is what drag measurements leave open (`rft.calibrate`)."""
+
+    C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
+    gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
+    k: Annotated[float | None, Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above")] = None
+    covariance: tuple[tuple[float, ...], ...] | None = None
+    angles = ("gamma0",)
+
+    def __post_init__(self):
+        check_numbers(self)
+        require(
+            0 < self.gamma0 < math.pi / 2,
+            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+        )
+        sizes = (2,) if self.k is None else (2, 3)
+        object.__setattr__(self, "covariance", checked_covariance(self.covariance, *sizes))
+
+    @property
+    def uncertain(self) -> tuple[str, ...]:
+        """Names of the parameters that ``covariance`` is of."""
+        return ("C", "gamma0", "k")[: len(self.covariance or (0, 0))]
+
+    @property
+    def dry(self) -> tuple[tuple[float, float, float], ...]:
+        # With v_t^2 + v_n^2 written out, C (v.n) / sqrt(tan^2 g0 + (v.n)^2)
+        # = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2): a second dry term.
+        return (1.0, 1.0, 1.0), (math.sin(self.gamma0), 0.0, self.C * math.cos(self.gamma0))

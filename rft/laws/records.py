@@ -1,0 +1,99 @@
+"""Force laws as records: numbers, and formulas of them, which both drivers of the balance take.
+
+The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`, `slopes` and `average`. A
+closed form, a sum of viscous and dry terms, has exact averages over an element; any other law is averaged by a
+quadrature rule. Compiled code knows a law whose traction is a formula (`rft.vectors.formula`); another one is left to
+NumPy."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rft.checks import is_number
+from rft.laws.base import is_closed, numbers_of_terms, remembered, require_law, terms_slopes, terms_traction
+from rft.link import added, dry, viscous
+from rft.quadrature import QUADRATURE, by_nodes, nodes_of, parse, slopes_by_differences
+from rft.vectors import formula, is_formula
+
+
+@formula
+def closed_form(law, v_t, v_n, v_w, rounding):
+    """Return the exact load of viscous and dry terms."""
+    load = viscous(v_t, v_n, v_w, law.viscous[0, 0], law.viscous[0, 1])
+    for j in range(len(law.dry)):
+        load = added(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
+    return load
+
+
+class Terms(NamedTuple):
+    """A law in closed form, as `TermNumbers`."""
+
+    viscous: np.ndarray
+    dry: np.ndarray
+    traction, slopes, average = terms_traction, terms_slopes, closed_form
+
+
+class Uncompiled:
+    """The record of a law whose traction is no formula."""
+
+    slopes, average = slopes_by_differences, by_nodes
+
+    def __init__(self, law, nodes: np.ndarray, weights: np.ndarray):
+        self.nodes, self.weights, self.traction = nodes, weights, law.traction
+        if hasattr(law, "slopes"):
+            self.slopes = law.slopes
+
+
+@remembered
+def record(law, rule: str = "exact") -> Any:
+    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N"); ValueError for what is no law."""
+    require_law(law)
+    kind, count = rule_for(law, rule)
+    if is_closed(law):
+        numbers = numbers_of_terms(law)._asdict()
+        if kind == "exact":
+            return Terms(**numbers)
+        formulas = {"traction": terms_traction, "slopes": terms_slopes, "average": by_nodes}
+    nodes, weights = (x.reshape(1, 1, -1, 1, 1) for x in nodes_of((kind, count)))
+    if not is_closed(law):
+        if not is_formula(type(law).traction):
+            return Uncompiled(law, nodes, weights)
+        numbers = numbers_of(law)
+        slopes = getattr(type(law), "slopes", slopes_by_differences)
+        formulas = {"traction": type(law).traction, "slopes": slopes, "average": by_nodes}
+    new = record_class(type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items()))
+    return new(*numbers.values(), nodes, weights)
+
+
+def numbers_of(law) -> dict[str, np.ndarray | float]:
+    """Return the numbers that the formulas of a law read: its ``numbers``, or the numbers among its fields."""
+    if hasattr(law, "numbers"):
+        return law.numbers
+    own = fields(law) if is_dataclass(law) else ()
+    return {f.name: float(x) for f in own if is_number(x := getattr(law, f.name))}
+
+
+@functools.cache
+def record_class(name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]) -> type:
+    """Return the class of records with these numbers and formulas; one class is one form of law to compiled code."""
+    new = NamedTuple(name, [(field, np.ndarray) for field in names])
+    for field, function in formulas:
+        setattr(new, field, function)
+    return new
+
+
+def is_compilable(law_record) -> bool:
+    """Return whether compiled code knows a law, from its record."""
+    return isinstance(law_record, tuple)
+
+
+def rule_for(law, rule: str) -> tuple[str, int]:
+    """Return the rule as `rft.quadrature.parse` does, but QUADRATURE where "exact" is asked of a law without a closed
+    form."""
+    kind, count = parse(rule)
+    return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)

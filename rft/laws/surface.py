@@ -1,0 +1,45 @@
+"""Drag of a shallow body at the surface of dry grains: the form of Eq. 3 across, its own strength along."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.checks import Number, check_numbers, checked_covariance, require
+from rft.laws.base import TermLaw
+
+
+@dataclass(frozen=True)
+class Surface(TermLaw):
+    """Resistive force per unit length of a shallow body at the surface of dry grains, opposing the velocity.
+
+        f_n = across (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
+
+    v the unit vector of the velocity, in units of the axial drag: `Granular` with across = 1. The form across is the
+    one that Schiebel et al. (eLife 9, e51412, 2020) fitted to the drag on a plate; that the drag along is Coulomb's, a
+    constant times v.t, is assumed.
+
+    covariance (-): that of C, gamma0 (in rad) and across; it changes no force and is what drag measurements leave open.
+    """
+
+    C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
+    gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
+    across: Annotated[float, Number(1e-6, 1e6, "-", "strength of the drag across, A of that fit, over the axial drag")]
+    covariance: tuple[tuple[float, ...], ...] | None = None
+    angles = ("gamma0",)
+    uncertain = ("C", "gamma0", "across")
+
+    def __post_init__(self):
+        check_numbers(self)
+        require(
+            0 < self.gamma0 < math.pi / 2,
+            f"gamma0 must lie between 0 and 90 degrees, got {math.degrees(self.gamma0):g} degrees ({self.gamma0:g} rad)",
+        )
+        object.__setattr__(self, "covariance", checked_covariance(self.covariance, 3))
+
+    @property
+    def dry(self) -> tuple[tuple[float, float, float], ...]:
+        # As in `Granular`: C (v.n) / sqrt(tan^2 g0 + (v.n)^2) = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2).
+        extra = self.across * self.C * math.cos(self.gamma0)
+        return (1.0, 1.0, float(self.across)), (math.sin(self.gamma0), 0.0, extra)

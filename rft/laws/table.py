@@ -1,0 +1,132 @@
+"""A law as it was measured: drag along and across by the angle of attack, and a monotone curve through it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rft.checks import real_array, require
+from rft.drag import rod_drag
+from rft.laws.base import require_drag
+from rft.vectors import absolute, at, copysign, floor, formula, minimum, sqrt, where
+
+MOST_ROWS = 10_000
+MOST_CELLS = 4096  # of a curve on [0, 1]
+REACH = np.radians(15.0)  # how near to 0 and pi/2 the angles must come
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
+
+    psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; others are folded between,
+    and those measured again averaged (`rft.drag.rod_drag`). f_t, f_n (-): as many forces per length along and across,
+    in one unit of any kind, positive against the motion.
+
+    With the unit velocity v, f_t is a function of v.t = cos psi and f_n one of v.n = sin psi, as in Eq. 3 of Zhang and
+    Goldman (2014): odd ones, through the origin and the measured values, by piecewise cubics that are monotone between
+    neighbours and have a continuous derivative (PCHIP). They hold the last value where the angles do not reach 0 or
+    pi/2; what was measured of f_n at 0 and of f_t at pi/2, where symmetry allows none, is left out. Forces are in units
+    of f_t at psi = 0."""
+
+    psi: tuple[float, ...]
+    f_t: tuple[float, ...]
+    f_n: tuple[float, ...]
+    angles = ("psi",)
+    dry = None
+    viscous = None
+    mirror = True
+
+    def __post_init__(self):
+        rows = [real_array(name, getattr(self, name)) for name in ("psi", "f_t", "f_n")]
+        alike = all(x.ndim == 1 and x.size == rows[0].size for x in rows)
+        require(
+            alike and 3 <= rows[0].size <= MOST_ROWS, f"psi, f_t and f_n must be rows of 3 to {MOST_ROWS} numbers each"
+        )
+        for name, x in zip(("psi", "f_t", "f_n"), rows):
+            require(bool(np.isfinite(x).all()), f"{name} must be finite numbers")
+            object.__setattr__(self, name, tuple(x.tolist()))
+        largest = np.abs(rows[0]).max()
+        require(largest <= 2 * np.pi + 1e-9, f"psi is in rad, at most 2 pi, got {largest:g}: write psi_deg for degrees")
+        data = rod_drag(np.degrees(rows[0]), *rows[1:])
+        require(
+            data.psi.min() <= REACH and data.psi.max() >= np.pi / 2 - REACH and len(np.unique(data.psi.round(9))) > 2,
+            "the angles must come within 15 degrees of 0 and of 90, with at least one more between",
+        )
+        along, across = (_curve(x, f) for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces))
+        unit = float(along(1.0)) if along(1.0) > 0 else float(across(1.0))
+        require(unit > 0, "there is no drag at psi = 0 nor at psi = 90 degrees")
+        object.__setattr__(self, "numbers", {**_pieces("along", along, unit), **_pieces("across", across, unit)})
+        for name, x in self.numbers.items():
+            object.__setattr__(self, name, x)
+        require_drag(self)
+
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
+        inverse = inverse_speed(v_t, v_n, rounding)
+        f_t, _ = curve(v_t * inverse, self.along, self.along_cells, self.along_knots, self.along_steps)
+        f_n, _ = curve(v_n * inverse, self.across, self.across_cells, self.across_knots, self.across_steps)
+        return f_t, f_n
+
+    @formula
+    def slopes(self, v_t, v_n, rounding):
+        """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
+        inverse = inverse_speed(v_t, v_n, rounding)
+        c, s, e = v_t * inverse, v_n * inverse, rounding * inverse
+        _, by_c = curve(c, self.along, self.along_cells, self.along_knots, self.along_steps)
+        _, by_s = curve(s, self.across, self.across_cells, self.across_knots, self.across_steps)
+        by_c, by_s = by_c * inverse, by_s * inverse
+        return by_c * (s * s + e * e), -by_c * c * s, -by_s * c * s, by_s * (c * c + e * e)
+
+
+@formula
+def inverse_speed(v_t, v_n, rounding):
+    """Return 1 / |v|, with |v|^2 rounded off by rounding^2; 0 at rest."""
+    size2 = v_t * v_t + v_n * v_n + rounding * rounding
+    return where(size2 > 0.0, 1.0, 0.0) / sqrt(where(size2 > 0.0, size2, 1.0))
+
+
+@formula
+def curve(x, pieces, cells, knots, steps):
+    """Return value and slope at x, |x| <= 1, of an odd piecewise cubic.
+
+    pieces: (K, 4), coefficients about each knot in [0, 1], the highest power first. cells: (N + 1, 1), the piece at the
+    left end of each of N equal cells of [0, 1]. knots: (K + 1, 1), the last one beyond 1. steps: (S, 1), S the most
+    knots in a cell."""
+    a = minimum(absolute(x), 1.0)
+    piece = at(cells, floor(a * (1.0 * (len(cells) - 1))), 0)
+    for _ in range(len(steps)):
+        piece = piece + where(a >= at(knots, piece + 1.0, 0), 1.0, 0.0)
+    d = a - at(knots, piece, 0)
+    c3, c2, c1, c0 = at(pieces, piece, 0), at(pieces, piece, 1), at(pieces, piece, 2), at(pieces, piece, 3)
+    return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (2.0 * c2 + d * (3.0 * c3))
+
+
+def _pieces(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
+    """Return the arrays of `curve`, by name, for the half at x >= 0 of one of SciPy's odd piecewise polynomials on [-1,
+    1]."""
+    half = polynomial.x >= 0.0
+    knots, pieces = polynomial.x[half], polynomial.c.T[half[:-1]] / unit
+    count = min(MOST_CELLS, 1 << int(np.ceil(np.log2(1.0 / np.diff(knots).min()))))
+    first = np.searchsorted(knots, np.arange(count + 1) / count, side="right") - 1
+    column = lambda x: np.array(x, float).reshape(-1, 1)
+    cells, steps = np.minimum(first, len(pieces) - 1), np.zeros(max(1, np.diff(first).max()))
+    arrays = {"cells": cells, "knots": [*knots[:-1], 2.0], "steps": steps}
+    return {name: np.ascontiguousarray(pieces), **{f"{name}_{key}": column(x) for key, x in arrays.items()}}
+
+
+def _curve(x: np.ndarray, f: np.ndarray):
+    """The odd monotone piecewise cubic on [-1, 1] through the origin and (x, f), the mean of f where x repeats."""
+    from scipy.interpolate import PchipInterpolator
+
+    knots, which = np.unique(np.round(x, 12), return_inverse=True)
+    values = np.bincount(which, f) / np.bincount(which)
+    inner = knots > 1e-9
+    knots, values = knots[inner], values[inner]
+    if knots[-1] < 1.0:
+        knots, values = np.append(knots, 1.0), np.append(values, values[-1])
+    return PchipInterpolator(
+        np.concatenate([-knots[::-1], [0.0], knots]), np.concatenate([-values[::-1], [0.0], values])
+    )

@@ -1,0 +1,31 @@
+"""Low-Reynolds-number drag, the paper's comparison (Fig. 5(c)): linear in the velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from rft.checks import Number, check_numbers, checked_covariance
+from rft.laws.base import TermLaw
+
+
+@dataclass(frozen=True)
+class Viscous(TermLaw):
+    """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
+
+    A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
+
+    covariance (-): that of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
+    (`rft.calibrate`)."""
+
+    ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0
+    covariance: tuple[tuple[float, ...], ...] | None = None
+    uncertain = ("ratio",)
+
+    def __post_init__(self):
+        check_numbers(self)
+        object.__setattr__(self, "covariance", checked_covariance(self.covariance, 1))
+
+    @property
+    def viscous(self) -> tuple[float, float]:
+        return 1.0, float(self.ratio)

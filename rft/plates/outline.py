@@ -1,0 +1,122 @@
+"""The outline of a body that does not change along its width: straight elements between points in the vertical plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from rft.checks import check_numbers, real_array, require
+from rft.metres import LARGEST, metres
+
+MOST_ELEMENTS = 5000
+FEW = 500  # elements, of which pairs are compared all at once, without loading a tree
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A chain of straight elements in the body's frame, in m; turned about its origin.
+
+    points: (N + 1, 2) as (x, z), the last repeating the first if the outline is closed. bends: (N, 2, 2), unit normals
+    at both ends of each element where the chain stands for a curve; None: those of the elements. A closed outline has
+    faces outwards, and is stored counter-clockwise with x to the right and z up. An open one is a thin sheet, of which
+    either side may lead. Refused: outlines that cross or touch themselves, elements of no length."""
+
+    points: np.ndarray
+    width: Annotated[float, metres("width of the body across the plane")]
+    bends: np.ndarray | None = None
+
+    def __post_init__(self):
+        check_numbers(self)
+        points = real_array("points", self.points)
+        require(points.ndim == 2 and points.shape[1] == 2, "points must be a list of (x, z)")
+        require(
+            2 <= len(points) <= MOST_ELEMENTS + 1,
+            f"an outline takes 1 to {MOST_ELEMENTS} elements, got {len(points) - 1}",
+        )
+        require(bool((np.abs(points) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
+        bends = self.bends if self.bends is None else real_array("bends", self.bends)
+        good = bends is None or (bends.shape == (len(points) - 1, 2, 2) and bool(np.isfinite(bends).all()))
+        require(good, f"bends must be unit normals of shape ({len(points) - 1}, 2, 2)")
+        if self.closed and _area(points) < 0.0:
+            points, bends = points[::-1], None if bends is None else bends[::-1, ::-1]
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "bends", bends)
+        _check_simple(points, self.closed)
+
+    @property
+    def closed(self) -> bool:
+        return len(self.points) > 3 and bool((np.asarray(self.points[0]) == np.asarray(self.points[-1])).all())
+
+    @property
+    def elements(self) -> int:
+        return len(self.points) - 1
+
+    @property
+    def midpoints(self) -> np.ndarray:
+        """(N, 2)."""
+        return (self.points[1:] + self.points[:-1]) / 2
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(N,)."""
+        return np.hypot(*np.diff(self.points, axis=0).T)
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(N, 2): to the right of the way from point to point, which is outwards if the outline is closed."""
+        along = np.diff(self.points, axis=0) / self.lengths[:, None]
+        return np.stack([along[:, 1], -along[:, 0]], -1)
+
+    @property
+    def end_normals(self) -> np.ndarray:
+        """(N, 2, 2): at the start and at the end of each element."""
+        return np.repeat(self.normals[:, None], 2, 1) if self.bends is None else self.bends
+
+
+def _area(points) -> float:
+    x, z = points.T
+    return float(np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) / 2)
+
+
+def _cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _check_simple(points, closed: bool) -> None:
+    along = np.diff(points, axis=0)
+    lengths, size = np.hypot(*along.T), np.ptp(points, axis=0).max()
+    short = np.flatnonzero(lengths <= 1e-12 * size)
+    require(not short.size, f"points {short[:1]} and the next are the same: keep one")
+    last = along[1:] if not closed else np.roll(along, -1, 0)
+    first = along[:-1] if not closed else along
+    back = (np.abs(_cross(first, last)) <= 1e-12 * size**2) & ((first * last).sum(-1) < 0)
+    require(
+        not back.any(),
+        f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}: drop the point there",
+    )
+    i, j = _meeting(points, along, closed)
+    require(not i.size, f"elements {i[:1]} and {j[:1]} of the outline cross or touch: order its points along the edge")
+
+
+def _close(points, reach: float) -> np.ndarray:
+    """(2, k): pairs of points not further apart than ``reach``, the first before the second."""
+    if len(points) <= FEW:
+        away = points[:, None] - points
+        return np.array(np.nonzero(np.triu(np.hypot(away[..., 0], away[..., 1]) <= reach, 1)))
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points).query_pairs(reach, output_type="ndarray").T
+
+
+def _meeting(points, along, closed: bool):
+    """Pairs of elements that meet, but for neighbours. Only those whose middles are close can."""
+    i, j = _close(points[:-1] + along / 2, np.hypot(*along.T).max() * (1 + 1e-9))
+    apart = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
+    i, j = i[apart], j[apart]
+    a, d, b, e = points[i], along[i], points[j], along[j]
+    sides = _cross(d, b - a) * _cross(d, b + e - a), _cross(e, a - b) * _cross(e, a + d - b)
+    near = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (np.minimum(b, b + e) <= np.maximum(a, a + d))
+    met = near.all(-1) & (sides[0] <= 0) & (sides[1] <= 0)
+    return i[met], j[met]

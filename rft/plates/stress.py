@@ -1,0 +1,137 @@
+"""Stress of grains on a plate in the vertical plane, per unit depth: the map alpha_x,z(beta, gamma) of Sec. II B and Fig. 7.
+
+Axes: x forward, z up, the surface at z = 0. beta: tilt of the plate, 0 lying flat, pi/2 upright; its leading normal is
+n = (sin beta, -cos beta). gamma: direction of motion below the horizontal, v = (cos gamma, -sin gamma). The force on an
+area A at depth |z| is |z| A (-alpha_x, alpha_z), alpha in N/cm^3 (Eq. 4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.vectors import absolute, formula, where
+
+PER_CUBIC_METRE = 1e6  # N/m^3 in a N/cm^3
+TENSION = ("keep", "cut")
+GRAZING = math.radians(0.25)  # assumed; the drag of smooth rods is 0.2 % less than with a jump
+
+
+def _coefficient(meaning: str) -> Number:
+    return Number(-1e6, 1e6, "N/cm^3", meaning)
+
+
+CosineZ = Annotated[float, _coefficient("coefficient of a cosine of alpha_z")]
+SineZ = Annotated[float, _coefficient("coefficient of a sine of alpha_z, m = -1 written m1")]
+CosineX = Annotated[float, _coefficient("coefficient of a cosine of alpha_x")]
+SineX = Annotated[float, _coefficient("coefficient of a sine of alpha_x")]
+Zeta = Annotated[float, Number(1e-6, 1e6, "-", "strength of the medium over that of its coefficients")]
+Grazing = Annotated[
+    float,
+    Number(
+        0, math.pi / 4, "rad",
+        "angle between motion and face over which the stress on the face of a closed body rises, from none where it "
+        "slides along itself to that of the map; 0 for a jump",
+    ),
+]  # fmt: skip
+
+
+@formula
+def alpha(law, n, v):
+    """Return (alpha_x, alpha_z), N/cm^3, of a law's `PlateStress.alpha_ahead` for any unit normal n = (n_x, n_z) and
+    unit velocity v = (v_x, v_z): the map is its own mirror image."""
+    side = where(v[0] < 0.0, -1.0, 1.0)
+    a_x, a_z = law.alpha_ahead((side * n[0], n[1]), (absolute(v[0]), v[1]))
+    a_x = side * a_x
+    if law.cut == 0.0:
+        return a_x, a_z
+    pushes = (n[1] * a_z - n[0] * a_x) * (n[0] * v[0] + n[1] * v[1]) <= 0.0
+    return where(pushes, a_x, 0.0), where(pushes, a_z, 0.0)
+
+
+class PlateStress:
+    """Base of stress maps. A map gives `alpha_ahead` for motion forwards, gamma within +-pi/2; the rest follows here, by
+    mirror symmetry and because a plate turned by pi is the same plate:
+
+        alpha_z(beta, gamma) = alpha_z(-beta, +-pi - gamma),  alpha_x(beta, gamma) = -alpha_x(-beta, +-pi - gamma).
+
+    grazing: the angle in radians between motion and face over which the stress on the face of a closed body rises. A thin
+    plate has no jump where it slides along itself: its other face leads. tension: what happens to faces that the map pulls
+    on instead of pushing. "keep" leaves them, "cut" frees them of stress.
+    """
+
+    grazing: float
+    tension: str
+
+    def alpha_ahead(self, n, v) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha_x, alpha_z) in N/cm^3 for unit normals n = (n_x, n_z), either of the plate's two, and unit velocities
+        v = (v_x, v_z) with v_x >= 0."""
+        raise NotImplementedError
+
+    def __call__(self, beta, gamma) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha_x, alpha_z) in N/cm^3 for angles in radians, of any size, that broadcast together."""
+        beta, gamma = real_array("beta", beta), real_array("gamma", gamma)
+        return self.alpha((np.sin(beta), -np.cos(beta)), (np.cos(gamma), -np.sin(gamma)))
+
+    def alpha(self, n, v) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha_x, alpha_z) in N/cm^3 for unit normals n = (n_x, n_z) and unit velocities v = (v_x, v_z), pairs of arrays."""
+        return alpha(self, n, v)
+
+    @property
+    def cut(self) -> float:
+        """1 where faces that the map pulls on are freed of stress, else 0."""
+        return float(self.tension == "cut")
+
+    def _check(self) -> None:
+        check_numbers(self)
+        good = isinstance(self.tension, str) and self.tension in TENSION
+        require(good, f"tension must be {' or '.join(map(repr, TENSION))}, got {shown(self.tension)}")
+
+
+@dataclass(frozen=True)
+class StressMap(PlateStress):
+    """The map as nine Fourier coefficients in N/cm^3, times zeta:
+
+        alpha_z = sum A_mn cos(2 m beta + n gamma) + B_mn sin(2 m beta + n gamma),
+        alpha_x = sum C_mn cos(2 m beta + n gamma) + D_mn sin(2 m beta + n gamma),  m in -1, 0, 1 and n in 0, 1.
+
+    The defaults are the generic set M0. Source: Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2; Fig. 7 of Zhang
+    and Goldman (2014).
+    """
+
+    A00: CosineZ = 0.206
+    A10: CosineZ = 0.169
+    B11: SineZ = 0.212
+    B01: SineZ = 0.358
+    Bm11: SineZ = 0.055
+    C11: CosineX = -0.124
+    C01: CosineX = 0.253
+    Cm11: CosineX = 0.007
+    D10: SineX = 0.088
+    zeta: Zeta = 1.0
+    grazing: Grazing = GRAZING
+    tension: str = "keep"
+    angles = ("grazing",)
+
+    def __post_init__(self):
+        self._check()
+
+    @formula
+    def alpha_ahead(self, n, v):
+        cos_2b, sin_2b = n[1] * n[1] - n[0] * n[0], -2.0 * n[0] * n[1]
+        cos_g, sin_g = v[0], -v[1]
+        both, turned = (
+            cos_2b * sin_g,
+            sin_2b * cos_g,
+        )  # their sum is sin(2 beta + gamma), sin(gamma - 2 beta) the difference
+        a_z = self.A00 + self.A10 * cos_2b + (self.B11 + self.Bm11) * both + (self.B11 - self.Bm11) * turned
+        both, turned = cos_2b * cos_g, sin_2b * sin_g  # cos(2 beta + gamma) the difference, cos(gamma - 2 beta) the sum
+        a_x = (self.C11 + self.Cm11) * both + (self.Cm11 - self.C11) * turned + self.C01 * cos_g + self.D10 * sin_2b
+        return self.zeta * a_x, self.zeta * (a_z + self.B01 * sin_g)
+
+
+COEFFICIENTS = ("A00", "A10", "B11", "B01", "Bm11", "C11", "C01", "Cm11", "D10")

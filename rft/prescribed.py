@@ -1,0 +1,36 @@
+"""What prescribed motions have in common, of outlines in the vertical plane and of meshes."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from rft.checks import Number, require
+from rft.metres import LARGEST, metres
+
+MOST_SAMPLES = 100_000
+FARTHEST = 1e3  # m along the ground
+
+Samples = Annotated[int, Number(2, MOST_SAMPLES, "-", "poses along the motion, 2 to 100,000", whole=True)]
+Distance = Annotated[float, Number(1e-9, FARTHEST, "m", "length of the path")]
+Direction = Annotated[float, Number(-10, 10, "rad", "direction of the motion below the horizontal")]
+Depth = Annotated[float, metres("depth of the frame's origin at the start", -LARGEST)]
+Height = Annotated[float, metres("height of the frame's origin above the surface", -LARGEST)]
+
+
+class Motion:
+    """Base of motions. turns: whether the angle tells where the body is, not its place."""
+
+    samples: int
+    turns = False
+
+    def require_downwards(self) -> None:
+        """Raise ValueError unless the direction points into the ground."""
+        told = "direction must point downwards, between 0 and 180 degrees below the horizontal"
+        require(0.01 < self.direction < math.pi - 0.01, told)
+
+    def require_turning(self) -> None:
+        """Raise ValueError unless the rate leads from start to stop."""
+        require(abs(self.rate) >= 1e-9, "rate must not be 0: drag a body that does not turn")
+        forwards = (self.stop - self.start) * self.rate > 0
+        require(forwards, "a rate from start to stop: positive if stop > start, else negative")

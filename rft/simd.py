@@ -1,0 +1,351 @@
+"""The functions of `rft.vectors` inside compiled code: on numbers, and on eight numbers at once.
+
+A `Vector` is eight doubles in a register, a `Mask` eight truth values; LLVM splits them where a processor's registers
+are narrower. A formula written for one element, compiled for vectors, works on eight elements at the pace of one.
+Importing this module loads numba, which takes some 0.2 s, so only what compiles imports it."""
+
+from __future__ import annotations
+
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.imputils import lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing import signature
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    models,
+    overload,
+    overload_method,
+    register_jitable,
+    register_model,
+    type_callable,
+)
+
+from rft import vectors
+
+WIDTH = 8
+DOUBLES, WHOLES, BITS = (ir.VectorType(kind, WIDTH) for kind in (ir.DoubleType(), ir.IntType(64), ir.IntType(1)))
+
+
+class Vector(types.Type):
+    """Eight doubles; a number stands for eight alike."""
+
+    def can_convert_from(self, context, other):
+        return Conversion.safe if isinstance(other, (types.Float, types.Integer)) else None
+
+
+class Mask(types.Type):
+    """Eight truth values; one stands for eight alike."""
+
+    def can_convert_from(self, context, other):
+        return Conversion.safe if isinstance(other, types.Boolean) else None
+
+
+vector, mask = Vector("vector"), Mask("mask")
+
+
+def _register_model(kind, llvm):
+    @register_model(kind)
+    class Model(models.PrimitiveModel):
+        def __init__(self, manager, fe_type):
+            super().__init__(manager, fe_type, llvm)
+
+
+_register_model(Vector, DOUBLES)
+_register_model(Mask, BITS)
+
+
+def _repeated(builder, x, llvm):
+    """Return a vector of eight times the same value."""
+    one = builder.insert_element(ir.Constant(llvm, ir.Undefined), x, ir.IntType(32)(0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), None)
+    return builder.shuffle_vector(one, ir.Constant(llvm, ir.Undefined), zeros)
+
+
+@lower_cast(types.Float, Vector)
+@lower_cast(types.Integer, Vector)
+def _vector_from_number(context, builder, fromty, toty, x):
+    return _repeated(builder, context.cast(builder, x, fromty, types.float64), DOUBLES)
+
+
+@lower_cast(types.Boolean, Mask)
+def _mask_from_truth(context, builder, fromty, toty, x):
+    return _repeated(builder, context.cast(builder, x, fromty, types.boolean), BITS)
+
+
+# Operators.
+
+
+def _takes_vectors(a, b):
+    return vector in (a, b) and all(isinstance(x, (Vector, types.Number)) for x in (a, b))
+
+
+def _takes_masks(a, b):
+    return mask in (a, b) and all(isinstance(x, (Mask, types.Boolean)) for x in (a, b))
+
+
+def _operator(function, takes, argument, result, emit):
+    """Define a binary operator for arguments of one kind."""
+
+    @type_callable(function)
+    def typed(context):
+        return lambda a, b: signature(result, argument, argument) if takes(a, b) else None
+
+    lower_builtin(function, argument, argument)(lambda context, builder, sig, args: emit(builder, *args))
+
+
+def _arithmetic(name):
+    return lambda builder, x, y: getattr(builder, name)(x, y, flags=("contract",))
+
+
+def _comparison(sign):
+    return lambda builder, x, y: builder.fcmp_ordered(sign, x, y)
+
+
+for _function, _name in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
+    _operator(_function, _takes_vectors, vector, vector, _arithmetic(_name))
+for _function, _sign in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.eq, "=="),
+):
+    _operator(_function, _takes_vectors, vector, mask, _comparison(_sign))
+_operator(operator.and_, _takes_masks, mask, mask, lambda builder, x, y: builder.and_(x, y))
+_operator(operator.or_, _takes_masks, mask, mask, lambda builder, x, y: builder.or_(x, y))
+
+
+@type_callable(operator.neg)
+def _type_of_negative(context):
+    return lambda a: signature(vector, vector) if a == vector else None
+
+
+@lower_builtin(operator.neg, vector)
+def _negative(context, builder, sig, args):
+    return builder.fneg(args[0])
+
+
+# Functions.
+
+
+def _intrinsic(name, count):
+    """Return what emits a call of LLVM's intrinsic of this name."""
+
+    def emit(builder, *args):
+        full, module = f"llvm.{name}.v{WIDTH}f64", builder.module
+        kind = ir.FunctionType(DOUBLES, [DOUBLES] * count)
+        return builder.call(module.globals.get(full) or ir.Function(module, kind, full), args)
+
+    return emit
+
+
+def _selected(sign):
+    return lambda builder, x, y: builder.select(builder.fcmp_ordered(sign, x, y), x, y)
+
+
+def _define(function, takes, emit, number):
+    """Give a function of `rft.vectors` its meaning for vectors, and ``number``, its meaning for single numbers."""
+    result = signature(vector, *takes)
+
+    def typed(*args):
+        return result if vector in args or mask in args else None
+
+    # numba reads the number of arguments from the signature of these functions.
+    typers = lambda x: typed(x), lambda x, y: typed(x, y), lambda x, y, z: typed(x, y, z)
+    type_callable(function)(lambda context: typers[len(takes) - 1])
+    lower_builtin(function, *takes)(lambda context, builder, sig, args: emit(builder, *args))
+    chosen = (
+        lambda x: number if isinstance(x, types.Number) else None,
+        lambda x, y: number if isinstance(x, types.Number) and isinstance(y, types.Number) else None,
+        lambda condition, x, y: number if isinstance(condition, types.Boolean) else None,
+    )
+    overload(function, strict=False)(chosen[len(takes) - 1])
+
+
+_define(vectors.sqrt, (vector,), _intrinsic("sqrt", 1), lambda x: np.sqrt(x))
+_define(vectors.absolute, (vector,), _intrinsic("fabs", 1), lambda x: abs(x))
+_define(vectors.exp, (vector,), _intrinsic("exp", 1), lambda x: np.exp(x))
+_define(vectors.floor, (vector,), _intrinsic("floor", 1), lambda x: np.floor(x))
+_define(vectors.copysign, (vector, vector), _intrinsic("copysign", 2), lambda x, y: np.copysign(x, y))
+_define(vectors.maximum, (vector, vector), _selected(">"), lambda x, y: x if x > y else y)
+_define(vectors.minimum, (vector, vector), _selected("<"), lambda x, y: x if x < y else y)
+_define(
+    vectors.where,
+    (mask, vector, vector),
+    lambda builder, c, x, y: builder.select(c, x, y),
+    lambda condition, x, y: x if condition else y,
+)
+
+
+@intrinsic
+def _exponents(context, x):
+    """Return the powers of 2 in eight numbers, and the numbers without them, in [1, 2)."""
+
+    def emit(context, builder, sig, args):
+        bits = builder.bitcast(args[0], WHOLES)
+        constant = lambda n: ir.Constant(WHOLES, [n] * WIDTH)
+        power = builder.sub(builder.lshr(bits, constant(52)), constant(1023))
+        rest = builder.or_(builder.and_(bits, constant((1 << 52) - 1)), constant(1023 << 52))
+        pair = builder.sitofp(power, DOUBLES), builder.bitcast(rest, DOUBLES)
+        return context.make_tuple(builder, sig.return_type, pair)
+
+    return types.UniTuple(vector, 2)(vector), emit
+
+
+LN2 = float(np.log(2.0))
+ATANH = tuple(1.0 / (2 * j + 1) for j in range(1, 12))  # of s^2 in 2 atanh s = 2 s (1 + s^2 / 3 + ...), |s| < 0.172
+
+
+@overload(vectors.log_ratio, inline="never", jit_options={"forceinline": True})
+def _log_ratio(a, b):
+    if isinstance(a, types.Number):
+        return lambda a, b: np.log(a / b)
+
+    def of_vectors(a, b):
+        power_a, a = _exponents(a)
+        power_b, b = _exponents(b)
+        large, small = a > 1.4142135623730951 * b, b > 1.4142135623730951 * a
+        a, b = a * vectors.where(large, 0.5, 1.0), b * vectors.where(small, 0.5, 1.0)
+        power = power_a - power_b + vectors.where(large, 1.0, 0.0) - vectors.where(small, 1.0, 0.0)
+        s = (a - b) / (a + b)
+        z = s * s
+        return LN2 * power + (s + s) * (1.0 + z * vectors.polynomial(z, ATANH))
+
+    return of_vectors
+
+
+@overload(vectors.polynomial, inline="never", jit_options={"forceinline": True})
+def _polynomial(z, coefficients):
+    """Unroll Horner's rule, since a loop over the tuple would not be unrolled."""
+    count = len(coefficients)
+    lines = [f"    value = value * z + coefficients[{j}]" for j in range(count - 2, -1, -1)]
+    return _written(
+        "unrolled", ["z, coefficients", f"    value = coefficients[{count - 1}]", *lines, "    return value"]
+    )
+
+
+def _written(name: str, lines: list[str], **names):
+    """Return the function of this name from its source: arguments, then the lines of its body."""
+    space = dict(names)
+    exec("\n".join([f"def {name}({lines[0]}):", *lines[1:]]), space)
+    return space[name]
+
+
+# Memory. Arrays that hold vectors have eight columns.
+
+
+@intrinsic
+def load(context, x, i):
+    """Return the vector x[i, :] of an array (n, 8)."""
+
+    def emit(context, builder, sig, args):
+        return builder.load(_pointer(context, builder, sig, args), align=8)
+
+    return vector(x, i), emit
+
+
+@intrinsic
+def store(context, x, i, value):
+    """Write a vector to x[i, :] of an array (n, 8)."""
+
+    def emit(context, builder, sig, args):
+        builder.store(args[2], _pointer(context, builder, sig, args), align=8)
+        return context.get_dummy_value()
+
+    return types.void(x, i, vector), emit
+
+
+def _pointer(context, builder, sig, args):
+    array = context.make_array(sig.args[0])(context, builder, args[0])
+    row = builder.mul(context.cast(builder, args[1], sig.args[1], types.int64), ir.IntType(64)(WIDTH))
+    return builder.bitcast(builder.gep(array.data, [row]), DOUBLES.as_pointer())
+
+
+@intrinsic
+def any_of(context, x):
+    """Return whether any of eight truth values holds."""
+
+    def emit(context, builder, sig, args):
+        bits = ir.IntType(WIDTH)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), bits(0))
+
+    return types.boolean(x), emit
+
+
+@intrinsic
+def _gather(context, table, row, column):
+    """Return table[row, column] of an array (n, m), for eight rows given as a vector of whole numbers."""
+
+    def emit(context, builder, sig, args):
+        array = context.make_array(sig.args[0])(context, builder, args[0])
+        columns = builder.extract_value(array.shape, 1)
+        rows, column = builder.fptosi(args[1], WHOLES), context.cast(builder, args[2], sig.args[2], types.int64)
+        value = ir.Constant(DOUBLES, ir.Undefined)
+        for lane in map(ir.IntType(32), range(WIDTH)):
+            place = builder.add(builder.mul(builder.extract_element(rows, lane), columns), column)
+            value = builder.insert_element(value, builder.load(builder.gep(array.data, [place])), lane)
+        return value
+
+    return vector(table, row, column), emit
+
+
+@overload(vectors.at)
+def _at(table, row, column):
+    if row == vector:
+        return lambda table, row, column: _gather(table, row, column)
+    return lambda table, row, column: table[int(row), column]
+
+
+def record_access(kind):
+    """Return (read, write) for a NamedTuple of vectors in the rows of an array (rows, 8), from a row ``first`` on."""
+    reads = ", ".join(f"load(x, first + {i})" for i in range(len(kind._fields)))
+    writes = [f"    store(x, first + {i}, record.{name})" for i, name in enumerate(kind._fields)]
+    read = _written("read", ["x, first", f"    return kind({reads})"], kind=kind, load=load)
+    write = _written("write", ["x, first, record", *writes], store=store)
+    return register_jitable(forceinline=True)(read), register_jitable(forceinline=True)(write)
+
+
+@overload(vectors.over_nodes, inline="never")
+def _over_nodes(load):
+    return lambda load: load
+
+
+# Formulas.
+
+
+def register_formulas() -> None:
+    """Let compiled code call all formulas that were marked since the last time."""
+    while vectors.FORMULAS:
+        register_jitable(inline="never", forceinline=True)(vectors.FORMULAS.pop(0))
+
+
+def _register_method(name: str, count: int) -> None:
+    """Let compiled code call the formula ``name`` of a law's class, with so many arguments beside the law."""
+    arguments = ", ".join(f"x{i}" for i in range(count))
+
+    def chosen(law):
+        return _written(
+            "call",
+            [f"law, {arguments}", f"    return method(law, {arguments})"],
+            method=getattr(law.instance_class, name),
+        )
+
+    typed = _written("typed", [f"law, {arguments}", "    return chosen(law)"], chosen=chosen)
+    for kind in (types.NamedTuple, types.NamedUniTuple):
+        overload_method(kind, name, jit_options={"forceinline": True})(typed)
+
+
+_register_method("traction", 3)
+_register_method("slopes", 3)
+_register_method("average", 4)
+_register_method("alpha_ahead", 2)

@@ -1,0 +1,90 @@
+"""The functions that formulas are written with, for numbers, NumPy arrays and the vectors of compiled code alike.
+
+A formula is a plain function of one element, written as in the paper and marked with `formula`. Called as it stands it
+works on numbers and on arrays, by NumPy. `rft.simd` gives the functions below, and every formula, a second meaning
+inside compiled code: there they also take eight elements at once, in a register of the processor. This module imports
+no compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+FORMULAS: list[Callable] = []  # formulas that the compiler has not been given yet (`rft.simd.register_formulas`)
+
+
+def formula(function: Callable) -> Callable:
+    """Mark a function as a formula, so that compiled code may call it; return it unchanged."""
+    function.is_formula = True
+    FORMULAS.append(function)
+    return function
+
+
+def is_formula(function: Callable) -> bool:
+    """Return whether a function is marked as a formula."""
+    return getattr(function, "is_formula", False)
+
+
+def sqrt(x):
+    """Return the square root."""
+    return np.sqrt(x)
+
+
+def absolute(x):
+    """Return the absolute value."""
+    return np.abs(x)
+
+
+def exp(x):
+    """Return the exponential function."""
+    return np.exp(x)
+
+
+def floor(x):
+    """Return the largest whole number that is not above x."""
+    return np.floor(x)
+
+
+def copysign(x, y):
+    """Return the size of x with the sign of y."""
+    return np.copysign(x, y)
+
+
+def maximum(x, y):
+    """Return the larger number."""
+    return np.maximum(x, y)
+
+
+def minimum(x, y):
+    """Return the smaller number."""
+    return np.minimum(x, y)
+
+
+def where(condition, x, y):
+    """Return x where the condition holds, y elsewhere; both are computed."""
+    return np.where(condition, x, y)
+
+
+def log_ratio(a, b):
+    """Return log(a / b) of positive numbers."""
+    return np.log(a / b)
+
+
+def polynomial(z, coefficients):
+    """Return sum_j coefficients[j] z^j by Horner's rule."""
+    value = coefficients[-1]
+    for c in coefficients[-2::-1]:
+        value = value * z + c
+    return value
+
+
+def at(table, row, column):
+    """Return table[row, column], an entry for each of the whole numbers ``row``."""
+    return table[np.asarray(row, int), column]
+
+
+def over_nodes(load):
+    """Return a load summed over the nodes of a rule: the first axis of arrays. Compiled code takes one node at a
+    time."""
+    return type(load)(*(np.sum(x, 0) for x in load))
