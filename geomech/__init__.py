@@ -16,45 +16,52 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from geomech import face as _face  # noqa: F401  it gives values their methods
+from geomech.core import version as _version
+
 if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
-    from geomech import connection as connection
-    from geomech import curvature as curvature
     from geomech import gaits as gaits
     from geomech import measured as measured
     from geomech import optimise as optimise
-    from geomech import reconstruct as reconstruct
     from geomech import systems as systems
     from geomech import tiers as tiers
-    from geomech import workers as workers
-    from geomech.kinds import register as register
+    from geomech.geometry import connection as connection
+    from geomech.geometry import curvature as curvature
+    from geomech.geometry import reconstruct as reconstruct
     from geomech.measured import fit_log as fit_log
     from geomech.output import plots as plots
+    from geomech.run import workers as workers
     from geomech.scene import Numerics as Numerics
     from geomech.scene import Scene as Scene
     from geomech.scene import load as load
     from geomech.scene import toml as toml
+    from geomech.scene.kinds import register as register
     from geomech.study import undulation as undulation
     from geomech.study.bench import Study as Study
     from geomech.systems import Swimmer as Swimmer
     from rft import bodies as bodies
     from rft import effects as effects
-    from rft import media as media
+    from rft import laws as _laws
 
-__version__ = "0.1.0"
+    media = _laws
+
+__version__ = _version.VERSION
 
 _MODULES = {  # by the name they have here; none is imported before it is asked for
-    **{name: f"geomech.{name}" for name in ("connection", "curvature", "gaits", "measured", "optimise")},
-    **{name: f"geomech.{name}" for name in ("reconstruct", "systems", "tiers", "workers")},
-    **{name: f"rft.{name}" for name in ("media", "bodies", "effects")},
+    **{name: f"geomech.geometry.{name}" for name in ("connection", "curvature", "reconstruct")},
+    **{name: f"geomech.{name}" for name in ("gaits", "measured", "optimise", "systems", "tiers")},
+    **{name: f"rft.{name}" for name in ("bodies", "effects")},
+    "media": "rft.laws",
     "plots": "geomech.output.plots",
     "undulation": "geomech.study.undulation",
+    "workers": "geomech.run.workers",
 }
 _OBJECTS = {
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scene"),
     "Study": "geomech.study.bench",
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",
-    "register": "geomech.kinds",
+    "register": "geomech.scene.kinds",
 }
 
 

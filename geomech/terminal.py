@@ -20,12 +20,12 @@ from pathlib import Path
 
 import typer
 
-from geomech.errors import Note, line, plain
-from geomech.progress import progress
+from geomech.core.errors import Note, line, plain
+from geomech.run import BELOW
+from geomech.run.progress import progress
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
-BELOW = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 LONGEST = 2000  # characters of an error
 PRINTING = "geomech.cli", "geomech.commands", "geomech.terminal", "click", "typer"  # modules that print; no files
 PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, with_workers
-from geomech.files import whole_folder
+from geomech.io.files import whole_folder
 
 
 @with_workers
@@ -32,7 +32,7 @@ def accuracy(
         study, draw = walking, walks.accuracy_figure
     else:
         scene, draw = loaded(scene), plots.work_precision_figure
-    kept, told = keeping(scene, out, command="accuracy"), terminal.progress(f"accuracy of {scene.name}")
+    kept, told = storing(scene, out, command="accuracy"), terminal.progress(f"accuracy of {scene.name}")
     with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
         allow(scene, study.cost(scene), yes)
         results = study.study(scene, bar)

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded, one_way
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import SceneArgument, YesOption, check_outputs
 
 
@@ -38,7 +38,7 @@ def animate(
     balances, seconds, memory = zip(*costs)
     takes = type(costs[0])(sum(balances), sum(seconds), max(memory))
     allow(scene, takes, yes)
-    kept = keeping(scene, out, one_way=one_way(scene, takes), command="animate", cycles=count)
+    kept = storing(scene, out, command="animate", cycles=count)
     with kept, terminal.progress(f"motion of {scene.name}") as bar:
         found = motion.motion(scene, count)
         if mapped:

@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING
 
 from geomech import terminal
 from geomech.commands.options import check_outputs
-from geomech.errors import Note, SceneError, check_angle, named
+from geomech.core.errors import Note, SceneError, check_angle, named
 
 if TYPE_CHECKING:
     from geomech.scene import Scene
 
 WORTH_SAYING = 1.0  # s that a field takes
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
-MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
 
 
 def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
     """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError, which says what to do
-    else, if it takes too long to be begun without --yes."""
+    else, if it takes too long to be begun without --yes. From here on "auto" is the back end for that many balances."""
+    from geomech.run.backend import prefer_for
+
     cost.check(scene.name, yes, less)
+    prefer_for(cost.as_balances)
     for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
     if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
@@ -79,39 +81,23 @@ def loaded_walker(name: str):
     return scene
 
 
-def one_way(scene, cost) -> bool:
-    """Whether a request is computed by one back end from beginning to end, so that what is done of it one after the other can
-    be kept: no clock has a say in it, as the digits of results hang on it."""
-    return bool(scene.system.steps) or cost.balances >= MANY
-
-
 @contextlib.contextmanager
-def keeping(scene, output: Path | None, large: bool = True, one_way: bool = False, **asked) -> Iterator[None]:
-    """In the body of the statement what is computed side by side, or piece after piece, is kept beside the output, a file or a
-    folder, and is taken up where it was stopped; at its end nothing is kept any more. asked: all that it is asked for, but for
-    where the results go. Of what is only printed, None, it is kept in the current folder if it is ``large``. one_way: as the
-    function has it; else "auto" may take another back end the next time, and pieces are not kept. SceneError while another
-    computation to the same output is under way."""
-    from geomech import workers
-    from geomech.files import refuse_inputs
+def storing(scene, output: Path | None, **request) -> Iterator[None]:
+    """Store what is computed in the body of the statement beside the output, a file or a folder, or, of what is only printed
+    (None), in the user's cache folder; the same command resumes from there. At the end nothing is stored any more. request:
+    the command with its options, but for where its results go. SceneError while another computation to the output is under
+    way."""
+    from geomech.io.files import refuse_inputs
+    from geomech.run import jobs, store
+    from geomech.run.digest import digest
     from geomech.scene import inputs
-    from geomech.study import kept
-    from geomech.study.parts import Parts, asking
 
-    question = asking(scene, **asked)
-    place = kept.printed(question) if output is None else kept.stands_for(output)
-    with contextlib.ExitStack() as stack:
-        partial = None
-        if output is not None or large or kept.beside(place, question).exists():
-            with contextlib.nullcontext() if output else contextlib.suppress(SceneError):  # two may print the same
-                stack.enter_context(kept.alone(place, "computation"))
-                partial = kept.beside(place, question)
-                refuse_inputs([partial], inputs(scene))
-        kept_in = (lambda: Parts(partial, question)) if partial else contextlib.nullcontext
-        with kept_in() as parts, workers.keeping(parts), workers.one_way(workers.MANY * one_way):
-            yield
-        if partial:
-            partial.unlink(missing_ok=True)
+    files = inputs(scene)
+    context = jobs.context_of([x for x in files if x != Path(scene.name)])
+    path = store.in_cache(digest(context, scene, request)) if output is None else store.beside(output)
+    refuse_inputs([path] if path else [], files)
+    with jobs.storing(path, context, output):
+        yield
 
 
 def field(

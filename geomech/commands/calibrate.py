@@ -9,8 +9,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.options import JsonOption, PlotOption, check_files
-from geomech.errors import SceneError, choose
-from geomech.files import whole_file
+from geomech.core.errors import SceneError, choose
+from geomech.io.files import whole_file
 
 Size = Optional[float]
 
@@ -40,7 +40,7 @@ def calibrate(
     """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, of
     the vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to
     a plate pushed straight down, columns depth_m, force_N."""
-    from geomech.files import note
+    from geomech.io.files import note
     from geomech.output import plots
     from geomech.study.calibration import CALIBRATIONS
     from geomech.study.stress_calibration import law_of

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field, keeping, loaded, planes
+from geomech.commands.asked import beside_field, field, loaded, planes, storing
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -19,7 +19,7 @@ from geomech.commands.options import (
     check_outputs,
     with_workers,
 )
-from geomech.errors import SceneError, choose
+from geomech.core.errors import SceneError, choose
 
 
 @with_workers
@@ -54,7 +54,7 @@ def ccf(
         raise SceneError("--metric and --stretch are those of two joints: drop them for slices")
     check_outputs(scene, None, plot)
     asked = {"metric": metric or stretch, "pair": pair, "slice": slice_, "beside": beside}
-    with keeping(scene, plot, command="ccf", **asked):
+    with storing(scene, plot, command="ccf", **asked):
         if sliced:
             maps = _slices(scene, style or "map", (pair, slice_), beside, yes)
         else:
@@ -70,7 +70,7 @@ def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | No
     system, told = study.scene.system, {"gaits": [study.scene.gait]}
     told |= {"error": study.curvature_error, "labels": system.shape_labels}
     if stretch:
-        from geomech.stretch import stretch as redrawn
+        from geomech.geometry.stretch import stretch as redrawn
 
         plane, effort = redrawn(study.metric), "BL" if system.power_degree == 1 else "path length"
         return plots.stretched_figure(study.curvature, plane, **told, effort=effort)

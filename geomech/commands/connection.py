@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field, keeping, loaded, planes
+from geomech.commands.asked import beside_field, field, loaded, planes, storing
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -21,7 +21,7 @@ from geomech.commands.options import (
     check_outputs,
     with_workers,
 )
-from geomech.errors import SceneError, choose
+from geomech.core.errors import SceneError, choose
 
 
 @with_workers
@@ -40,10 +40,10 @@ def connection(
     yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
-    from geomech.files import note
+    from geomech.io.files import note
+    from geomech.io.tables import ORDERS, SIGNS
     from geomech.output import mat, netcdf, plots
     from geomech.study.bench import Study
-    from geomech.tables import ORDERS, SIGNS
 
     check_netcdf(out, matlab=True)
     for option, word, known in (("--sign", sign, SIGNS), ("--order", order, ORDERS)):
@@ -63,7 +63,7 @@ def connection(
         raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
     check_outputs(scene, out, plot)
     asked = {"file": out.suffix, "plot": plot is not None, "pair": pair, "slice": slice_, "beside": beside}
-    with keeping(scene, out, command="connection", **asked):
+    with storing(scene, out, command="connection", **asked):
         if sliced:
             found = planes(Study(scene), pair, slice_, yes)
         study = field(scene, grid, extent, out, plot, bool(plot) and not sliced, yes, harmonics=out.suffix == ".nc")

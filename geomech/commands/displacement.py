@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded, one_way
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -21,7 +21,7 @@ from geomech.commands.options import (
     spread,
     with_workers,
 )
-from geomech.errors import SceneError, choose
+from geomech.core.errors import SceneError, choose
 
 
 @with_workers
@@ -52,15 +52,12 @@ def displacement(
         refuse_costless(scene)
     with terminal.progress(f"displacement of {scene.name}") as bar:
         more, study = cost.of_effort(scene, len(values)) if effort else [], Study(scene)
-        large = settled = True  # of a tolerance nobody knows before
         if tol is None:
-            takes = study.cost(values, chosen or study.methods, more=more)
-            allow(scene, takes, yes)
-            large, settled = not takes.small, one_way(scene, takes)
+            allow(scene, study.cost(values, chosen or study.methods, more=more), yes)
         elif chosen:
             raise SceneError("--tol chooses the tier: drop --methods")
         asked = {"command": "displacement", "amplitudes": values, "methods": chosen, "tol": tol, "cost": effort}
-        with keeping(scene, plot, large, settled, **asked):
+        with storing(scene, plot, **asked):
             if tol is None:
                 table = study.study(values, chosen or study.methods, progress=bar)
             else:

@@ -9,8 +9,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.options import JsonOption, PlotOption, an_angle, check_files, check_netcdf
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 
 
 def fit(

@@ -9,7 +9,7 @@ import typer
 
 from geomech.commands.names import section_names
 from geomech.commands.options import PluginOption, load_plugins
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 
 
 def keys(

@@ -9,7 +9,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import (
     JsonOption,
     PlotOption,
@@ -19,8 +19,8 @@ from geomech.commands.options import (
     joint_limits,
     with_workers,
 )
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 
 
 @with_workers
@@ -55,10 +55,9 @@ def optimize(
     if stretch:
         refuse_stretch(scene, plot)
     check_outputs(scene, out, plot)
-    cost = request.cost()
-    allow(scene, cost, yes)
+    allow(scene, request.cost(), yes)
     asked = {"for": aim, "direction": direction, "harmonics": harmonics, "within": within, "starts": starts}
-    with keeping(scene, out or plot, not cost.small, command="optimize", **asked, rate=rate, power=power):
+    with storing(scene, out or plot, command="optimize", **asked, rate=rate, power=power):
         with terminal.progress(f"{aim} of {scene.name}") as bar:
             found = search(request, bar)
         if plot:

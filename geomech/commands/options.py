@@ -14,8 +14,8 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.names import intruder_names, scene_names, walker_names
-from geomech.errors import SceneError
-from geomech.files import refuse_inputs, whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import refuse_inputs, whole_file
 
 
 def _scene(names: Callable[[], list[str]]):
@@ -76,9 +76,9 @@ PluginOption = Annotated[
 
 
 def load_plugins(files: list[Path] | None) -> None:
-    """Let scenes name what is in the files; see `geomech.kinds.load_file`."""
+    """Let scenes name what is in the files; see `geomech.scene.kinds.load_file`."""
     for path in files or ():
-        from geomech.kinds import load_file
+        from geomech.scene.kinds import load_file
 
         load_file(path)
 
@@ -110,11 +110,11 @@ SchedulerOption = Annotated[
 
 
 def with_workers(command: Callable) -> Callable:
-    """A command that also takes ``--workers`` and ``--scheduler`` (`geomech.workers`)."""
+    """A command that also takes ``--workers`` and ``--scheduler`` (`geomech.run.workers`)."""
 
     @functools.wraps(command)
     def run(workers=None, scheduler=None, **given):
-        from geomech.workers import using
+        from geomech.run.workers import using
 
         with using(workers, scheduler):
             return command(**given)

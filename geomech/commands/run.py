@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded, one_way
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.names import scene_names
 from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
-from geomech.files import whole_folder
+from geomech.io.files import whole_folder
 
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[
@@ -36,7 +36,7 @@ def run(
     report.refuse_folder(scene, out, inputs(scene))
     takes, told = report.cost(scene), terminal.progress(f"field of {scene.name}")
     allow(scene, takes, yes)
-    kept = keeping(scene, out, one_way=one_way(scene, takes), command="run")
+    kept = storing(scene, out, command="run")
     with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
         tables = report.write(Study(scene), folder, bar)
     for title, table in tables.items():

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.names import shown_names
-from geomech.errors import choose
+from geomech.core.errors import choose
 
 
 def scenes(
@@ -21,7 +21,7 @@ def scenes(
     from geomech.scene import builtin_names, intruder_names, walker_names
     from geomech.scene.read import builtin_text
     from geomech.scene.write import medium_toml, vertical_toml
-    from rft.vertical import VERTICAL
+    from rft.plates import VERTICAL
 
     if show is not None:
         shown = [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE, *VERTICAL]

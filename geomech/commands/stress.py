@@ -11,7 +11,7 @@ import typer
 
 from geomech.commands.names import medium_names
 from geomech.commands.options import JsonOption, PlotOption
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 
 
 def stress(
@@ -29,9 +29,9 @@ def stress(
     plot: PlotOption = None,
 ):
     """Stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig. 7)."""
-    from geomech import files
+    from geomech.io import files
     from geomech.scene.intruder import load_medium
-    from rft.vertical import survey
+    from rft.plates import survey
 
     if (beta is None) != (gamma is None) or (beta is None and plot is None):
         raise SceneError("give both --beta and --gamma, in degrees, or --plot for all angles")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, loaded
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import (
     PlotOption,
     SceneArgument,
@@ -19,8 +19,7 @@ from geomech.commands.options import (
     spread,
     with_workers,
 )
-from geomech.errors import SceneError
-from geomech.files import note
+from geomech.core.errors import SceneError
 
 
 @with_workers
@@ -35,7 +34,6 @@ def sweep(
     interrupted, and taken up again."""
     from geomech.output import sweeps
     from geomech.scene import load
-    from geomech.study import kept
     from geomech.study import sweep as sweeping
     from geomech.study.tables import of_pose
 
@@ -56,28 +54,17 @@ def sweep(
         from geomech.output import walk_sweeps as sweeps
         from geomech.study import walking as sweeping
     axes = {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
-    partial = sweeping.partial(scene, axes, out)
-    check_outputs(scene, out, plot, partial)
-    with kept.alone(out):
+    check_outputs(scene, out, plot)
+    with storing(scene, out, command="sweep"):
         with terminal.progress(f"sweep of {scene.name}") as bar:
             cost = (sweeping.cost_of_sweep if walks else sweeping.cost)(scene, axes)
             allow(scene, cost, yes)
-            if kept.is_second(out, partial):
-                note(
-                    f"another sweep to {out} is unfinished: what is done of it stays, this one keeps its own in {partial}"
-                )
-            results = sweeping.sweep(scene, axes, partial, bar, cost.seconds)
-        try:
-            sweeps.save(out, scene, results)
-            if plot:
-                from geomech.output import plots
+            results = sweeping.sweep(scene, axes, progress=bar, seconds=cost.seconds)
+        sweeps.save(out, scene, results)
+        if plot:
+            from geomech.output import plots
 
-                plots.save(sweeps.draw(scene, results), plot)
-        except BaseException as error:
-            if partial.exists():
-                error.add_note(f"what is done is kept in {partial}: the same command goes on from there")
-            raise
-        partial.unlink(missing_ok=True)
+            plots.save(sweeps.draw(scene, results), plot)
     if walks:
         print(f"{sweeps.told(results)}, in {out}")
         return

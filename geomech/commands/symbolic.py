@@ -8,7 +8,7 @@ import typer
 
 from geomech.commands.asked import loaded
 from geomech.commands.options import SceneArgument
-from geomech.errors import named
+from geomech.core.errors import named
 
 
 def symbolic(

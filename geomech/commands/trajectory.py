@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded, one_way
+from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
 
 
@@ -28,7 +28,7 @@ def trajectory(
     with terminal.progress(f"motion of {scene.name}") as bar:
         takes = motion.cost(scene, cycles)
         allow(scene, takes, yes)
-        with keeping(scene, out, one_way=one_way(scene, takes), command="trajectory", cycles=cycles):
+        with storing(scene, out, command="trajectory", cycles=cycles):
             found = motion.motion(scene, cycles)
             trajectories.save(out, found, bar)
     (x, y, theta), unit = found.pose[-1], scene.system.unit

@@ -10,7 +10,7 @@ import typer
 
 from geomech.commands.asked import scene_with_gait
 from geomech.commands.options import JsonOption, SceneArgument, numbers
-from geomech.errors import Note, named
+from geomech.core.errors import Note, named
 
 
 def velocity(

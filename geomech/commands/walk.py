@@ -9,9 +9,9 @@ from typing import Annotated, Optional
 import typer
 
 from geomech import terminal
-from geomech.commands.asked import allow, keeping, loaded_walker
+from geomech.commands.asked import allow, loaded_walker, storing
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, check_outputs, folder
-from geomech.files import whole_folder
+from geomech.io.files import whole_folder
 
 
 def walk(
@@ -40,9 +40,8 @@ def walk(
     if animate:
         film.check_format(animate)
     check_outputs(scene, animate, None)
-    takes = walking.price(scene, by=engine)
-    allow(scene, takes, yes)
-    with keeping(scene, out or animate, not takes.small, command="walk", engine=engine):
+    allow(scene, walking.price(scene, by=engine), yes)
+    with storing(scene, out or animate, command="walk", engine=engine):
         with terminal.progress(f"walk of {scene.name}") as bar:
             found = walking.run(scene, engine, bar, math.inf if yes else LONGEST)
         if animate:

@@ -1,10 +1,10 @@
 """Gaits: closed curves in shape space."""
 
-from geomech.gaits.base import Gait
 from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
 from geomech.gaits.waves import Sine, Wave
+from geomech.geometry.gait import Gait
 
 KINDS = {
     "circle": Circle,

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import Note, UnitWarning, number, short
+from geomech.core.errors import Note, UnitWarning, number, short
 from geomech.gaits import frames, midline
-from geomech.gaits.base import Gait
-from geomech.rows import LARGEST_NUMBER
+from geomech.geometry.gait import Gait
+from geomech.io.rows import LARGEST_NUMBER
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import number, short
-from geomech.gaits.base import LARGEST, Gait, finite_array
+from geomech.core.errors import number, short
+from geomech.geometry.gait import LARGEST, Gait, finite_array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.rows import Rows
-from geomech.rows import read as read_rows
+from geomech.io.rows import Rows
+from geomech.io.rows import read as read_rows
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 UNTIMED = ("frame", "phase")  # names that may stand for t, and are no s

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import short
-from geomech.gaits.base import Gait, finite_array
+from geomech.core.errors import short
+from geomech.geometry.gait import Gait, finite_array
 
 
 @dataclass(frozen=True, kw_only=True)

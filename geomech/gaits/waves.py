@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import number, real_array
-from geomech.gaits.base import LARGEST, Gait
+from geomech.core.errors import number, real_array
 from geomech.gaits.fourier import Series
+from geomech.geometry.gait import LARGEST, Gait
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.gaits.base import FASTEST
+from geomech.geometry.gait import FASTEST
+from geomech.geometry.tube import Loop, waves
 from geomech.measured import phase
 from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
-from geomech.tube import Loop, waves
 
 FEWEST = 8  # whole cycles: fewer do not tell how they scatter
 ENOUGH = FEWEST + 2  # cycles of a log that surely has as many: half of one at each end is not taken

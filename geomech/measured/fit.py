@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import number
+from geomech.core.errors import number
 from geomech.gaits import Fourier
+from geomech.geometry.reconstruct import displacement
+from geomech.geometry.tube import Known, Loop, Tube, grid_of, series, tube
+from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, regression, slips, smooth, unknowns
 from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
-from geomech.reconstruct import displacement
-from geomech.tables.base import LARGEST_ENTRY
-from geomech.tube import Known, Loop, Tube, grid_of, series, tube
 from rft import se2
 
 HARMONICS = 12  # of the connection, at most; those of the gait go up to as many

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.geometry.tube import Known, series
 from geomech.measured.reach import PLACES, WIDTH
 from geomech.measured.regression import RATES, Samples
-from geomech.tube import Known, series
 
 NOISE = 0.3  # of its variance: what splines and harmonics that cross-validation chooses leave, where A is smooth
 COARSE = 0.5  # of the mean that halves leave: splines through all rows, twice as close, leave less
@@ -29,7 +29,7 @@ SLOWEST = 0.03  # of its rms: the rate across the gait, at least
 
 class Left(NamedTuple):
     """residual: (3,), rms of what is left of xi, over that of the joint rates. explained: (3,), share of the squares of xi that
-    is not left. off: (3, 2, PLACES) of `geomech.tube.Known`."""
+    is not left. off: (3, 2, PLACES) of `geomech.geometry.tube.Known`."""
 
     residual: np.ndarray
     explained: np.ndarray

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError, UnitWarning, short
-from geomech.rows import read as read_rows
-from geomech.tables.base import LARGEST_ANGLE
+from geomech.core.errors import SceneError, UnitWarning, short
+from geomech.io.rows import read as read_rows
+from geomech.io.tables.base import LARGEST_ANGLE
 
 LARGEST_FILE = 100_000_000  # bytes
 MOST_ROWS, FEWEST_ROWS = 500_000, 100

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.tube import waves
+from geomech.geometry.tube import waves
 
 LIKELY = 0.9  # of the best correlation of a log with itself: the shortest shift that comes so near is the period
 ORDER = 4  # of the Butterworth filter about the cycle's frequency

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.geometry.tube import Loop
 from geomech.measured.regression import Samples
-from geomech.tube import Loop
 
 REACH = 2.5  # standard deviations of the samples about the mean gait
 PLACES = 64  # phases at which their spread is told

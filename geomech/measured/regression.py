@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.tube import Loop, waves
+from geomech.geometry.tube import Loop, waves
 
 FOLDS = 5  # of the cross-validation over cycles that chooses harmonics
 MOST_BLOCKS = 120  # of cycles, that are left out as one

@@ -6,11 +6,11 @@ import warnings
 
 import numpy as np
 
-from geomech.errors import UnitWarning
+from geomech.core.errors import UnitWarning
+from geomech.geometry.tube import Loop
 from geomech.measured import regression
 from geomech.measured.log import Log
 from geomech.measured.smooth import Smoothed
-from geomech.tube import Loop
 
 TURNS = (
     4.0  # rad of the heading per rad of the joints, rms, at most: no link of a body turns much faster than its joints

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.errors import number
-from geomech.files import whole_file
+from geomech.core.errors import number
 from geomech.gaits import Gait
+from geomech.io.files import whole_file
 
 FINER = 4  # steps of the integration between two rows
 MEMORY = 0.25  # cycles over which the deviations of a body's joints forget

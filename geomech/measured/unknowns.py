@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.geometry.tube import Loop
 from geomech.measured.regression import FOLDS, NOTHING, RATES, SECOND, Samples, Sums, sums
-from geomech.tube import Loop
 
 LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
 FEWEST = 2  # harmonics for which those of the second order are given up

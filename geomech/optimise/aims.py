@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import SceneError, choose, number
+from geomech.core.errors import SceneError, choose, number
 from geomech.optimise.cycles import Brought
 
 AIMS = ("displacement", "efficiency", "turning", "speed")

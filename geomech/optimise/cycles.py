@@ -1,9 +1,9 @@
 """What a cycle of a loop brings and costs, with its slopes in the numbers of the loop.
 
-Where the velocity follows from shape alone its derivatives by shape and rate are taken at every phase, by central
-differences of one batch of velocities, 4 d + 1 of them whatever the number of harmonics; the chain through the reconstruction
-(`geomech.reconstruct.slopes`) and the series is exact. Where a gait must be run as a whole the differences are those of whole
-gaits, run side by side.
+Where the velocity follows from shape alone its derivatives by shape and rate are taken at every phase, by central differences
+of one batch of velocities, 4 d + 1 of them whatever the number of harmonics; the chain through the reconstruction
+(`geomech.geometry.reconstruct.slopes`) and the series is exact. Where a gait must be run as a whole the differences are those
+of whole gaits, run side by side.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.geometry.reconstruct import slopes, turning
 from geomech.optimise.loops import Loops
-from geomech.reconstruct import slopes, turning
 
 STEP = 1e-5  # of differences: rad, and of the rate
 STEP_OF_RUNS = 1e-3  # rad: cycles repeat to 1e-6 only

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.errors import SceneError, check_angle, is_number, number, real_array, short
+from geomech.core.errors import SceneError, check_angle, is_number, number, real_array, short
 from geomech.scene.model import Scene
 from geomech.systems.base import System
 

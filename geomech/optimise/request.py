@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.connection import evaluate
-from geomech.errors import SceneError, named, number
+from geomech.core.errors import SceneError, named, number
 from geomech.gaits import Gait, Sine
+from geomech.geometry.connection import evaluate
 from geomech.optimise.aims import Aim
 from geomech.optimise.climb import TRIES
 from geomech.optimise.limits import Asked, limits

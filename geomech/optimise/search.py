@@ -6,16 +6,15 @@ import contextlib
 import dataclasses
 import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
-from geomech import workers
-from geomech.connection import check_knobs
-from geomech.errors import SceneError, named
-from geomech.files import note
+from geomech.core.errors import SceneError, named
 from geomech.gaits import Gait
-from geomech.gaits.base import FASTEST
+from geomech.geometry.connection import check_knobs
+from geomech.geometry.gait import FASTEST
+from geomech.geometry.reconstruct import turning
+from geomech.io.files import note
 from geomech.optimise import loops as series
 from geomech.optimise import ways
 from geomech.optimise.climb import TRIES, climb, settled
@@ -39,7 +38,7 @@ from geomech.optimise.request import (
     checked,
 )
 from geomech.optimise.telling import told
-from geomech.reconstruct import turning
+from geomech.run.jobs import runner
 from geomech.scene.model import Scene
 
 NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
@@ -68,7 +67,7 @@ def optimise(
 def search(request: Request, progress: Callable | None = None) -> Optimum:
     """`optimise` of a request that is checked."""
     check_knobs(1, progress)
-    with named(request.scene.name), workers.one_way(workers.MANY if request.starts > 1 else 1):
+    with named(request.scene.name):
         return _Search(request, progress).optimum()
 
 
@@ -193,11 +192,11 @@ class _Search:
         phases: int | None = None,
     ) -> list[np.ndarray]:  # fmt: skip
         """Where each start leads, by the direct tier or what is ``looked_up``, in this request or another, at its phases or
-        others. Who computes: `geomech.workers`."""
-        at_hand = len(starts) == 1 and not workers.far()
-        how = Way(r or self.r, self.origin, turn, looked_up, most, tolerance, self._tell if at_hand else None, phases)
+        others. Who computes: `geomech.run.workers`."""
+        here = len(starts) == 1 and not getattr(runner().executor, "remote", False)
+        how = Way(r or self.r, self.origin, turn, looked_up, most, tolerance, self._tell if here else None, phases)
         ends, before, seconds = [], self.done, len(starts) * (CLIMB if looked_up else FINISHING)
-        for p, count in workers.each(_up_from, how, starts, len(starts), seconds=seconds):
+        for p, count in runner().map(_up_from, how, starts, len(starts), seconds):
             ends.append(p)
             self.count += count
             self._tell(max(0, before + len(ends) * self.climb - self.done))  # whoever did it, and however soon
@@ -331,7 +330,8 @@ class _Search:
         return told(self.r, gait)
 
 
-class Way(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Way:
     """How a start is led uphill. origin: the first start. turn (rad): of a cycle, at most. looked_up: `ways.looked_up`, or
     None for the direct tier. told: whenever a cycle is done, where only one start is under way. phases: of the direct tier,
     where it takes others than the loops have, as the last way up does."""
@@ -342,7 +342,7 @@ class Way(NamedTuple):
     looked_up: tuple | None
     most: int
     tolerance: float
-    told: Callable | None
+    told: Callable | None = dataclasses.field(compare=False)
     phases: int | None = None
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech import metric
+from geomech.geometry import metric
 from geomech.optimise.cycles import Phases, Runs
 from geomech.optimise.request import Request
 from geomech.study.bench import Study

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
-from geomech.progress import told
+from geomech.run.progress import told
 from geomech.study.cost import Cost
 from geomech.study.motion import Motion
 

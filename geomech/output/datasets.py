@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.field import Field
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
 from geomech.output import sweeps
 from geomech.output.netcdf import (
     COMPONENTS,

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.errors import plain
-from geomech.field import Field
+from geomech.core.errors import plain
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
 from geomech.output import plots, sweeps
 from geomech.study.bench import Study
 from geomech.study.results import Displacements, Swept

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from geomech.errors import plain
+from geomech.core.errors import plain
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 
 import numpy as np
+
+from geomech.study.intrusion import Estimate
 
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
@@ -15,8 +18,15 @@ def csv(columns: Mapping[str, np.ndarray]) -> str:
     return "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
 
 
-def told(scene, columns: Mapping[str, np.ndarray], found) -> str:
-    """Extremes of force and moment, and where they are; work."""
+def as_json(scene, columns: Mapping[str, np.ndarray], error: Estimate) -> str:
+    """The columns, and the errors of force, N, and moment, N m; null where there are none."""
+    known = {k: x if np.isfinite(x) else None for k, x in error._asdict().items()}
+    told = {"force": known["force"], "moment": known["moment"], f"from_{scene.parts}": error.count}
+    return json.dumps({**{k: v.tolist() for k, v in columns.items()}, "estimate": told})
+
+
+def told(scene, columns: Mapping[str, np.ndarray], found, error: Estimate) -> str:
+    """Extremes of force and moment, and where they are; their errors; work."""
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
     lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
     if matched := getattr(scene, "matched", ""):
@@ -29,6 +39,14 @@ def told(scene, columns: Mapping[str, np.ndarray], found) -> str:
                 for k in (columns[name].argmin(), columns[name].argmax())]  # fmt: skip
         low, high = (f"{value + 0.0:.4g} at {place} = {where + 0.0:.4g} {UNITS[place]}" for value, where in ends)
         lines.append(f"{name:8} {low}, to {high} ({'N' if name.startswith('force') else 'N m'})")
+    lines.append(f"error    {_error(scene, error)}")
     work = float(np.sum((found.power[1:] + found.power[:-1]) / 2 * np.diff(found.t)))
     lines.append(f"work     {work:.4g} J of the grains on the body; power at most {found.power.max():.4g} W")
     return "\n".join(lines)
+
+
+def _error(scene, error: Estimate) -> str:
+    if not np.isfinite(error.force):
+        return f"not known: finer {scene.parts} are more than it takes"
+    sizes = f"force {error.force:.1g} N, moment {error.moment:.1g} N m"
+    return f"{sizes} at most, from up to {error.count:,} {scene.parts}"

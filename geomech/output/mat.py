@@ -1,4 +1,4 @@
-"""Connections as MATLAB files in sysplotter's layout (`geomech.tables.mat`)."""
+"""Connections as MATLAB files in sysplotter's layout (`geomech.io.tables.mat`)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
+from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 from geomech.scene.model import Scene
 from geomech.study.bench import Study
-from geomech.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 
 
 def check_joints(scene: Scene) -> None:

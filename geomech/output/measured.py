@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.curvature import ccf
-from geomech.curvature import error as curvature_error
+from geomech.geometry.curvature import ccf
+from geomech.geometry.curvature import error as curvature_error
+from geomech.geometry.tube import BEYOND
 from geomech.measured.fit import SHOWN, Fitted
 from geomech.output.netcdf import (
     INTERVAL_OF_CCF,
@@ -22,7 +23,6 @@ from geomech.output.netcdf import (
     write,
 )
 from geomech.scene.write import gait_table, table
-from geomech.tube import BEYOND
 
 ALONG = "fitted along the gait alone"
 

@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import two_form
-from geomech.connection import Connection
-from geomech.field import Field
-from geomech.files import whole_file
-from geomech.harmonics import Harmonics
-from geomech.metric import Finsler, Metric
+from geomech.geometry import two_form
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.tube import Known, Tube
+from geomech.geometry.two_form import TwoForm
+from geomech.io.files import whole_file
+from geomech.io.tables.netcdf import SHAPE
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
-from geomech.tables.netcdf import SHAPE
-from geomech.tube import Known, Tube
-from geomech.two_form import TwoForm
 
 COMPONENTS = ("x", "y", "theta")
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -137,7 +137,7 @@ def of_reach(tube: Tube) -> Variable:
 
 
 def of_known(known: Known, unit: str) -> list[Variable]:
-    """What a connection near one gait is looked up in (`geomech.tube`)."""
+    """What a connection near one gait is looked up in (`geomech.geometry.tube`)."""
     units, order = (
         f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError, named
-from geomech.files import read, refuse_inputs
+from geomech.core.errors import SceneError, named
 from geomech.gaits import Butterfly, Circle, Gait
+from geomech.io.files import read, refuse_inputs
 from geomech.output import plots
 from geomech.output.netcdf import save_connection
 from geomech.scene.model import Scene
@@ -28,7 +28,6 @@ from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.path import around
 from geomech.tiers.path import axes as field_axes
-from geomech.workers.aside import aside
 
 AMPLITUDES = 10  # or so, in the study that `run` makes of each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
@@ -60,14 +59,13 @@ def write(study: Study, folder: Path, progress: Callable) -> dict[str, dict]:
         study.compute_field(progress)
         save_connection(folder / "connection.nc", study)
     tables = {}
-    with aside() as beside:
-        if mapped:
-            beside(lambda: _maps(study, folder, gaits))
-        for gait, some in zip(gaits, amplitudes):
-            table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
-            if gait is not scene.gait:
-                table["note"] = ADDED
-        _save(plots.displacement_figure(tables, gaits), folder / "displacement")
+    for gait, some in zip(gaits, amplitudes):
+        table = tables[type(gait).__name__.lower()] = study.study(some, study.methods, gait)
+        if gait is not scene.gait:
+            table["note"] = ADDED
+    if mapped:
+        _maps(study, folder, gaits)
+    _save(plots.displacement_figure(tables, gaits), folder / "displacement")
     (folder / TABLES).write_text(json.dumps(tables, indent=1) + "\n")
     (folder / SCENE).write_text(toml(scene), encoding="utf-8")
     return tables

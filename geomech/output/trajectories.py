@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 from geomech.study.motion import Motion
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 from geomech.output import plots
 from geomech.output.netcdf import attribute
 from geomech.output.sweeps import labels

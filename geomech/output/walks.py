@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgba
 
-from geomech.files import whole_file
+from geomech.io.files import whole_file
 from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
 from geomech.study import walking
@@ -34,7 +34,7 @@ def as_json(found: Walked) -> str:
     numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
     numbers |= {"residual": w.residual, "unaccounted": w.unaccounted}
     numbers |= {"settled": w.settled if np.isfinite(w.settled) else None, "aside": w.aside, "turning": w.turning}
-    numbers |= {"estimate_aside": found.aside, "estimate_turning": found.turning}
+    numbers |= {"estimate_aside": found.aside, "estimate_turning": found.turning, "estimate_elements": found.elements}
     return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
 
 
@@ -45,6 +45,7 @@ def told(scene: WalkerScene, found: Walked) -> str:
     share = f", cost of transport {cost:.3g} (work over weight times way, from rest)" if known else ""
     return "\n".join([
         f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settled(w)})",
+        f"of the error {found.elements:.1g} m/s are of the elements, from twice as many",
         *_turning(found),
         f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
         f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech import rows
-from geomech.errors import SceneError, short
+from geomech.core.errors import SceneError, short
+from geomech.io import rows
 
 LARGEST_FILE = 20_000_000  # bytes
 

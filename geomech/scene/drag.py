@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.errors import choose
-from geomech.rows import Rows
-from geomech.rows import read as read_rows
+from geomech.core.errors import choose
+from geomech.io.rows import Rows
+from geomech.io.rows import read as read_rows
 
 LARGEST_FILE = 10_000_000  # bytes
 MOST_ROWS = 100_000

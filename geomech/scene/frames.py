@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geomech import connection
+from geomech.geometry import connection
 from geomech.systems.base import System
 from geomech.systems.framed import Framed
 from geomech.tiers import TIERS

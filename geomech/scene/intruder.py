@@ -11,14 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import summary
-from geomech.errors import SceneError, choose, named, number, short
-from geomech.files import read_text
+from geomech.core import summary
+from geomech.core.errors import SceneError, choose, named, number, short
+from geomech.io.files import read_text
 from geomech.scene import solid
 from geomech.scene.columns import columns
 from geomech.scene.intruding import Intruding, as_table, checked_tables, located
-from geomech.scene.read import LARGEST, _build, _kind
-from rft.vertical import (
+from geomech.scene.parts import LARGEST, build, kind_in
+from rft.ground import KINDS as EFFECTS
+from rft.ground import GroundEffect
+from rft.plates import (
     MOTIONS,
     SHAPES,
     VERTICAL,
@@ -31,16 +33,14 @@ from rft.vertical import (
     StressMap,
     loads,
 )
-from rft.vertical.effects import KINDS as EFFECTS
-from rft.vertical.effects import GroundEffect, folded
-from rft.vertical.loads import ORDER
-from rft.vertical.stress import COEFFICIENTS, GRAZING
+from rft.plates.loads import ORDER
+from rft.plates.stress import COEFFICIENTS, GRAZING
 
 RADIANS = 3.2  # a table of angles within this is likely not in degrees
 
 
 class Intrusion(NamedTuple):
-    """Forces along a motion. t (T,) s; pose and twist (T, 3) as `rft.vertical.loads` has them; force (T, 2) N; moment (T,) N m
+    """Forces along a motion. t (T,) s; pose and twist (T, 3) as `rft.plates.loads` has them; force (T, 2) N; moment (T,) N m
     about the frame's origin; power (T,) W of the grains on the body. With effects that have a weight the
     force is that of both."""
 
@@ -106,6 +106,11 @@ class IntruderScene(Intruding):
         return 6e-8 * (2 if self.medium.tension == "cut" and not self.outline.closed else 1)
 
     @property
+    def finer(self) -> tuple[int, ...]:
+        """Twice as many; of first order also three times, for what one changes alone may be small by chance."""
+        return (2,) if self.order == 2 else (2, 3)
+
+    @property
     def order(self) -> int:
         return ORDER[self.medium.tension]
 
@@ -113,7 +118,7 @@ class IntruderScene(Intruding):
         """Forces along the motion, with as many elements if told so."""
         outline = self.outline if elements is None else self.intruder.outline(elements)
         t, pose, twist = self.motion.course(outline)
-        found: Loads = loads(folded(self.medium, self.effects), outline, pose, twist)
+        found: Loads = loads(self.medium, outline, pose, twist, self.effects)
         return Intrusion(t, pose, twist, self.weighed(found.force), found.moment, found.power(twist))
 
     def table(self, found: Intrusion) -> dict[str, np.ndarray]:
@@ -157,25 +162,25 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> Intrudi
 
 
 def _intruder(place: str, table: dict) -> Shape:
-    kind = SHAPES[_kind(place, table, "kind", SHAPES | solid.KINDS)]
+    kind = SHAPES[kind_in(place, table, "kind", SHAPES | solid.KINDS)]
     rest = {k: v for k, v in table.items() if k != "kind"}
     if "file" in rest and "points" in (f.name for f in dataclasses.fields(kind)):
         if "points" in rest:
             raise SceneError(f"{place}: points are given twice: keep one of points and file")
         x, z = columns(place, rest.pop("file"), ("x", "z")).values()
         rest["points"] = np.stack([x, z], -1).tolist()
-    return _build(place, rest, kind)
+    return build(place, rest, kind)
 
 
 def _motion(place: str, table: dict) -> Motion:
-    name = _kind(place, table, "kind", MOTIONS)
+    name = kind_in(place, table, "kind", MOTIONS)
     rest = {k: v for k, v in table.items() if k != "kind"}
     if name == "csv":
         if {*rest} != {"file"}:
             told = "a motion of kind 'csv' takes 'file' and nothing else: a table t,x,z, and angle (rad) if it turns"
             raise SceneError(f"{place}: {told}")
         rest = {k: v.tolist() for k, v in columns(place, rest["file"], ("t", "x", "z"), ("angle",)).items()}
-    return _build(place, rest, MOTIONS[name])
+    return build(place, rest, MOTIONS[name])
 
 
 @dataclass(frozen=True)
@@ -202,7 +207,7 @@ def read_medium(place: str, table: Mapping) -> PlateStress:
         raise SceneError(f"{place}: {twice[0]} is {twice[0].replace('m', '-')}: keep one")
     for key in given:
         choose(f"{place} key", key, ["name", "file", *COEFFICIENTS, *sorted(own)])
-    choices = _build(place, {k: v for k, v in table.items() if k in own}, _Choices)
+    choices = build(place, {k: v for k, v in table.items() if k in own}, _Choices)
     if len({*given} & {"name", "file"}) + bool({*given} & {*COEFFICIENTS}) > 1:
         raise SceneError(f"{place}: keep one of 'name', 'file' and the nine coefficients")
     if "name" in given:
@@ -214,7 +219,7 @@ def read_medium(place: str, table: Mapping) -> PlateStress:
             raise SceneError(
                 f"{place} has no {', '.join(lacking)}: give all nine coefficients in N/cm^3, or none and zeta"
             )
-        base = _build(place, given, StressMap)
+        base = build(place, given, StressMap)
     with named(place):
         if not 0 < choices.zeta < float("inf"):
             raise ValueError(f"zeta must be a number above 0, got {short(choices.zeta)}")

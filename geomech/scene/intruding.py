@@ -8,20 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError, choose, named, short
-from geomech.scene.read import _of_kind
+from geomech.core.errors import SceneError, choose, named, short
+from geomech.scene.parts import build_kind
 from geomech.systems.said import said
+from rft.ground import KINDS, GroundEffect, checked, weight
 from rft.premise import not_so
-from rft.vertical.effects import KINDS, GroundEffect, checked, weight
 
 TABLES = ("medium", "intruder", "motion", "numerics", "effects")
 
 
 class Intruding:
-    """Base of such scenes. parts: what the body is made of, in the plural. takes: {field: (class, what to give instead)}.
-    per_part: s for a part at a pose, measured."""
+    """Base of such scenes. parts: what the body is made of, in the plural. finer: times as many, that tell
+    the error. takes: {field: (class, what to give instead)}. per_part: s for a part at a pose, measured."""
 
     parts = "parts"
+    finer: tuple[int, ...] = (2,)
     takes: Mapping[str, tuple[type, str]] = {}
     per_part = 0.0
     effects: tuple[GroundEffect, ...]
@@ -95,7 +96,7 @@ def checked_tables(tables: Mapping, name: str) -> dict:
     effects = tables.get("effects", [])
     if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
         raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
-    made = tuple(_of_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
+    made = tuple(build_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
     with named(f"{name}: [[effects]]"):
         return {"numerics": dict(tables.get("numerics", {})), "effects": checked(made)}
 

@@ -1,7 +1,8 @@
 """What a class that a table of a TOML file is read from says of the table's keys, as text to read and as JSON Schema.
 
-A class says it in its docstring: ``name (unit): meaning``, or ``name, other (unit): meaning``, up to the next key or the
-end of the paragraph. The unit is - where there is none. Types and defaults are those of its fields.
+A class says it in the annotations of its fields (`rft.checks.Number`), else in its docstring: ``name (unit): meaning``,
+or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is - where there is none. Types
+and defaults are those of its fields.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import msgspec
+
+from rft.checks import numbers_of
 
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
@@ -81,7 +84,7 @@ def _default(field: dataclasses.Field) -> Any:
 
 
 def meanings(kind: type) -> dict[str, tuple[str, str]]:
-    """(unit, meaning) of the fields, as the docstrings of the class and of those it is derived from say."""
+    """(unit, meaning) of the fields, as annotations and docstrings of the class and of those it is derived from say."""
     names = {f.name for f in dataclasses.fields(kind)}
     found: dict[str, tuple[str, str]] = {}
     for base in reversed(kind.__mro__):
@@ -94,7 +97,7 @@ def meanings(kind: type) -> dict[str, tuple[str, str]]:
                     .replace("`", "")
                 )
                 found |= dict.fromkeys(mark[1].split(", "), (mark[2], meaning))
-    return found
+    return found | {name: (number.unit, number.meaning) for name, number in numbers_of(kind).items()}
 
 
 def first(kind: type) -> str:

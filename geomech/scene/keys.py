@@ -10,10 +10,10 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from geomech.errors import choose
-from geomech.kinds import FAMILIES, unloaded
+from geomech.core.errors import choose
 from geomech.scene import intruder_keys, walker_keys
 from geomech.scene.key import Key, first, keys_of, meanings, option, properties, table, told
+from geomech.scene.kinds import FAMILIES, unloaded
 from geomech.scene.model import Numerics
 from geomech.scene.read import TABLES
 from geomech.scene.sizes import NOT_OF_THE_BODY, Physical

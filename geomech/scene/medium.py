@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError, short
-from geomech.files import read_text
-from geomech.rows import Rows
-from geomech.rows import read as read_rows
+from geomech.core.errors import SceneError, short
+from geomech.io.files import read_text
+from geomech.io.rows import Rows
+from geomech.io.rows import read as read_rows
 from geomech.scene.drag import LARGEST_FILE, header
 
 LARGEST = 1_000_000  # bytes of a medium's file

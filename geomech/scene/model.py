@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geomech.errors import choose, named, plain, short
+from geomech.core.errors import choose, named, plain, short
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
+from geomech.geometry.gait import checked_gait
 from geomech.scene.frames import reframed
 from geomech.systems.base import Cycle, System, checked_system
 from geomech.tiers.base import Numerics

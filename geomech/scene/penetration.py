@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.rows import Rows
+from geomech.io.rows import Rows
 from geomech.scene.drag import LENGTHS, LONGEST_COMMENT, MOST_COMMENTS, NUMBER, SAID
 
 UNITS = {  # in small letters; without one it is the SI unit

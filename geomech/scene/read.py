@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import tomllib
-import warnings
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import msgspec
-
-from geomech.errors import SceneError, UnitWarning, choose, named, short
-from geomech.files import note, read_text
+from geomech.core.errors import SceneError, choose, named, short
 from geomech.gaits import KINDS as GAITS
-from geomech.kinds import choose_kind
+from geomech.io.files import note, read_text
 from geomech.scene import slips
 from geomech.scene.frames import framed
 from geomech.scene.medium import with_files
 from geomech.scene.model import Numerics, Scene, checked_scene
+from geomech.scene.parts import LARGEST, build, build_kind, kind_in
 from geomech.scene.sizes import Sizes
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.framed import NAME as FITTED
@@ -31,7 +27,6 @@ if TYPE_CHECKING:
     from geomech.scene.walker import WalkerScene
 
 TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
-LARGEST = 10_000_000  # bytes of a scene file
 PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
 INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
 WALKERS = "walkers"  # and of robots that walk
@@ -152,7 +147,7 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     tables, fitted = _without_fitted(tables, name)
     tables, files = with_files(tables, name)
     sizes = Sizes(name, tables)
-    gait = _of_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
+    gait = build_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
     kind, parts = _system(tables, name, sizes)
     own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
     numerics = tables.get("numerics", {})
@@ -161,8 +156,8 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
         choose(f"{name}: [numerics] key", plain, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
     if own:
         solver = {k: v for k, v in numerics.items() if k in own}
-        parts["solver"] = _build(f"{name}: [numerics]", solver, type(kind.solver))
-    finely = _build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics)
+        parts["solver"] = build(f"{name}: [numerics]", solver, type(kind.solver))
+    finely = build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics)
     with named(name):
         system = kind(**parts)
         return Scene(
@@ -198,13 +193,13 @@ def _system(tables: Mapping, name: str, sizes: Sizes) -> tuple[type, dict]:
     """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
     they may also be in its own table."""
     table = dict(_located(tables.get("system", {"kind": "swimmer"}), name))
-    kind = SYSTEMS[_kind(f"{name}: [system]", table, "kind", SYSTEMS)]
+    kind = SYSTEMS[kind_in(f"{name}: [system]", table, "kind", SYSTEMS)]
     del table["kind"]
     if kind is not Swimmer:
         if strangers := sorted({"medium", "body", "effects"} & {*tables}):
             raise SceneError(f"{name}: a {kind.kind} takes no {strangers[0]!r}: drop it, or the table [system]")
         place = f"{name}: [system]"
-        parts = _fields(_build(place, sizes.fill(place, table, kind), kind))
+        parts = _fields(build(place, sizes.fill(place, table, kind), kind))
     else:
         parts = _swimmer({**{k: tables[k] for k in PARTS if k in tables}, **table}, name, sizes)
     sizes.all_used()
@@ -226,9 +221,9 @@ def _swimmer(parts: dict, name: str, sizes: Sizes) -> dict:
         if not isinstance(parts.get(part), dict):
             raise SceneError(f"{name}: the table [{part}] is missing: add it, see 'geomech scenes --show NAME'")
     made = {"medium": _medium(f"{name}: [medium]", parts["medium"])}
-    made["body"] = _of_kind(f"{name}: [body]", parts["body"], *PARTS["body"], sizes.fill)
+    made["body"] = build_kind(f"{name}: [body]", parts["body"], *PARTS["body"], sizes.fill)
     places = [(f"{name}: [[effects]]", e) for e in effects]
-    made["effects"] = tuple(_of_kind(place, e, *PARTS["effects"], sizes.fill) for place, e in places)
+    made["effects"] = tuple(build_kind(place, e, *PARTS["effects"], sizes.fill) for place, e in places)
     return made
 
 
@@ -240,56 +235,9 @@ def _located(table: dict, name: str) -> dict:
 
 def _medium(place: str, table: dict):
     if "name" not in table:
-        return _of_kind(place, table, *PARTS["medium"])
+        return build_kind(place, table, *PARTS["medium"])
     if extra := sorted(set(table) - {"name"}):
         raise SceneError(
             f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'"
         )
     return MEDIA[choose(f"{place} name", table["name"], MEDIA)]
-
-
-def _kind(place: str, table: dict, key: str, kinds: Mapping[str, type]) -> str:
-    if key not in table:
-        raise SceneError(f"{place} has no {key!r}: add {key} = one of {', '.join(kinds)}")
-    return choose_kind(f"{place} {key}", table[key], kinds)
-
-
-def _of_kind(place: str, table: dict, key: str, kinds: Mapping[str, type], fill=lambda place, table, kind: table):
-    kind = kinds[_kind(place, table, key, kinds)]
-    return _build(place, fill(place, {k: v for k, v in table.items() if k != key}, kind), kind)
-
-
-def _build(place: str, table: dict, kind: type):
-    """A dataclass from a table: keys are its fields, one of its ``angles`` may be given as ``x_deg``; else SceneError."""
-    names = [f.name for f in dataclasses.fields(kind)]
-    values = {}
-    for key, value in table.items():
-        in_degrees = key.endswith("_deg") and key.removesuffix("_deg") in getattr(kind, "angles", ())
-        field = choose(f"{place} key", key.removesuffix("_deg") if in_degrees else key, names)
-        if field in values:
-            raise SceneError(f"{place}: {field} is given twice: keep one of {field} and {field}_deg")
-        values[field] = _radians(value) if in_degrees else value
-        if key == "gamma0_deg":
-            _check_degrees(f"{place} {key}", value)
-    try:
-        return msgspec.convert(values, kind)
-    except (ValueError, OverflowError) as error:
-        told = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        cure = slips.of_value(told, table, getattr(kind, "angles", ()))
-        raise SceneError(f"{place} {told}{cure}") from None
-
-
-def _check_degrees(place: str, value) -> None:
-    """UnitWarning for an angle of grains below a degree: measured ones are of ten to twenty."""
-    if isinstance(value, (int, float)) and 0 < value < 1:
-        told = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
-        warnings.warn(told, UnitWarning, stacklevel=2)
-
-
-def _radians(degrees):
-    """Numbers, and numbers in lists, from degrees; anything else as it is, to be refused for what it is."""
-    if isinstance(degrees, list):
-        return [_radians(x) for x in degrees]
-    if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:
-        return math.radians(degrees)
-    return degrees

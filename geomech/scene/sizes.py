@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from geomech.errors import SceneError, choose
+from geomech.core.errors import SceneError, choose
 
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 

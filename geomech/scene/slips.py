@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from geomech.errors import is_number, short
+from geomech.core.errors import is_number, short
 
 WANTED = {
     "float": "a number", "int": "a whole number without a point", "str": 'text in "quotes"', "bool": "true or false",

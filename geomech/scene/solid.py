@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import summary
-from geomech.errors import SceneError, choose, named, number
+from geomech.core import summary
+from geomech.core.errors import SceneError, choose, named, number
 from geomech.scene.columns import columns
 from geomech.scene.intruding import Intruding, as_table, checked_tables, located
-from geomech.scene.read import _build, _kind
-from rft.spatial import MOTIONS, SOLIDS, Faces, Mesh, MeshFile, Motion, Passage, Solid, Spatial, bearing, below, wrench
-from rft.vertical.effects import KINDS as EFFECTS
-from rft.vertical.effects import GroundEffect
+from geomech.scene.parts import build, kind_in
+from rft.ground import KINDS as EFFECTS
+from rft.ground import GroundEffect
+from rft.meshes import MOTIONS, SOLIDS, Faces, Mesh, MeshFile, Motion, Passage, Solid, Spatial, bearing, below, wrench
 
 KINDS = {"mesh": MeshFile, **{k: v for k, v in SOLIDS.items() if k != "c-leg"}, "extruded-c-leg": SOLIDS["c-leg"]}
 STRENGTHS = ("name", "file", "zeta", "xi_n", "density", "internal_friction")
@@ -59,13 +59,13 @@ class MeshScene(Intruding):
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
     matched: str = field(default="", compare=False)
 
-    parts = "triangles"
+    parts, finer = "triangles", (4,)
     order = 1  # 2 in their size
     per_part = 1.5e-7
     takes = {
         "medium": (Spatial, "a medium such as Spatial(xi_n=3e5)"),
         "intruder": (Solid, "a solid such as Sphere(radius=0.02)"),
-        "motion": (tuple(MOTIONS.values()), "a motion of rft.spatial such as Drag(depth=0.05)"),
+        "motion": (tuple(MOTIONS.values()), "a motion of rft.meshes such as Drag(depth=0.05)"),
         "matched": (str, "text"),
     }
 
@@ -168,7 +168,7 @@ def read_medium(place: str, table: dict, vertical: Callable) -> tuple[Spatial, s
             told = f"xi_n = {xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) of {of} in the vertical plane"
         elif "density" in given:
             xi_n = Spatial.of_grains(given["density"], given["internal_friction"]).xi_n
-    return _build(place, {**table, "xi_n": xi_n}, Spatial), told
+    return build(place, {**table, "xi_n": xi_n}, Spatial), told
 
 
 def matched_strength(stress) -> float:
@@ -182,14 +182,14 @@ def _solid(place: str, table: dict) -> Solid:
     if shape is None:
         if kind == "mesh" and "file" not in table:
             raise SceneError(f"{place}: give 'file' (.stl, .obj, .ply) or 'shape', one of {', '.join(SOLIDS)}")
-        return _build(place, table, KINDS[kind])
+        return build(place, table, KINDS[kind])
     if kind != "mesh" or "file" in table:
         raise SceneError(f"{place}: 'shape' goes with kind = 'mesh' and no 'file': drop one")
-    return _build(place, table, SOLIDS[choose(f"{place} shape", shape, SOLIDS)])
+    return build(place, table, SOLIDS[choose(f"{place} shape", shape, SOLIDS)])
 
 
 def _motion(place: str, table: dict) -> Motion:
-    name = _kind(place, table, "kind", MOTIONS)
+    name = kind_in(place, table, "kind", MOTIONS)
     del table["kind"]
     if name == "csv":
         if {*table} != {"file"}:
@@ -197,4 +197,4 @@ def _motion(place: str, table: dict) -> Motion:
             raise SceneError(f"{place}: {told}")
         found = columns(place, table["file"], ("t", "x", "y", "z"), ("rx", "ry", "rz"))
         table = {k: v.tolist() for k, v in found.items()}
-    return _build(place, table, MOTIONS[name])
+    return build(place, table, MOTIONS[name])

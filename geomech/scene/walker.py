@@ -7,20 +7,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from geomech.errors import SceneError, choose, named, short
+from geomech.core.errors import SceneError, choose, named, short
 from geomech.scene import solid
 from geomech.scene.intruder import _intruder, read_medium
 from geomech.scene.intruding import located, of_effects
-from geomech.scene.read import _build, _kind
+from geomech.scene.parts import build, kind_in
 from geomech.systems.said import said
-from rft.spatial import Screw, Solid, Spatial
-from rft.vertical import SHAPES, PlateStress, Shape, StressMap
-from rft.vertical.effects import KINDS as EFFECTS
-from rft.vertical.effects import GroundEffect
+from rft.ground import KINDS as EFFECTS
+from rft.ground import GroundEffect
+from rft.meshes import Screw, Solid, Spatial
+from rft.plates import SHAPES, PlateStress, Shape, StressMap
 from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
 TABLES = ("medium", "robot", "gait", "numerics", "effects")
-KINDS = {"aeration", "grain-inertia"}  # of effects
+KINDS = {kind for kind, effect in EFFECTS.items() if effect.walks}
 LAWS = ("planar", "3d")
 OF_THREE = {"xi_n", "density", "internal_friction", "surface_friction"}  # keys of a [medium] of three dimensions alone
 CURE = "see 'geomech scenes --show xplorer'"
@@ -109,9 +109,9 @@ def from_tables(tables: Mapping, name: str = "scene", text: str = "") -> WalkerS
         return WalkerScene(
             medium=_medium(f"{name}: [medium]", at(tables["medium"]), tables["robot"].get("kind")),
             robot=_robot(name, tables["robot"], at),
-            gait=_build(f"{name}: [gait]", _gait(name, tables["gait"]), Tripod),
+            gait=build(f"{name}: [gait]", _gait(name, tables["gait"]), Tripod),
             effects=tuple(_effects(name, tables.get("effects", []))),
-            numerics=_build(f"{name}: [numerics]", dict(tables.get("numerics", {})), Fineness),
+            numerics=build(f"{name}: [numerics]", dict(tables.get("numerics", {})), Fineness),
             name=name,
             text=text,
             files=tuple(files),
@@ -131,7 +131,7 @@ def _robot(name: str, table: Mapping, at) -> Robot:
     place, rest = f"{name}: [robot]", dict(table)
     if "mjcf" in rest:
         return _machine(place, rest, at)
-    kind = ROBOTS[_kind(place, rest, "kind", ROBOTS)]
+    kind = ROBOTS[kind_in(place, rest, "kind", ROBOTS)]
     del rest["kind"]
     part, names = kind.part, [f.name for f in dataclasses.fields(kind)]
     for key in rest:
@@ -149,10 +149,10 @@ def _robot(name: str, table: Mapping, at) -> Robot:
 def _part(place: str, table: dict, robot: type[Robot]) -> Shape | Solid:
     """What a robot moves by: an outline, or a screw, which need not say its kind."""
     if robot is not Screws:
-        _kind(place, dict(table), "kind", SHAPES)
+        kind_in(place, dict(table), "kind", SHAPES)
         return _intruder(place, table)
     choose(f"{place} kind", table.pop("kind", "screw"), ("screw",))
-    return _build(place, table, Screw)
+    return build(place, table, Screw)
 
 
 def _machine(place: str, table: dict, at) -> Mjcf:
@@ -181,6 +181,6 @@ def _effects(name: str, effects) -> list[GroundEffect]:
         raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
     place, made = f"{name}: [[effects]]", []
     for table in effects:
-        kind = EFFECTS[_kind(place, dict(table), "kind", KINDS)]
-        made.append(_build(place, {k: v for k, v in table.items() if k != "kind"}, kind))
+        kind = EFFECTS[kind_in(place, dict(table), "kind", KINDS)]
+        made.append(build(place, {k: v for k, v in table.items() if k != "kind"}, kind))
     return made

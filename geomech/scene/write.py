@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.scene.medium import with_files
@@ -54,7 +54,7 @@ def gait_table(gait: Gait) -> dict:
 
 
 def medium_toml(name: str, entry) -> str:
-    """The table of a medium of the catalogue (`rft.media.catalogue.Entry`), with its source above."""
+    """The table of a medium of the catalogue (`rft.laws.catalogue.Entry`), with its source above."""
     lines = textwrap.wrap(f"{name}: {entry.source}", 110)
     if entry.axial_stress is not None:
         lines.append(f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa")
@@ -66,9 +66,9 @@ def medium_toml(name: str, entry) -> str:
 
 
 def vertical_toml(name: str, entry) -> str:
-    """The table of a medium of intruder scenes (`rft.vertical.VerticalEntry`), with its source above."""
+    """The table of a medium of intruder scenes (`rft.plates.VerticalEntry`), with its source above."""
     head = "".join(f"# {line}\n" for line in textwrap.wrap(f"{name}: {entry.source}", 110))
-    from rft.vertical.stress import COEFFICIENTS
+    from rft.plates.stress import COEFFICIENTS
 
     told = dataclasses.asdict(entry.stress)
     values = {**{key.replace("m", "-"): told[key] for key in COEFFICIENTS}, "zeta": told["zeta"]}

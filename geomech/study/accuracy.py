@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import workers
-from geomech.errors import SceneError, named
-from geomech.progress import told
+from geomech.core.errors import SceneError, named
+from geomech.run.jobs import runner
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
@@ -97,14 +96,14 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     is not exact besides {"own_error": body lengths}, the largest that no setting takes away: errors of the cheapest include it.
 
     runs: each setting is timed so often, and the quickest counts; time stepping once, it is long enough for that to tell.
-    Seconds are of one thread's computing. Who computes: `geomech.workers`."""
+    Seconds are of one thread's computing. Who computes: `geomech.run.workers`."""
     amplitudes = checked_scene(scene).gait.amplitude * FRACTIONS
     knobs, lines = _knobs(scene), []
     asked = [Asked(_finest(scene), "direct", 1)]
     for knob in knobs:
         asked += [Asked(_limit(scene, knob), knob.tier, 1)] if knob.against == "limit" else []
         asked += [Asked(knob.turned(scene, value), knob.tier, _runs(scene, runs)) for value in knob.values]
-    found = told(workers.each(_answer, amplitudes, asked, len(asked)), len(asked), progress)
+    found = runner().map(_answer, amplitudes, asked, len(asked), progress=progress)
     true, _ = next(found)
     for knob in knobs:
         truth = next(found)[0] if knob.against == "limit" else true

@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from geomech.connection import Connection, even_part
-from geomech.curvature import ccf
-from geomech.curvature import error as ccf_error
-from geomech.errors import SceneError, choose, named, real_array, short
-from geomech.field import Field, inside
+from geomech.core.errors import SceneError, choose, named, real_array, short
+from geomech.core.face import Faced
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
-from geomech.metric import Finsler, Metric
-from geomech.plane import Plane
-from geomech.progress import progress as shown
+from geomech.geometry.connection import Connection, even_part
+from geomech.geometry.curvature import ccf
+from geomech.geometry.curvature import error as ccf_error
+from geomech.geometry.field import Field, inside
+from geomech.geometry.gait import checked_gait
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.plane import Plane
+from geomech.geometry.two_form import TwoForm, two_form
+from geomech.run.progress import progress as shown
 from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
@@ -27,10 +29,9 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import axes, plane
-from geomech.two_form import TwoForm, two_form
 
 
-class Study:
+class Study(Faced):
     """A scene and the tables computed for it so far, kept under what they depend on: the system, some entries of
     [numerics], for a family also the gait. `turned` gives a bench with other numerics that shares them."""
 
@@ -42,17 +43,6 @@ class Study:
     def __repr__(self) -> str:
         held = sorted({str(key[0]) for key in self.computed})
         return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(held) or 'nothing yet'})"
-
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.study(self)
-
-    def to_xarray(self) -> Any:
-        """A Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
-        from geomech.output import datasets
-
-        return datasets.of_study(self)
 
     @property
     def computed(self) -> tuple:
@@ -126,7 +116,7 @@ class Study:
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
-        that pair, without a field of all joints (`geomech.plane`)."""
+        that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, at = self.scene, self.scene.gait.middle if at is None else at
         with named(s.name):
             make = lambda: plane(s.system, s.numerics, tuple(pair), at, progress)
@@ -134,7 +124,7 @@ class Study:
 
     @property
     def two_form(self) -> TwoForm:
-        """The CCF of all pairs of joints, of any number (`geomech.two_form`)."""
+        """The CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
         return self._kept("two-form", TIERS["path"].depends_on, (), lambda: two_form(self.fitted))[0]
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
@@ -155,8 +145,8 @@ class Study:
 
     @property
     def metric(self) -> Metric | Finsler:
-        """What a change of shape costs, on the field's grid (`geomech.metric`): a quadratic form where xi = A alphadot, else
-        a norm. SceneError if the system has none."""
+        """What a change of shape costs, on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
+        alphadot, else a norm. SceneError if the system has none."""
         return self.compute_metric()
 
     def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import SceneError, named
+from geomech.core.errors import SceneError, named
 from geomech.scene import drag
 from geomech.scene.write import table
 from geomech.study.stress_calibration import OfPenetration, OfPlates, of_penetration, of_plates

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.errors import SceneError, is_number, real_array, short
+from geomech.core.errors import SceneError, is_number, real_array, short
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
+from geomech.geometry.gait import checked_gait
 from geomech.scene.model import Scene
 from geomech.study import cost, tables, uncertainty
 from geomech.study.bench import Study

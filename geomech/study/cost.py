@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import workers
-from geomech.connection import SAMPLES_TOGETHER
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Gait
+from geomech.geometry.connection import SAMPLES_TOGETHER
+from geomech.run.backend import suiting
+from geomech.run.jobs import unaided
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.tiers import TIERS
@@ -53,6 +54,11 @@ class Cost(NamedTuple):
         return f"{balances}, about {_duration(self.seconds)} of computing and {_size(self.memory)} of memory"
 
     @property
+    def as_balances(self) -> float:
+        """Balances that take NumPy about as long, for the choice of a back end."""
+        return self.balances
+
+    @property
     def small(self) -> bool:
         """Not worth saying."""
         return self.seconds < WORTH_SAYING and self.memory < LARGEST
@@ -85,6 +91,16 @@ class Job(NamedTuple):
         terms = [getattr(s.numerics, name) for name in table if name not in ("grid", "extent", "directions")]
         return repr((self.what, s.system.costs_as, self.gait, self.group, self.tier, terms))
 
+    @property
+    def balances(self) -> int:
+        """Balances of one of them, or of one time step."""
+        return self.group if self.what not in ("look-ups", "powers") else 0
+
+    @property
+    def least(self) -> float:
+        """Balances of all, as far as they are known before one is solved: one cycle of steps."""
+        return self.count * self.balances
+
 
 def price(jobs: Sequence[Job]) -> Cost:
     """Of jobs that are done one after the other."""
@@ -92,11 +108,12 @@ def price(jobs: Sequence[Job]) -> Cost:
     for job in jobs:
         kinds.setdefault(job.kind, []).append(job)
     balances = seconds = 0.0
-    for same in kinds.values():
-        job, count = same[0], sum(j.count for j in same)
-        each, cycles = _per_step(job, count) if job.what == "steps" else (_per_sample(job, count), 1)
-        seconds += count * cycles * each
-        balances += count * cycles * job.group if job.what not in ("look-ups", "powers") else 0
+    with suiting(sum(j.least for j in jobs)):
+        for same in kinds.values():
+            job, count = same[0], sum(j.count for j in same)
+            each, cycles = _per_step(job, count) if job.what == "steps" else (_per_sample(job, count), 1)
+            seconds += count * cycles * each
+            balances += count * cycles * job.balances
     return Cost(math.ceil(balances), seconds, max((j.memory for j in jobs), default=BASE))
 
 
@@ -247,14 +264,14 @@ def _per_step(job: Job, count: float) -> tuple[float, int]:
         found = system.time_steps(*gait.cycle(phases, np.full(samples, gait.amplitude)), cycles)
         return found.cycles, (time.process_time() - start) / (phases * found.cycles)
 
-    with workers.one_way(workers.MANY), workers.keeping(None):
+    with unaided():
         cycles = time_steps(1, system.solver.cycles and 1)[0]  # also loads what the first steps load
         return time_steps(some, 1)[1] * job.group / some, system.solver.cycles or cycles
 
 
 def _grown(f: Callable, samples: int, most: float) -> float:
-    """Seconds a sample that f(samples) takes by the back end of large requests, for as many as it takes to tell."""
-    with workers.one_way(workers.MANY), workers.keeping(None):
+    """Seconds a sample that f(samples) takes, for as many as it takes to tell."""
+    with unaided():
         f(samples)  # loads what the first call loads
         while True:
             start = time.process_time()

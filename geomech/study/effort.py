@@ -2,8 +2,8 @@
 
 Power is in axial drags of the whole body times body lengths a unit of time, in which phase grows by 1 rad; in a fluid the drag
 is that at a body length a unit of time. Work is its integral over a cycle, path length that of F = power^(1/degree)
-(`geomech.metric`): in a dry medium the same, in body lengths. Cost of transport is work over that of towing the body, straight
-and along itself, as far in the same time.
+(`geomech.geometry.metric`): in a dry medium the same, in body lengths. Cost of transport is work over that of towing the body,
+straight and along itself, as far in the same time.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from geomech import connection, metric
-from geomech.errors import SceneError, number, real_array
+from geomech.core.errors import SceneError, number, real_array
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
-from geomech.harmonics import Harmonics
-from geomech.metric import Finsler, Metric
+from geomech.geometry import connection, metric
+from geomech.geometry.gait import checked_gait
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
 from geomech.scene.model import Scene
 from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES

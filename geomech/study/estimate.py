@@ -8,12 +8,14 @@ direct tier. Errors come in pairs: the distance between net positions, in body l
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from geomech import workers
-from geomech.errors import named
+from geomech.core.errors import named
 from geomech.gaits import Gait
-from geomech.reconstruct import displacement
+from geomech.geometry.reconstruct import displacement
+from geomech.run.jobs import runner
 from geomech.scene.model import Scene
 
 CHECKED = (
@@ -53,22 +55,14 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
+    one = _direct if scene.system.steps else partial(runner().call, _direct)  # pieces of steps are stored by themselves
     with named(scene.name):
-        return tuple(np.concatenate(x) for x in zip(*(_kept(scene, gait, some, phases) for some in groups)))
+        return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, some, phases) for some in groups)))
 
 
-def _kept(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
-    """As `_direct`; kept by itself, for the command that goes on, but for steps in time, whose pieces are."""
-    compute = lambda: _direct(scene, gait, amplitudes, phases)
-    if scene.system.steps:
-        return compute()
-    solver = getattr(scene.system, "solver", None)
-    return workers.known(
-        "direct", compute, lambda: (repr(solver), repr(gait), amplitudes, phases), bool(workers.settled_on())
-    )
-
-
-def _direct(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int):
+def _direct(
+    scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier."""
     phases = max(32, 8 * -(-phases // 8))
     system, stepping = scene.system, scene.system.steps

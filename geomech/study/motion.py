@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.errors import SceneError, is_whole, named, short
+from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.scene.model import Scene
 from geomech.study.cost import Cost, direct, price
 

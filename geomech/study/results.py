@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from geomech import summary
-from geomech.errors import plain
+from geomech.core import summary
+from geomech.core.errors import plain
+from geomech.core.face import Faced
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.tiers import TIERS
 
 
-class Displacements(dict):
+class Displacements(Faced, dict):
     """Net displacement per cycle by amplitude and tier (`Study.study`, `choose.cheapest`) of a gait of a scene."""
 
     def __init__(self, values: Mapping, scene: Scene, gait: Gait):
@@ -30,35 +30,13 @@ class Displacements(dict):
         """Estimates by tier, of a table of all or of the cheapest. key: "estimate" or "estimate_heading"."""
         return self[key] if isinstance(self[key], dict) else {self.tiers[0]: self[key]}
 
-    def to_xarray(self) -> Any:
-        """A Dataset over tier, amplitude and component, with units and error estimates."""
-        from geomech.output import datasets
 
-        return datasets.displacements(self)
-
-    def __repr__(self) -> str:
-        from geomech.output.report import text_table
-
-        return plain(text_table(self.scene.name, self, self.scene))
-
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.displacements(self)
-
-
-class Swept(dict):
+class Swept(Faced, dict):
     """Net displacement per cycle over a grid of a scene's parameters (`sweep.sweep`)."""
 
     def __init__(self, values: Mapping, scene: Scene):
         super().__init__(values)
         self.scene = scene
-
-    def to_xarray(self) -> Any:
-        """A Dataset over the parameters and component, as the file of `geomech sweep`."""
-        from geomech.output import datasets
-
-        return datasets.swept(self)
 
     def __repr__(self) -> str:
         over = " x ".join(f"{name} ({len(v)}: {summary.span(v)})" for name, v in self["over"].items())
@@ -66,8 +44,3 @@ class Swept(dict):
         worst = f"estimated error up to {np.max(self['estimate'], initial=0.0):.1e} {unit}"
         net = f"net {summary.poses(self['displacement'])} ({unit}, rad)"
         return f"Swept({plain(self.scene.name)} over {over}; {net}; {worst})"
-
-    def _repr_html_(self) -> str:
-        from geomech.output import display
-
-        return display.swept(self)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.errors import SceneError, named
-from geomech.rows import read as read_rows
+from geomech.core.errors import SceneError, named
+from geomech.io.rows import read as read_rows
 from geomech.scene import penetration
 from geomech.scene.drag import LARGEST_FILE
 from geomech.scene.intruder import plate_rows
-from rft.vertical.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_stress, fit_zeta
-from rft.vertical.survey import survey
+from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_stress, fit_zeta
+from rft.plates.survey import survey
 
 KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # as files have them: B-11 for Bm11
 MOST_LINES = 60  # of a table of residuals

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import time
@@ -11,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import workers
-from geomech.errors import SceneError, real_array, short
+from geomech.core.errors import SceneError, real_array, short
+from geomech.run.backend import suiting
+from geomech.run.jobs import context_of, runner, storing, unaided
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
-from geomech.scene.read import from_tables
-from geomech.study import estimate, kept, uncertainty
+from geomech.scene.read import from_tables, inputs
+from geomech.study import estimate, uncertainty
 from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, of_medium, price
-from geomech.study.parts import asking
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
 
@@ -27,6 +28,7 @@ LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
 MOST_BATCHES = 10  # that are taken for nothing in a forecast
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
+WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
 FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key
 
@@ -78,26 +80,24 @@ def sweep(
     "medium_error_heading": (N_1, ...), rad} (`geomech.study.uncertainty`).
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects) go through the
-    solver together. partial: a file that keeps what is done (`geomech.study.kept`) and is taken up again when the same sweep is
-    asked for; it is the caller's to remove, once the results are saved. seconds: what `cost` has said, if it was asked: others
-    begin sooner. Who computes: `geomech.workers`. SceneError if a point of the grid makes no scene.
+    solver together. partial: a file in which what is done is stored, so that the same sweep resumes; it is the caller's to
+    remove, once the results are saved. seconds: what `cost` has said, if it was asked: others begin sooner. Who computes:
+    `geomech.run.workers`. SceneError if a point of the grid makes no scene.
     """
     tables, names, values, points = _grid(scene, over)
     shape, amplitudes = tuple(map(len, values.values())), values.get(AMPLITUDE)
     solved = tuple(1 if name in _idle(scene, names) else n for name, n in zip(names, shape))
-    if not (partial is None or (isinstance(partial, (str, Path)) and str(partial))):
-        raise SceneError(f"partial must be the path of a file, got {short(partial)}")
     at = _At(tables, scene, tuple(names))
     parts = -(-points.total * len(amplitudes or [0]) // SAMPLES_TOGETHER)
     doubtful = uncertainty.uncertain(scene.system)
-    kept_as = partial and Path(partial), question(scene, values), int(np.prod(solved)), workers.settle(parts)
-    with kept.Rows(*kept_as, kept.WIDTH + 2 * doubtful) as rows:
-        some = _parts(at, points, amplitudes, len(rows))
-        for found in workers.each(_part, at, some, parts, rows.settled, rows.left(seconds)):
-            rows.add(found)
+    rows, done = np.empty((int(np.prod(solved)), WIDTH + 2 * doubtful)), 0
+    with stored_in(partial, scene):
+        for found in runner().map(_part, at, _parts(at, points, amplitudes), parts, seconds):
+            rows[done : done + len(found)] = found
+            done += len(found)
             if progress:
-                progress(len(rows) / rows.total)
-    flat = rows.values.reshape(*solved, -1)
+                progress(done / len(rows))
+    flat = rows.reshape(*solved, -1)
     flat = np.broadcast_to(flat, (*shape, flat.shape[-1]))
     back = [names.index(k) for k in over]
     flat = np.transpose(flat, (*back, len(shape)))
@@ -108,6 +108,15 @@ def sweep(
     results = {"over": over, "displacement": flat[..., :3], **errors}
     results |= _speeds(scene, results)
     return Swept({**results, "units": _units(scene, results)}, scene)
+
+
+def stored_in(partial: Path | None, scene) -> contextlib.AbstractContextManager:
+    """Store what is done of a sweep in a file, if one is given; it stays until the caller removes it."""
+    if partial is None:
+        return contextlib.nullcontext()
+    if not (isinstance(partial, (str, Path)) and str(partial)):
+        raise SceneError(f"partial must be the path of a file, got {short(partial)}")
+    return storing(Path(partial), context_of(inputs(scene)), Path(partial), keep=True)
 
 
 def lengths(at: _At, values: Mapping[str, list[float]], names: Iterable[str]) -> np.ndarray:
@@ -167,14 +176,15 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
     balances, each, _ = np.array(list(map(price, jobs))).T
     if not scene.system.steps and total > MOST_BATCHES * together:
-        seconds += total / together * _of_a_batch(at, ([points[0]], values.get(AMPLITUDE, [])[:1] or None))
+        with suiting(balances.mean()):
+            seconds += total / together * _of_a_batch(at, ([points[0]], values.get(AMPLITUDE, [])[:1] or None))
     held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
     return Cost(round(balances.mean()), float(each.mean()) + seconds, max(held) + HELD * total)
 
 
 def _of_a_batch(at: _At, part: tuple) -> float:
     """Seconds that a batch takes, however small it is."""
-    with workers.one_way(workers.MANY):
+    with unaided():
         _part(at, part)  # loads what the first one loads
         start = time.process_time()
         _part(at, part)
@@ -225,16 +235,6 @@ def listed(name: str, values) -> list[float]:
     return array.tolist()
 
 
-def partial(scene: Scene, over: Mapping[str, list[float]], output: Path) -> Path:
-    """The file that keeps what is done of this sweep to ``output``; SceneError as from `sweep`."""
-    return kept.beside(output, question(scene, _grid(scene, over)[2]))
-
-
-def question(scene: Scene, values: Mapping[str, list[float]]) -> dict:
-    """All that the numbers of a sweep follow from: the code, the scene, and the parameters' values by name, in order."""
-    return asking(scene, over=[[name, list(x)] for name, x in values.items()])
-
-
 def _corners(outer: list[list[float]]):
     """The grid's corners, and every value of each parameter with the others at their first."""
     yield from itertools.product(*([v[0], v[-1]] for v in outer))
@@ -256,9 +256,9 @@ class _At(NamedTuple):
         return from_tables(tables, self.scene.name, self.scene.text)
 
 
-def _parts(at: _At, points: Points, amplitudes: list[float] | None, done: int) -> Iterator[tuple]:
-    """What is solved together of all that is not done, in order: (scenes, or their points, amplitudes)."""
-    count, total = len(amplitudes or [0]), points.total * len(amplitudes or [0])
+def _parts(at: _At, points: Points, amplitudes: list[float] | None) -> Iterator[tuple]:
+    """What is solved together, in order: (scenes, or their points, amplitudes)."""
+    count, total, done = len(amplitudes or [0]), points.total * len(amplitudes or [0]), 0
     while done < total:
         k, j = divmod(done, count)  # points, of which amplitudes run fastest
         first = at(points[k])

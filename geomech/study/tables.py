@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from geomech.field import UNTOLD
 from geomech.gaits import Gait
+from geomech.geometry.field import UNTOLD
 from geomech.scene.model import Scene, frequency_of
 
 ERRORS = ("estimate", "estimate_heading")

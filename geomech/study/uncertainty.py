@@ -15,7 +15,7 @@ import itertools
 
 import numpy as np
 
-from geomech.errors import SceneError, named
+from geomech.core.errors import SceneError, named
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study.tables import QUANTITIES, of_pose

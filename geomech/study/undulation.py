@@ -3,11 +3,12 @@ which muscles must work for it (Sec. III C, Fig. 10)."""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.errors import real_array, short
+from geomech.core.errors import real_array, short
 from geomech.gaits import Sine, Wave
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     ValueError if the gait is no such wave.
 
     The elements are chords of the wave: 40 of them a wave leave errors of 2 % at A / lambda = 0.2, but above 0.4 enough
-    to feign an optimum of efficiency and slip. Refine before believing one.
+    to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`.
     """
     gait = _travelling(scene)
     amplitudes = real_array("amplitudes", amplitudes)
@@ -130,14 +131,26 @@ def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000, kinem
     return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
 
-def best(x, y) -> tuple[float, float]:
-    """Place and height of the largest of samples y(x), by the parabola through it and its neighbours."""
-    x, y = np.asarray(x, float), np.asarray(y, float)
-    k = int(np.clip(np.argmax(y), 1, len(y) - 2))
-    a, b, c = np.polyfit(x[k - 1 : k + 2] - x[k], y[k - 1 : k + 2], 2)
-    if k != np.argmax(y) or a >= 0:
-        return float(x[np.argmax(y)]), float(y.max())
-    return float(x[k] - b / (2 * a)), float(c - b * b / (4 * a))
+def optimum(x, values, sign: int = 1) -> tuple[float, float] | None:
+    """Return the place and height of the largest (sign 1) or least (-1) of positive values (B,) at x (B,).
+
+    Both are those of the parabola through the logarithms of that value and its neighbours. None if it is the first or the
+    last of the values: the optimum lies outside of the range, or there is none.
+    """
+    x, heights = np.asarray(x, float), sign * np.log(values)
+    k = int(np.argmax(heights))
+    if k in (0, len(x) - 1):
+        return None
+    near = slice(k - 1, k + 2)
+    a, b, c = np.polyfit(x[near] - x[k], heights[near], 2)
+    return float(x[k] - b / (2 * a)), float(np.exp(sign * (c - b * b / (4 * a))))
+
+
+def refined(scene: Scene, finer: int) -> Scene:
+    """Return the scene with ``finer`` times its elements, of the body and of its wave."""
+    elements = finer * _sine(scene, "refined").elements
+    gait = dataclasses.replace(scene.gait, elements=elements)
+    return scene.changed(body=dataclasses.replace(scene.system.body, elements=elements), gait=gait)
 
 
 def activation(scene: Scene) -> dict[str, np.ndarray | float]:

@@ -14,17 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech import workers
-from geomech.errors import SceneError, named
-from geomech.progress import told
+from geomech.core.errors import SceneError, named
+from geomech.run import jobs
+from geomech.run.backend import preferred, suiting
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
-from geomech.study import kept
 from geomech.study.cost import BASE, PILOT, Cost
-from geomech.study.kept import Rows
-from geomech.study.parts import asking
-from geomech.study.sweep import LARGEST, Points, changed, listed
-from rft.media.catalogue import GRAVITY
+from geomech.study.sweep import LARGEST, Points, changed, listed, stored_in
+from rft.laws.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
@@ -32,8 +29,9 @@ from rft.walking.stride import NEAR as NEAR
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
-PER_STEP = 2.2e-3  # s of computing, for a robot by itself,
-MORE = 0.23  # of that for each beside it, measured
+PER_STEP = {"numpy": 2.2e-3, "numba": 2e-4}  # s of computing, for a robot by itself,
+MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each beside it, measured
+STEP = 200.0  # balances, of time by NumPy
 ALONE = 5e-3  # s, in three dimensions,
 OWN = 3e-2  # and of a machine of one's own, whose wheels stick and slip: 5e-3 to 5e-2 measured
 HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
@@ -55,12 +53,14 @@ TOLERANCES = 10.0 ** -np.arange(1, 5)
 class Walked(NamedTuple):
     """walk: as rft has it. estimate: error of its speed, m/s: what half or three quarters of the steps change, the larger, for
     one alone may be small by chance; `TO_COME` times what twice the elements change; what is left to the limit, and what
-    steps that are not solved move. aside, turning: errors of those of the walk, m/s and rad/s, by the changes alone."""
+    steps that are not solved move. aside, turning: errors of those of the walk, m/s and rad/s, by the changes alone.
+    elements: m/s, what of the estimate comes from twice the elements."""
 
     walk: Walk
     estimate: float
     aside: float = 0.0
     turning: float = 0.0
+    elements: float = 0.0
 
 
 def walked(
@@ -70,21 +70,20 @@ def walked(
     fraction done."""
     numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
     told = {"progress": lambda done: progress(WALKING * done)} if progress else {}
-    walks = how.walk(walkers, numerics, SETTLING if settling else None, **told)
+    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **told)
     others = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
     others += [("elements", min(1000, 2 * numerics.elements))]
     changes = []
     for k, (name, other) in enumerate(others):
-        there = how.again(
-            walkers, dataclasses.replace(numerics, **{name: other}), walks, SETTLING if settling else None
-        )
+        finer = dataclasses.replace(numerics, **{name: other})
+        there = how.again(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
         changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(there, walks)]))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
     half, most, finer = changes
     error = np.maximum(half, most) + TO_COME * finer
     error[:, 0] += [w.drift + w.off for w in walks]
-    return [Walked(w, *e) for w, e in zip(walks, error.tolist())]
+    return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
@@ -124,6 +123,11 @@ def run(
 class Steps(Cost):
     """What walking costs; balances counts the time steps."""
 
+    @property
+    def as_balances(self) -> float:
+        """A time step takes NumPy as long as some 200 balances."""
+        return STEP * self.balances
+
     def __str__(self) -> str:
         return f"{self.balances:,} time steps, about {max(1.0, self.seconds):.0f} s of computing"
 
@@ -132,17 +136,21 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     """Of ``count`` scenes like this one, from its first time steps. Where these are many times as hard as others, of robots
     that are so light that they bounce or stick at every step, the search for a limit cycle is taken to be in vain."""
     numerics, how = scene.numerics, by or scene.engine
-    together = TOGETHER if how == "planar" else 1
+    planar = how == "planar"
+    together = TOGETHER if planar else 1
     own = isinstance(scene.robot, Mjcf)  # which may never come to a limit cycle
-    usual = (OWN if own else PER_STEP if together > 1 else ALONE) * (0.5 + numerics.elements / 32)
-    with named(scene.name):
+    most = SETTLING if settling else numerics.duration * scene.gait.frequency
+    cycles = min(most, 2 * LIMIT + _speeding_up(scene))
+    least = (cycles + 2.75 * LIMIT) * numerics.steps * count
+    with named(scene.name), suiting(STEP * least if planar else 0.0):
+        per_step, more = PER_STEP[preferred()], MORE[preferred()]
+        usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
         pace, tries = engine(how).pace(scene.walker, numerics, PILOT)
-    cycles = SETTLING if settling else numerics.duration * scene.gait.frequency
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
-    cycles = cycles + vain if vain else min(cycles, 2 * LIMIT + _speeding_up(scene))
+    cycles = most + vain if vain else cycles
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
-    seconds = each * steps * (batches + (count - batches) * MORE)
+    seconds = each * steps * (batches + (count - batches) * more)
     return Steps(round(steps * count), seconds, BASE)
 
 
@@ -162,19 +170,15 @@ def sweep(
     seconds: float | None = None,
 ) -> dict:
     """{"over": {parameter: values}, "speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}: as
-    `geomech.study.sweep.sweep`, which keeps what is done."""
+    `geomech.study.sweep.sweep`, which stores what is done."""
     tables, values, points = _grid(scene, over)
     shape, at = tuple(map(len, values.values())), _At(tables, scene, tuple(values))
     together = TOGETHER if scene.engine == "planar" else 1  # others walk one after the other: each tells how far it is
     parts = -(-points.total // together)
-    with Rows(partial and Path(partial), question(scene, values), points.total, workers.settle(parts)) as rows:
-        left = range(len(rows), points.total, together)
-        some = ([points[i] for i in range(k, min(k + together, points.total))] for k in left)
-        for found in workers.each(_part, at, some, parts, rows.settled, rows.left(seconds)):
-            rows.add(found)
-            if progress:
-                progress(len(rows) / rows.total)
-    speed, estimate, kinds, cycles, _ = np.moveaxis(rows.values.reshape(*shape, 5), -1, 0)
+    some = ([points[i] for i in range(k, min(k + together, points.total))] for k in range(0, points.total, together))
+    with stored_in(partial, scene):
+        rows = [row for found in jobs.runner().map(_part, at, some, parts, seconds, progress) for row in found]
+    speed, estimate, kinds, cycles = np.moveaxis(np.reshape(rows, (*shape, 4)), -1, 0)
     status = np.array(STATUSES)[kinds.astype(int)]
     return {"over": values, "speed": speed, "estimate": estimate, "status": status, "cycles": cycles}
 
@@ -197,12 +201,7 @@ def _part(at: _At, points: list) -> list[list[float]]:
     """Rows of some points: speed, its error, status, cycles."""
     alike = itertools.groupby(map(at, points), key=lambda s: (s.numerics, s.engine))
     found = [one for _, some in alike for one in walked(list(some), settling=True)]
-    return [[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles, 0.0] for w in found]
-
-
-def question(scene: WalkerScene, values: Mapping) -> dict:
-    """All that the numbers of a sweep follow from."""
-    return asking(scene, over=[[k, list(v)] for k, v in values.items()])
+    return [[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in found]
 
 
 def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
@@ -229,19 +228,14 @@ def _grid(scene: WalkerScene, over: Mapping):
     return tables, values, points
 
 
-def partial(scene: WalkerScene, over: Mapping, output: Path) -> Path:
-    """The file that keeps what is done of this sweep to ``output``."""
-    return kept.beside(output, question(scene, _grid(scene, over)[1]))
-
-
 def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
     """{"scene", "speed", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest"}: error of the speed,
     m/s, against one as far refined as `FINEST`, for every knob. Seconds are of one thread's computing. Who computes:
-    `geomech.workers`."""
+    `geomech.run.workers`."""
     (walk,) = engine(scene.engine).walk([scene.walker], scene.numerics, SETTLING)
     asked = [(name, value) for name, settings in KNOBS.items() for value in (FINEST[name], *settings)]
     common = scene.engine, scene.walker, scene.numerics, walk
-    found = told(workers.each(_answer, common, asked, len(asked), back_end=""), len(asked), progress)
+    found = jobs.runner().map(_answer, common, asked, len(asked), progress=progress)
     lines = []
     for name, settings in KNOBS.items():
         truth, _ = next(found)

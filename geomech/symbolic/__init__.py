@@ -1,10 +1,21 @@
 """Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
 
-A, alpha = system.symbolic()            # or rft.symbolic.viscous_chain(lengths, ratio), with symbols
+A, alpha = system.symbolic()            # or symbolic.viscous_chain(lengths, ratio), with symbols
 A = symbolic.simplified(A, alpha)
 print(symbolic.latex(symbolic.ccf(A, alpha)))
 """
 
+from geomech.symbolic.connections import chain_connection, differential_drive, no_slip_snake, viscous_chain
 from geomech.symbolic.matrices import bracket, ccf, latex, simplified, velocity
 
-__all__ = ["bracket", "ccf", "latex", "simplified", "velocity"]
+__all__ = [
+    "bracket",
+    "ccf",
+    "chain_connection",
+    "differential_drive",
+    "latex",
+    "no_slip_snake",
+    "simplified",
+    "velocity",
+    "viscous_chain",
+]

@@ -21,7 +21,8 @@ def ccf(A: sp.Matrix, alpha, i: int = 0, j: int = 1) -> sp.Matrix:
 
 
 def velocity(A: sp.Matrix, alpha) -> Callable[..., Any]:
-    """The callable velocity(alpha, alphadot) -> xi that `geomech.connection.fit` and `geomech.tiers.direct.direct` take."""
+    """The callable velocity(alpha, alphadot) -> xi that `geomech.geometry.connection.fit` and `geomech.tiers.direct.direct`
+    take."""
     import numpy as np
 
     entries = sp.lambdify(alpha, list(A), "numpy", cse=True)

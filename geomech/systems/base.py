@@ -8,11 +8,11 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from geomech import summary
-from geomech.connection import Connection, evaluate, fit
-from geomech.errors import check_angle, choose, real_array, short
-from geomech.images import Around, around
-from geomech.reconstruct import displacement, poses, repeated
+from geomech.core import summary
+from geomech.core.errors import check_angle, choose, real_array, short
+from geomech.geometry.connection import Connection, evaluate, fit
+from geomech.geometry.images import Around, around
+from geomech.geometry.reconstruct import displacement, poses, repeated
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
 __all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
@@ -99,20 +99,20 @@ class Plain:
     """Base of systems: what holds of one whose velocity follows from shape alone, at one place at a time.
 
     odd: the velocity turns round with the rates. halved: it is odd and mirrored, so that half of a symmetric grid tells the
-    other. reversible: head and tail are alike, as `geomech.images` has it. starts: `run` takes velocities nearby, (..., N,
-    3), to begin from. kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the
+    other. reversible: head and tail are alike, as `geomech.geometry.images` has it. starts: `run` takes velocities nearby,
+    (..., N, 3), to begin from. kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the
     phases only. solver: its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are
-    evaluated, for one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held:
-    numbers that time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling:
-    change of displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles.
-    near: of which gait alone it is known, in words, empty where it is of all. carried: its displacements are those of
-    another frame, carried over. joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip
-    of unit. closed: forces on an element have an exact form, which finer loads come near to. notes: lines on what its user
-    may not expect of how it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n),
-    of parameters of its own that are not known for certain, which `varied` changes; None where all are. power_degree: of
-    its power in alphadot, 2 in a fluid and 1 in sand; None where it has no power (`driven`), or one of no one degree. cost:
-    None, or a function of alpha and alphadot that gives alphadot^T M(alpha) alphadot where the metric M of `geomech.metric`
-    is not one of drag but, say, of kinetic energy.
+    evaluated, for one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers
+    that time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
+    displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles. near: of
+    which gait alone it is known, in words, empty where it is of all. carried: its displacements are those of another frame,
+    carried over. joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed:
+    forces on an element have an exact form, which finer loads come near to. notes: lines on what its user may not expect of
+    how it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n), of parameters of its
+    own that are not known for certain, which `varied` changes; None where all are. power_degree: of its power in alphadot, 2
+    in a fluid and 1 in sand; None where it has no power (`driven`), or one of no one degree. cost: None, or a function of
+    alpha and alphadot that gives alphadot^T M(alpha) alphadot where the metric M of `geomech.geometry.metric` is not one of
+    drag but, say, of kinetic energy.
     """
 
     kind = "system"

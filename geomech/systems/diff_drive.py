@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from geomech.errors import choose, number
+from geomech.core.errors import choose, number
 from geomech.systems.base import Plain
-from rft.symbolic import differential_drive, exact
 
 
 @dataclass(frozen=True)
@@ -53,5 +52,6 @@ class DifferentialDrive(Plain):
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         """A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
-        radius, track = exact(self.wheel_radius), exact(self.track)
-        return differential_drive(radius, track)
+        from geomech.symbolic import connections
+
+        return connections.differential_drive(self.wheel_radius, self.track)

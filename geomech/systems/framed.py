@@ -1,4 +1,4 @@
-"""Any system seen from its minimum-perturbation frame (`geomech.minimum_perturbation`)."""
+"""Any system seen from its minimum-perturbation frame (`geomech.geometry.minimum_perturbation`)."""
 
 from __future__ import annotations
 
@@ -6,18 +6,16 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from geomech import connection
-from geomech.connection import Connection
-from geomech.coordinates import change_velocity, frame_velocity
+from geomech.geometry import connection
+from geomech.geometry.connection import Connection
+from geomech.geometry.coordinates import change_velocity, frame_velocity
+from geomech.geometry.minimum_perturbation import Frame, minimum_perturbation
 from geomech.systems.base import SHAPE_ALONE, Cycle, System
 from rft import se2
-
-if TYPE_CHECKING:  # it loads SciPy, which a scene in another frame has no need of
-    from geomech.minimum_perturbation import Frame
 
 NAME = "minimum-perturbation"
 
@@ -55,8 +53,6 @@ class Framed:
 
     def _make(self, progress: Callable | None) -> tuple[Frame, Connection]:
         """The frame, and the connection in it: of the same velocities, carried over."""
-        from geomech.minimum_perturbation import minimum_perturbation
-
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         keep = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from geomech.errors import number as checked
+from geomech.core.errors import number as checked
 from geomech.systems.momentum import Momentum
 
 

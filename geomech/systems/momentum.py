@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from geomech.errors import real_array, short
+from geomech.core.errors import real_array, short
 from geomech.systems.base import Plain
+from rft.balance.newton import carried
 from rft.bodies import Chain
-from rft.bodies.base import Kinematics
-from rft.symbolic import chain_connection, exact, in_units_of
+from rft.bodies.base import Elements
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Momentum(Plain):
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
         """Masses of the links, and [along, across, about the centre] of each: the mass that it moves, in any one unit and
-        body lengths, of its own or of the fluid. number: `float`, or `rft.symbolic.exact` for formulas."""
+        body lengths, of its own or of the fluid. number: `float`, or `geomech.symbolic.connections.exact` for formulas."""
         raise NotImplementedError
 
     @property
@@ -83,12 +83,12 @@ class Momentum(Plain):
         """As `rft.Chain.frame_pose`."""
         return self._chain.frame_pose(frame, alpha, alphadot)
 
-    def _weights(self, motion: Kinematics) -> np.ndarray:
+    def _weights(self, motion: Elements) -> np.ndarray:
         """G (3, n, 1) for velocities (v_t, v_n, spin), spin being the turning rate times half the length."""
         along, across, about = np.array(self.inertia()[1]).T
         return np.stack([along, across, about / motion.half[:, 0] ** 2])[..., None]
 
-    def _moving(self, alpha, alphadot) -> tuple[Kinematics, np.ndarray, np.ndarray]:
+    def _moving(self, alpha, alphadot) -> tuple[Elements, np.ndarray, np.ndarray]:
         """The links, G, and xi (3, B) in body lengths, for shapes (B, joints)."""
         motion = self._chain.motion(alpha.T, alphadot.T)
         weights = self._weights(motion)
@@ -118,10 +118,16 @@ class Momentum(Plain):
         """alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
-        return (weights * (motion.v + motion.carried(xi)) ** 2).sum((0, 1)).reshape(shape)
+        return (
+            (weights * (motion.v + np.stack(np.broadcast_arrays(*carried(motion, *xi)))) ** 2)
+            .sum((0, 1))
+            .reshape(shape)
+        )
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         """A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
-        masses, inertia = self.inertia(exact)
-        A, alpha = chain_connection(self.lengths, inertia, self.frame, masses)
-        return in_units_of(self.length, A), alpha
+        from geomech.symbolic import connections
+
+        masses, inertia = self.inertia(connections.exact)
+        A, alpha = connections.chain_connection(self.lengths, inertia, self.frame, masses)
+        return connections.in_units_of(self.length, A), alpha

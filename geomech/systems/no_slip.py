@@ -13,7 +13,6 @@ import numpy as np
 
 from geomech.systems.base import Plain
 from rft.bodies import Chain
-from rft.symbolic import in_units_of, no_slip_snake
 
 
 @dataclass(frozen=True)
@@ -72,5 +71,7 @@ class NoSlipSnake(Plain):
         return np.where(good[..., None], xi, np.nan) * [self.length, self.length, 1.0]
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        A, alpha = no_slip_snake(self.lengths, self.frame)
-        return in_units_of(self.length, A), alpha
+        from geomech.symbolic import connections
+
+        A, alpha = connections.no_slip_snake(self.lengths, self.frame)
+        return connections.in_units_of(self.length, A), alpha

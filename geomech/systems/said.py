@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 
-from geomech.errors import short
+from geomech.core.errors import short
 from geomech.systems.base import SHAPE_ALONE, Premise, not_so
-from rft.backend import foreign_to
 from rft.bodies import KINDS as BODIES
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
-from rft.loads import QUADRATURE
-from rft.media import LAWS, is_rate_independent
+from rft.laws import LAWS, is_rate_independent
+from rft.laws.records import is_compilable, record
+from rft.quadrature import QUADRATURE
 
 
 class Said:
@@ -64,9 +64,9 @@ class Said:
             if assumed := effect.assumes(self.medium):
                 lines.append(f"     assumes {assumed}")
         off = [name for name in EFFECTS if name not in [e.kind for e in self.effects]]
-        alien = foreign_to(self.medium, self.body, self.effects, self.solver.loads)
+        compilable = is_compilable(record(self.medium, self.solver.loads))
         lines.append("off, not evaluated: " + (", ".join(off) or "none"))
-        return [*lines, f"back end: {self.solver.computed(alien, name_in(LAWS, self.medium))}"]
+        return [*lines, f"back end: {self.solver.computed(compilable, name_in(LAWS, self.medium))}"]
 
     @property
     def because(self) -> str:

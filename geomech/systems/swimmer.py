@@ -5,27 +5,28 @@ from __future__ import annotations
 import dataclasses
 import sys
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import rft
-from geomech.errors import real_array, short
-from geomech.images import Around, around
-from geomech.reconstruct import displacement, poses, repeated
+from geomech.core.errors import real_array, short
+from geomech.core.work import iterate
+from geomech.geometry.images import Around, around
+from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
 from geomech.systems.said import Said
 from geomech.systems.solver import Solver
+from rft.balance.solver import ELEMENTS_TOGETHER
 from rft.bodies import KINDS as BODIES
 from rft.bodies.base import checked_body, halves, is_reversible, pace
-from rft.contact import Model
+from rft.contact import Assembly, assemble
 from rft.effects import KINDS as EFFECTS
-from rft.effects.base import pieced
-from rft.loads import element_load, rule_for
-from rft.media import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
-from rft.media.base import is_central, require_law
-from rft.newton import ELEMENTS_TOGETHER
-from rft.symbolic import viscous_body
+from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
+from rft.laws.base import is_central, require_law
+from rft.laws.records import record, rule_for
+from rft.stepping import Row, State, Stepping
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
@@ -54,7 +55,7 @@ class Swimmer(Said, Plain):
         if not isinstance(self.solver, Solver):
             raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
         try:
-            element_load(self.medium, self.solver.loads)
+            record(self.medium, self.solver.loads)
         except ValueError as error:
             raise ValueError(f"[numerics] {error}") from None
         self._agree()
@@ -63,7 +64,7 @@ class Swimmer(Said, Plain):
             if kinds.count(type(effect)) > 1:
                 raise ValueError(f"[[effects]] {effect.kind} is asked for twice: keep one")
             try:
-                effect.apply(Model.of(self.medium, self.solver.loads))
+                effect.check(self.medium)
             except ValueError as error:
                 raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
 
@@ -152,14 +153,15 @@ class Swimmer(Said, Plain):
     @property
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
-        body = pieced(self.body, self.effects, self.solver.pieces)
-        motion = body.motion(*np.zeros((2, body.joints, 1)))
-        model = rft.effects.folded(self.effects, self.medium, body, self.solver.loads)
-        return sum(len(m.half) for m in model.motions(motion).values())
+        return self._assembly.elements
 
     @property
     def evaluations(self) -> int:
-        return self.elements * rule_for(self.medium, self.solver.loads)[1]
+        return self._assembly.points
+
+    @property
+    def _assembly(self) -> Assembly:
+        return assemble(self.medium, self.body, self.effects, self.solver.loads, self.solver.pieces)
 
     @property
     def costs_as(self) -> str:
@@ -198,10 +200,13 @@ class Swimmer(Said, Plain):
         return {"xi": s.xi.tolist(), **told}
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        from geomech.symbolic import connections
+
         plain = type(self.body) is rft.Chain and self.body.modes is None
         if not (self.linear and plain and type(self.medium) is rft.Viscous):
             raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
-        return viscous_body(self.body, self.medium.ratio)
+        A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
+        return connections.in_units_of(self.body.length, A), alpha
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
         """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
@@ -210,7 +215,13 @@ class Swimmer(Said, Plain):
     def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
         """The gait phase after phase (`rft.time_steps`), unchecked."""
         asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
-        return rft.time_steps(self.medium, self.body, alpha, alphadot, **asked)
+        of = Swimmer.time_steps, self, alpha, alphadot, cycles is None
+
+        def advance(stepping: Stepping, state: State, count: int, with_work: bool) -> tuple[State, list[Row]]:
+            step = partial(stepping.step, with_work=with_work)
+            return iterate(step, state, count, (*of, with_work), Row)
+
+        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **asked)
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is

@@ -1,6 +1,6 @@
 """A table of the connection read from a file: what another run, another program or an experiment found.
 
-Where the file has the odd harmonics of the velocity beside A (`geomech.harmonics`), xi depends on the direction of
+Where the file has the odd harmonics of the velocity beside A (`geomech.geometry.harmonics`), xi depends on the direction of
 alphadot as in the scene it came from, and A is its linear part; else xi = A alphadot.
 """
 
@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech import tables
-from geomech.errors import number, short
-from geomech.field import Field
-from geomech.reconstruct import displacement, trajectory
+from geomech.core.errors import number, short
+from geomech.geometry.field import Field
+from geomech.geometry.reconstruct import displacement, trajectory
+from geomech.geometry.tube import BEYOND, Tube
+from geomech.io import tables
 from geomech.systems.base import Plain
-from geomech.tube import BEYOND, Tube
 
 LENGTHS = (
     "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"

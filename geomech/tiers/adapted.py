@@ -1,13 +1,14 @@
-"""The adapted tier: a connection made for one family of gaits, exact up to its table (`geomech.family`)."""
+"""The adapted tier: a connection made for one family of gaits, exact up to its table (`geomech.geometry.family`)."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from geomech import family
-from geomech.errors import real_array
+from geomech.core.errors import real_array
+from geomech.geometry import family
 from geomech.systems.base import SHAPE_ALONE
 from geomech.tiers.base import Tier, solved
 
@@ -32,8 +33,7 @@ class Adapted(Tier):
         if least == largest:  # rest, and nothing else
             return family.Family(gait, np.zeros(1), np.zeros((1, numerics.phases // 2, 3)))
         count, phases = numerics.curves, numerics.phases // 2
-        velocity = lambda alpha, alphadot: system.run(alpha, alphadot).xi
-        return family.fit(velocity, gait, largest, count, phases, progress, least=least)
+        return family.fit(partial(_run, system), gait, largest, count, phases, progress, least=least)
 
     def solves(self, system, numerics, gait, count, phases) -> int:
         return numerics.curves * solved(system, gait, numerics.phases // 2)
@@ -43,3 +43,7 @@ class Adapted(Tier):
 
     def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
         return table.area(np.asarray(gait.amplitude if amplitudes is None else amplitudes, float))
+
+
+def _run(system, alpha, alphadot) -> np.ndarray:
+    return system.run(alpha, alphadot).xi

@@ -7,15 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.connection import SAMPLES_TOGETHER
-from geomech.curvature import ccf
-from geomech.errors import number, short
-from geomech.field import Field
+from geomech.core.errors import number, short
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
+from geomech.geometry.connection import SAMPLES_TOGETHER
+from geomech.geometry.curvature import ccf
+from geomech.geometry.field import Field
+from geomech.geometry.gait import checked_gait
+from geomech.geometry.two_form import RADII, spanned, spanned_by, two_form
 from geomech.tiers.base import in_groups
 from geomech.tiers.path import Path, zeros
-from geomech.two_form import RADII, spanned, spanned_by, two_form
 from rft import se2
 
 TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one where there is no field
@@ -44,7 +44,7 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
 
 class Area(Path):
     """Shares the connection of the path tier. Of more than two joints it integrates the two-form over one of the surfaces that
-    the loop spans (`geomech.two_form`), and tells how far others are from it."""
+    the loop spans (`geomech.geometry.two_form`), and tells how far others are from it."""
 
     name, label = "area", "area integral of the CCF"
     style = {"color": "#D55E00", "linestyle": "--"}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech.errors import number, real_array
+from geomech.core.errors import number, real_array
 from geomech.gaits import Gait
 from geomech.systems.base import ALL, System
 

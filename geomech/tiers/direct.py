@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.connection import SAMPLES_TOGETHER, Velocity, evaluate
-from geomech.errors import number
+from geomech.core.errors import number
 from geomech.gaits import Gait
-from geomech.gaits.base import checked_gait
-from geomech.reconstruct import displacement
+from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
+from geomech.geometry.gait import checked_gait
+from geomech.geometry.reconstruct import displacement
 from geomech.systems.base import NONE
 from geomech.tiers.base import Tier, in_groups, solved
 

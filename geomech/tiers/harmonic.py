@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech import harmonics
+from geomech.geometry import harmonics
 from geomech.tiers.path import Path, around, axes, fits, path, zeros
 
 HIGHEST = {2: 15, 3: 9}  # by joints, if [numerics] harmonics is left out

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from geomech import connection
-from geomech.connection import Connection, Velocity
-from geomech.field import Field, inside
 from geomech.gaits import Gait
-from geomech.images import images, to_solve
-from geomech.plane import Plane, looked_up
-from geomech.plane import plane as fit_plane
+from geomech.geometry import connection
+from geomech.geometry.connection import Connection, Velocity
+from geomech.geometry.field import Field, inside
+from geomech.geometry.images import images, to_solve
+from geomech.geometry.plane import Plane, looked_up
+from geomech.geometry.plane import plane as fit_plane
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
 
@@ -55,8 +55,8 @@ def around(system, numerics) -> bool:
 
 
 def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
-    """The plane of shape space on which two joints move (`geomech.plane`), looked up in a stored field; ValueError if there is
-    no connection, or if the plane lies outside the field."""
+    """The plane of shape space on which two joints move (`geomech.geometry.plane`), looked up in a stored field; ValueError if
+    there is no connection, or if the plane lies outside the field."""
     tier = Path()
     tier.refuse(system)
     if own := system.stored("connection"):

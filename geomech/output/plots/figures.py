@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.errors import choose
-from geomech.field import Field
+from geomech.core.errors import choose
 from geomech.gaits import Gait
-from geomech.metric import Finsler, Metric
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.plane import Plane, Seen
+from geomech.geometry.two_form import TwoForm
 from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest, vector_field
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.output.plots.styles import (
@@ -22,8 +24,6 @@ from geomech.output.plots.styles import (
     ccf_surface,
     streamlines,
 )
-from geomech.plane import Plane, Seen
-from geomech.two_form import TwoForm
 
 SHADOW = "dashed: the gait, seen along the joints that are held here"
 

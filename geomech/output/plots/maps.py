@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.field import Field
 from geomech.gaits import Gait
-from geomech.metric import Finsler, Metric
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
+from geomech.geometry.metric import Finsler, Metric
 from geomech.output.plots.style import axes_of, figure, quantity, styled
 
 ROUNDING = 1e-13  # of the largest entry of A: a row below it is nothing but rounding

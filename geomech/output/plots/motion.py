@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.field import Field
+from geomech.geometry.field import Field
 from geomech.output.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.study.motion import Motion

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.curvature import ccf
-from geomech.field import Field
-from geomech.minimum_perturbation import minimum_perturbation
+from geomech.geometry.connection import Connection
+from geomech.geometry.curvature import ccf
+from geomech.geometry.field import Field
+from geomech.geometry.minimum_perturbation import minimum_perturbation
+from geomech.geometry.stretch import stretch
 from geomech.optimise import Optimum
 from geomech.optimise.loops import TOUCHING
 from geomech.output.plots.maps import ccf_map, drawable, shape_space
 from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
-from geomech.stretch import stretch
 from geomech.study.bench import Study
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros

@@ -1,4 +1,4 @@
-"""The CCF on shape space redrawn so that equal lengths on paper cost equal effort (`geomech.stretch`)."""
+"""The CCF on shape space redrawn so that equal lengths on paper cost equal effort (`geomech.geometry.stretch`)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.field import Field
 from geomech.gaits import Gait
+from geomech.geometry.field import Field
+from geomech.geometry.stretch import Stretch
 from geomech.output.plots.maps import (
     ANGLES,
     PHASES,
@@ -21,7 +22,6 @@ from geomech.output.plots.maps import (
     unknown,
 )
 from geomech.output.plots.style import axes_of, figure, quantity, styled
-from geomech.stretch import Stretch
 
 
 @styled

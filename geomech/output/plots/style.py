@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from geomech.errors import SceneError
-from geomech.files import whole_file
+from geomech.core.errors import SceneError
+from geomech.io.files import whole_file
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker

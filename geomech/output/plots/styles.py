@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.connection import Connection
-from geomech.field import Field
 from geomech.gaits import Gait
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
 from geomech.output.plots.maps import (
     ANGLES,
     PHASES,

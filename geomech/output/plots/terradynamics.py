@@ -16,7 +16,7 @@ COLOURS = {"x": "C0", "y": "C2", "z": "C3"}
 
 @styled
 def stress_figure(survey, point: tuple[float, float] | None = None):
-    """alpha_z and alpha_x over tilt and direction of motion (Fig. 7(c) and (d)) of an `rft.vertical.Survey`, hatched where the
+    """alpha_z and alpha_x over tilt and direction of motion (Fig. 7(c) and (d)) of an `rft.plates.Survey`, hatched where the
     map pulls. point: (beta, gamma) in degrees to mark."""
     fig, axes = figure(8.6, 3.5, 2)
     for ax, name in zip(axes[0], "zx"):
@@ -29,7 +29,7 @@ def stress_figure(survey, point: tuple[float, float] | None = None):
 
 
 def stress_map(ax, survey, name: str):
-    """alpha_x or alpha_z (``name`` "x" or "z") of an `rft.vertical.Survey` for motion forwards, hatched where it pulls. Colours
+    """alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls. Colours
     are to the scale of both."""
     from cmcrameri import cm
 
@@ -91,7 +91,7 @@ def intrusion_figure(scene, found) -> Any:
 
 
 def draw_stress(ax, faces, above: np.ndarray, unit: float = 1e3) -> None:
-    """The faces below the surface (`rft.spatial.Faces`) on 3-D axes, in the colour of the size of the stress on them, and in
+    """The faces below the surface (`rft.meshes.Faces`) on 3-D axes, in the colour of the size of the stress on them, and in
     grey the triangles ``above`` it (Q, 3, 3)."""
     from cmcrameri import cm
     from matplotlib.cm import ScalarMappable

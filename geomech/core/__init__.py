@@ -1,0 +1,1 @@
+"""What all of geomech rests on, and nothing of its subject."""

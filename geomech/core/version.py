@@ -1,0 +1,3 @@
+"""The version of geomech."""
+
+VERSION = "0.1.0"

@@ -1,0 +1,99 @@
+"""The Python face of values: what they do in a notebook, and to and from files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from geomech.core.face import METHODS
+
+
+class Connection:
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.connection(self)
+
+    def to_xarray(self, *, shapes: Sequence[str] = ()) -> Any:
+        """Return a Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`.
+
+        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.connection(self, shapes)
+
+    @classmethod
+    def load(cls, path: str | Path, sign: str = "", order: str = "") -> Any:
+        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter has
+        (`geomech.io.tables`).
+
+        SceneError, one line, for any other. Its residual is nan where the file does not tell it."""
+        from geomech.io.tables import load
+
+        return load(path, sign, order).connection
+
+
+class Field:
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.field(self)
+
+    def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()) -> Any:
+        """Return a DataArray; of three components it is taken for a CCF, with its units.
+
+        shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.field(self, name, shapes)
+
+
+class Study:
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.study(self)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
+        from geomech.output import datasets
+
+        return datasets.of_study(self)
+
+
+class Displacements:
+    def __repr__(self) -> str:
+        from geomech.core.errors import plain
+        from geomech.output.report import text_table
+
+        return plain(text_table(self.scene.name, self, self.scene))
+
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.displacements(self)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset over tier, amplitude and component, with units and error estimates."""
+        from geomech.output import datasets
+
+        return datasets.displacements(self)
+
+
+class Swept:
+    def _repr_html_(self) -> str:
+        from geomech.output import display
+
+        return display.swept(self)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset over the parameters and component, as the file of `geomech sweep`."""
+        from geomech.output import datasets
+
+        return datasets.swept(self)
+
+
+for _face in (Connection, Field, Study, Displacements, Swept):
+    METHODS[_face.__name__] = {k: v for k, v in vars(_face).items() if isinstance(v, FunctionType | classmethod)}

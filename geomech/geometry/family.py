@@ -1,0 +1,137 @@
+"""A connection adapted to one family of gaits: the scaled copies alpha = centre + a unit(t) of a closed curve.
+
+The uniform least-squares connection spreads its misfit over all directions of alphadot. A family uses one direction at
+each shape, so there a connection can be exact: in the coordinates (a, t) of the family A_t(a, t) is the velocity
+itself, and A_a, across the curves, is free, since no gait of the family ever moves that way. The freedom is spent on
+the frame: turn the body frame back by all the heading the body gains along each curve, and choose A_a = 0. In that frame
+nothing turns, so nothing is left to commute, and
+
+    CCF = dA_t / da    per unit of a and t;
+
+its integral over 0 .. a and one cycle is the displacement, to any order in a. Where the body turns on the whole the frame
+does not close: it is cut at phase 0, and the turn is laid out evenly along the curve. The one approximation left is the
+table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from geomech.core import summary
+from geomech.core.errors import number, real_array
+from geomech.core.work import Map, each
+from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
+from geomech.geometry.gait import Gait, checked_gait
+from geomech.geometry.reconstruct import displacement, turning
+from rft import se2
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Velocities along the curves of a family. gait: its curve. amplitudes: (M,), ascending, 0 among them. xi: (M, N, 3),
+    body velocity with respect to phase at N equally spaced phases. Either side of 0 has a spline of its own: rates that
+    turn round kink the velocity there."""
+
+    gait: Gait
+    amplitudes: np.ndarray
+    xi: np.ndarray
+
+    def __repr__(self) -> str:
+        curves, phases = self.xi.shape[:2]
+        return f"Family({curves} curves of {self.gait!r}, amplitudes {summary.span(self.amplitudes)}, {phases} phases)"
+
+    @cached_property
+    def phases(self) -> np.ndarray:
+        """(N,): of the velocities, rad."""
+        return 2 * np.pi * np.arange(self.xi.shape[1]) / self.xi.shape[1]
+
+    @cached_property
+    def heading(self) -> np.ndarray:
+        """(M, N): of the body in the family's frame, rad; of zero mean over each curve from phase 0 to 2 pi."""
+        return turning(self.xi) + self.xi[..., 2].mean(-1, keepdims=True) * (self.phases - np.pi)
+
+    @cached_property
+    def A(self) -> np.ndarray:
+        """A_t in the family's frame, (M, N, 3), with the net turn spread evenly along each curve."""
+        x, y = se2.rotated(self.heading, self.xi[..., 0], self.xi[..., 1])
+        return np.stack([x, y, np.broadcast_to(self.xi[..., 2].mean(-1, keepdims=True), x.shape)], -1)
+
+    def _sides(self, values: np.ndarray):
+        """(sign, nodes, spline through values (M, ...) in |amplitude|) on each side of 0 that has curves."""
+        from scipy.interpolate import make_interp_spline
+
+        for sign in (-1, 1):
+            nodes = np.flatnonzero(sign * self.amplitudes >= 0)[::sign]
+            if len(nodes) > 1:
+                yield sign, nodes, make_interp_spline(np.abs(self.amplitudes[nodes]), values[nodes], 3)
+
+    def ccf(self) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha (M, N, 2), CCF (M, N, 3)) per rad^2 of shape space for a two-joint family, nan where its curves
+        fold; for maps. Its sign is that of `curvature.ccf`: positive for counter-clockwise loops."""
+        t = self.phases
+        unit, rate = self.gait.shape(t, [1.0])[0] - self.gait.shape(t, [0.0])[0], self.gait.rate(t, [1.0])[0]
+        jacobian = self.amplitudes[:, None] * (unit[:, 0] * rate[:, 1] - unit[:, 1] * rate[:, 0])
+        density = np.zeros_like(self.A)
+        for sign, nodes, spline in self._sides(self.A):
+            density[nodes] = sign * spline.derivative()(np.abs(self.amplitudes[nodes]))
+        small = np.abs(jacobian) < 1e-6 * np.abs(jacobian).max()
+        values = np.where(small[..., None], np.nan, density / np.where(small, 1.0, jacobian)[..., None])
+        return self.gait.shape(t, self.amplitudes), values
+
+    def area(self, amplitudes) -> np.ndarray:
+        """Net pose (..., 3) over a cycle from phase 0, in the body frame at the start: the CCF's integral, of which the
+        table has the exact value at each of its curves. ValueError for amplitudes off the table."""
+        a = real_array("amplitudes", amplitudes)
+        low, high = self.amplitudes[[0, -1]]
+        if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
+            raise ValueError(f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}")
+        moved, start = displacement(self.xi), self.heading[:, 0]
+        integral = np.zeros((*a.shape, 4))
+        for sign, _, spline in self._sides(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1)):
+            integral[sign * a > 0] = spline(np.abs(a[sign * a > 0]))
+        x, y, turn, start = np.moveaxis(integral, -1, 0)
+        return np.stack([*se2.rotated(-start, x, y), turn], -1)
+
+
+def fit(
+    velocity: Velocity,
+    gait: Gait,
+    largest: float,
+    count: int = 24,
+    phases: int = 128,
+    progress: Callable | None = None,
+    *,
+    least: float = 0.0,
+    map: Map = each,
+) -> Family:
+    """The family of ``gait`` up to the amplitude ``largest`` (> 0), from ``count`` curves of ``phases`` shapes; with a
+    negative ``least`` as many down to that, reflected through the centre. largest may then be 0.
+
+    Order 4 in 1/count and spectral in phases where the velocity is smooth; about order 2 in both across kinks.
+    map: of some curves after others, as the builtin.
+    """
+    checked_gait(gait)
+    number("least amplitude", least, -1e300, 0.0)
+    number("largest amplitude", largest, 0.0 if least < 0 else 1e-300, 1e300)
+    number("curves", count, 4, 1e6, whole=True)
+    number("phases", phases, 4, 1e9, whole=True)
+    count, phases = int(count), int(phases)
+    below, above = (x * np.arange(1, count + 1) / count if x else np.zeros(0) for x in (least, largest))
+    amplitudes = np.concatenate([below[::-1], [0.0], above])
+    xi, moving = np.zeros((len(amplitudes), phases, 3)), np.flatnonzero(amplitudes)
+    step = max(1, SAMPLES_TOGETHER // phases)
+    groups = [moving[k : k + step] for k in range(0, len(moving), step)]
+    cycles = [gait.cycle(phases, amplitudes[some]) for some in groups]
+    for some, found in zip(groups, map(partial(_along, velocity), cycles)):
+        xi[some] = found
+        if progress:
+            progress((some[-1] + 1) / (moving[-1] + 1))
+    return Family(gait, amplitudes, xi)
+
+
+def _along(velocity: Velocity, cycles: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    return evaluate(velocity, *cycles)

@@ -1,0 +1,178 @@
+"""Functions on shape space, known on a grid and interpolated by tensor-product splines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from geomech.core import summary
+from geomech.core.errors import number, real_array, short
+from geomech.core.face import Faced
+
+UNTOLD = "length"  # stands for the unit of lengths where nothing says it
+
+
+@dataclass(frozen=True, eq=False)
+class Field(Faced):
+    """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
+    components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
+
+    degree: of the spline through them; interpolation is of order degree + 1 in the spacing where the function is
+    smooth, of order 1 to 2 across the kinks that sticking links leave in a dry medium's connection. unit: of the lengths among
+    the values, "BL" (body lengths) or "m". length: of the body in that unit; None where nothing says it.
+    """
+
+    axes: tuple[np.ndarray, ...]
+    values: np.ndarray
+    degree: int = 3
+    _: KW_ONLY
+    unit: str = UNTOLD
+    length: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "axes", as_axes(self.axes))
+        object.__setattr__(self, "values", real_array("values", self.values))
+        number("degree", self.degree, 0, 5, whole=True)
+        shape = tuple(len(a) for a in self.axes)
+        if self.values.shape[-len(shape) :] != shape:
+            raise ValueError(f"values {self.values.shape} do not end in the grid's shape {shape}")
+        if min(shape) <= self.degree:
+            raise ValueError(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
+
+    def __repr__(self) -> str:
+        lead = self.values.shape[: -self.joints]
+        flat = self.values.reshape(-1, *self.values.shape[len(lead) :])
+        size = summary.spans(self.values) if lead == (3,) else summary.span(self.values)
+        what = "x".join(map(str, lead)) or "one"
+        told = f"values {size}{summary.lengths(**self.size)}"
+        return f"Field({what} components on {summary.grid(self.axes)}{summary.masked(flat)}; {told})"
+
+    @property
+    def size(self) -> dict:
+        """Its unit and length, as arguments of another field."""
+        return {"unit": self.unit, "length": self.length}
+
+    @property
+    def joints(self) -> int:
+        return len(self.axes)
+
+    def _along(self, axis: int):
+        """The one-dimensional spline along a grid axis; that axis comes first."""
+        from scipy.interpolate import make_interp_spline
+
+        rows = np.moveaxis(self.values, axis - self.joints, 0)
+        return make_interp_spline(self.axes[axis], rows, self.degree)
+
+    def derivative(self, axis: int) -> np.ndarray:
+        """d values / d alpha_axis on the grid, of the spline."""
+        number("axis", axis, 0, self.joints - 1, whole=True)
+        if self.masked:
+            return self._between_masks(axis)
+        return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
+
+    @property
+    def masked(self) -> bool:
+        """Whether some grid points are."""
+        return bool(np.isnan(self.values).any())
+
+    def _between_masks(self, axis: int) -> np.ndarray:
+        """`derivative`, of a spline through each run of points without a mask; nan for a run of one."""
+        from scipy.interpolate import make_interp_spline
+
+        x, out = self.axes[axis], np.full(self.values.shape, np.nan)
+        rows, slopes = (np.moveaxis(a, axis - self.joints, -1) for a in (self.values, out))
+        lead = rows.ndim - self.joints
+        for place in np.ndindex(rows.shape[lead:-1]):
+            row, slope = rows[(slice(None),) * lead + place], slopes[(slice(None),) * lead + place]
+            good = np.flatnonzero(np.isfinite(row).all(tuple(range(lead))))
+            for run in np.split(good, np.flatnonzero(np.diff(good) > 1) + 1):
+                if len(run) > 1:
+                    degree = min(self.degree, len(run) - 1)
+                    slope[..., run] = make_interp_spline(x[run], row[..., run], degree, axis=-1).derivative()(x[run])
+        return out
+
+    @cached_property
+    def spline(self) -> Any:
+        self._refuse_masks()
+        return _tensor_spline(self)
+
+    def antiderivative(self, axis: int) -> Any:
+        """The spline whose derivative along ``axis`` is this field's: alpha (..., d) -> (..., components)."""
+        self._refuse_masks()
+        return _tensor_spline(self, integrate=axis)
+
+    def __call__(self, alpha) -> np.ndarray:
+        """Values at shapes alpha (..., d), with the components last: (..., *components). ValueError outside the grid."""
+        return self.spline(self.inside(alpha))
+
+    def _refuse_masks(self) -> None:
+        if self.masked:
+            raise ValueError("a field with singular shapes is not looked up between its points: use the direct tier")
+
+    def inside(self, alpha) -> np.ndarray:
+        """alpha as an array, or ValueError naming the first angle that leaves the grid."""
+        return inside(self.axes, alpha)
+
+
+def as_axes(axes) -> tuple[np.ndarray, ...]:
+    """Axes as arrays of angles, or ValueError."""
+    try:
+        arrays = tuple(real_array("an axis", a) for a in axes)
+    except TypeError:
+        arrays = ()
+    if not arrays or any(a.ndim != 1 for a in arrays):
+        raise ValueError(f"axes must be rows of ascending angles, one for each joint, got {short(axes)}")
+    return arrays
+
+
+def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
+    """alpha (..., d) as an array, or ValueError naming the first angle that leaves the grid of these axes, by one of
+    ``names`` where these are given."""
+    alpha = real_array("alpha", alpha)
+    if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
+        raise ValueError(f"alpha must be finite and of shape (..., {len(axes)}), got {alpha.shape}")
+    for k, axis in enumerate(axes):
+        low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
+        slack = 1e-9 * (axis[-1] - axis[0])
+        if low < axis[0] - slack or high > axis[-1] + slack:
+            worst = low if axis[0] - low > high - axis[-1] else high
+            name = names[k] if names else f"alpha_{k + 1}"
+            raise ValueError(
+                f"{name} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
+                "widen the extent or lower the amplitude"
+            )
+    return alpha
+
+
+def every_second(axis: np.ndarray, first: int) -> np.ndarray:
+    """Indices of every second point of an axis from ``first``, and of both ends: half a grid, to estimate errors by."""
+    return np.unique([0, *range(first, len(axis), 2), len(axis) - 1])
+
+
+def half_of(axes, arrays, degree: int, first: int):
+    """(axes, arrays (..., N_1, ..., N_d), degree) on `every_second` point of each axis; of a lower degree where that
+    leaves too few points for the spline."""
+    picks = [every_second(axis, first) for axis in axes]
+    some = tuple(axis[pick] for axis, pick in zip(axes, picks))
+    return some, [x[(..., *np.ix_(*picks))] for x in arrays], min(degree, min(map(len, picks)) - 1)
+
+
+def _tensor_spline(field: Field, integrate: int | None = None):
+    """Tensor-product spline through a field; along the axis ``integrate``, its antiderivative from the lower end."""
+    from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
+
+    d = field.joints
+    c = np.moveaxis(field.values, range(-d, 0), range(d))
+    knots, degrees = [], []
+    for i, axis in enumerate(field.axes):
+        b = make_interp_spline(axis, np.moveaxis(c, i, 0), field.degree)
+        if i == integrate:
+            b = BSpline(b.t, b.c, b.k).antiderivative()
+        knots.append(b.t)
+        degrees.append(b.k)
+        c = np.moveaxis(b.c[: len(b.t) - b.k - 1], 0, i)
+    return NdBSpline(tuple(knots), np.ascontiguousarray(c), tuple(degrees))

@@ -1,0 +1,113 @@
+"""What a gait is: a closed curve in shape space, run once as the phase t goes from 0 to 2 pi."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.core.errors import is_whole, number, real_array, short
+
+LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
+FASTEST = 1e4  # Hz, as of the effects that have a frequency
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
+
+    amplitude (-): scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
+    reflected through the centre, alpha - centre -> centre - alpha at every phase. All gaits and tiers keep to that.
+    centre (rad): shape angles, the origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
+    start. frequency (Hz): cycles per second, unknown if left out; it makes displacements speeds, and changes them only
+    through effects that have a frequency.
+
+    angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
+    estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
+    """
+
+    amplitude: float = 1.0
+    centre: tuple[float, ...] = ()
+    reverse: bool = False
+    frequency: float | None = None
+    angles = ("centre",)
+    harmonics = 1
+    estimate_is = ""
+
+    def __post_init__(self):
+        number("amplitude", self.amplitude, -LARGEST, LARGEST)
+        object.__setattr__(self, "amplitude", float(self.amplitude))
+        centre = real_array("centre", self.centre)
+        if centre.ndim != 1 or centre.size not in (0, self.joints):
+            raise ValueError(f"centre must have {self.joints} angles, got {short(self.centre)}")
+        if not np.isfinite(centre).all():
+            raise ValueError(f"centre must be finite, got {short(self.centre)}")
+        object.__setattr__(self, "centre", tuple(centre.tolist()))
+        if not isinstance(self.reverse, (bool, np.bool_)):
+            raise ValueError(f"reverse must be True or False, got {short(self.reverse)}")
+        if self.frequency is not None:
+            number("frequency", self.frequency, 0, FASTEST)
+            object.__setattr__(self, "frequency", float(self.frequency))
+
+    @property
+    def joints(self) -> int:
+        return 2
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(joints,): the shape about which the gait moves, which it keeps at amplitude 0."""
+        return np.array(self.centre or (0.0,) * self.joints)
+
+    @property
+    def amplitude_label(self) -> str:
+        """For an axis of amplitudes."""
+        return f"amplitude of the {type(self).__name__.lower()} (scale)"
+
+    def unit(self, t) -> np.ndarray:
+        raise TypeError(f"{type(self).__name__} gives no curve: define unit(t)")
+
+    def unit_rate(self, t) -> np.ndarray:
+        raise TypeError(f"{type(self).__name__} gives no curve: define unit_rate(t)")
+
+    def shape(self, t, amplitudes=None) -> np.ndarray:
+        """alpha at phases t (T...), for amplitudes (B...) or the gait's own: (B..., T..., joints), rad."""
+        return self.middle + self._times(amplitudes, self.unit((-1.0 if self.reverse else 1.0) * real_array("t", t)))
+
+    def largest(self, amplitudes=None) -> float:
+        """The largest of its shape variables in size, at 32 phases, for amplitudes (B...) or the gait's own."""
+        return float(np.abs(self.shape(np.linspace(0.0, 2 * np.pi, 32), amplitudes)).max(initial=0.0))
+
+    def rate(self, t, amplitudes=None) -> np.ndarray:
+        """d alpha / dt, shaped like `shape`."""
+        sign = -1.0 if self.reverse else 1.0
+        return self._times(amplitudes, sign * self.unit_rate(sign * real_array("t", t)))
+
+    def _times(self, amplitudes, curve):
+        a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
+        if not (np.abs(a) <= LARGEST).all():
+            raise ValueError(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
+        return a[(..., *([None] * curve.ndim))] * curve
+
+    def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
+        """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
+        least = max(4, 2 * self.harmonics + 1)
+        if not (is_whole(phases) and phases >= least):
+            raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {short(phases)}")
+        t = 2 * np.pi * np.arange(phases) / phases
+        return self.shape(t, amplitudes), self.rate(t, amplitudes)
+
+
+def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
+    """values as a float array of that many dimensions, or ValueError naming it."""
+    array = real_array(name, values)
+    if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
+        raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {short(values)}")
+    return array
+
+
+def checked_gait(gait) -> Gait:
+    """gait, or ValueError if it is nothing of the kind."""
+    if isinstance(gait, type) or not (hasattr(gait, "joints") and hasattr(gait, "cycle")):
+        raise ValueError(f"gait must be a gait such as Circle(amplitude=0.5), got {short(gait)}")
+    return gait

@@ -1,0 +1,158 @@
+"""Beyond the connection: the odd harmonics of xi in the direction of alphadot, of which A is the first.
+
+In a rate-independent medium xi(alpha, alphadot) = |alphadot| f(alpha, beta), beta the direction of alphadot in the
+plane of two joint rates, f odd under beta -> beta + pi. Its Fourier series has odd harmonics only,
+
+    f = sum over k = 1, 3, 5 ... of a_k cos(k beta) + b_k sin(k beta),
+
+and (a_1, b_1) is the uniform least-squares connection. Kept on a grid up to some k they give the velocity at the cost
+of a look-up. Links that stick put kinks in f, so the coefficients fall off like 1/k^2 there.
+
+With three and more joints directions are those of a sphere. The odd spherical harmonics up to degree k on it are the
+homogeneous polynomials of degree k, of which there are (k + d - 1 choose d - 1): products of powers, each times the root of its
+multinomial coefficient, are the basis here, fitted by least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import combinations
+from math import comb, factorial, prod
+
+import numpy as np
+
+from geomech.core import summary
+from geomech.core.errors import is_whole, number, real_array, short
+from geomech.core.work import Map, each
+from geomech.geometry.connection import Velocity, check_knobs, directions, sampled
+from geomech.geometry.field import Field, as_axes, half_of
+
+VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
+
+
+@dataclass(frozen=True, eq=False)
+class Harmonics:
+    """Coefficients on a grid. coefficients: (3, 2 K, N_1, N_2), a_1, b_1, a_3, b_3 ... of each component of xi, in the
+    velocity's units and frame; of more joints (3, terms, N_1, ..., N_d), of `powers`. residual: (3, N_1, ..., N_d), rms over
+    directions of what the series leaves."""
+
+    axes: tuple[np.ndarray, ...]
+    coefficients: np.ndarray
+    residual: np.ndarray
+    degree: int = 3
+
+    def __repr__(self) -> str:
+        speed = np.sqrt((self.coefficients**2).sum(1) / 2)
+        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.left(self.residual, speed)})"
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.axes, self.coefficients, self.degree)
+
+    @property
+    def highest(self) -> int:
+        count, d = self.coefficients.shape[1], len(self.axes)
+        return count - 1 if d == 2 else next(k for k in range(1, count + 1) if terms(d, k) == count)
+
+    def half(self, first: int) -> Harmonics:
+        """As `Connection.half`."""
+        axes, arrays, degree = half_of(self.axes, (self.coefficients, self.residual), self.degree, first)
+        return Harmonics(axes, *arrays, degree)
+
+    def velocity(self, alpha, alphadot) -> np.ndarray:
+        """xi (..., 3) at alpha, alphadot (..., d); ValueError outside the grid."""
+        alpha, alphadot = np.broadcast_arrays(self.field.inside(alpha), real_array("alphadot", alphadot))
+        points = [x.reshape(-1, len(self.axes)) for x in (alpha, alphadot)]
+        step = max(1, VALUES_TOGETHER // self.coefficients.shape[1])
+        parts = [self._at(*(x[k : k + step] for x in points)) for k in range(0, len(points[0]), step)]
+        return np.concatenate(parts or [np.zeros((0, 3))]).reshape(*alpha.shape[:-1], 3)
+
+    def _at(self, alpha, alphadot) -> np.ndarray:
+        speed = np.linalg.norm(alphadot, axis=-1)
+        unit = alphadot / np.where(speed > 0, speed, 1.0)[..., None]
+        return np.einsum("...ij,...j->...i", self.field(alpha), basis(unit, self.highest)) * speed[..., None]
+
+
+def terms(joints: int, highest: int) -> int:
+    """Coefficients of the odd harmonics up to ``highest`` of so many joint rates."""
+    return comb(highest + joints - 1, joints - 1)
+
+
+@lru_cache(maxsize=16)
+def powers(joints: int, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """(powers (terms, d) of the products, the roots (terms,) of their multinomial coefficients)."""
+    bars = np.array(list(combinations(range(degree + joints - 1), joints - 1)))
+    ends = np.full((len(bars), 1), degree + joints - 1)
+    found = np.diff(np.concatenate([-np.ones_like(ends), bars, ends], 1)) - 1
+    return found, np.array([np.sqrt(factorial(degree) / prod(map(factorial, map(int, row)))) for row in found])
+
+
+def basis(unit: np.ndarray, highest: int) -> np.ndarray:
+    """At directions (..., d): (..., terms)."""
+    if unit.shape[-1] == 2:
+        return _basis(np.arctan2(unit[..., 1], unit[..., 0]), highest)
+    each, roots = powers(unit.shape[-1], highest)
+    ladder = np.cumprod(np.concatenate([np.ones((1, *unit.shape)), np.repeat(unit[None], highest, 0)]), 0)
+    found = (
+        roots * ladder[each[:, 0], ..., 0].T
+        if unit.ndim == 1
+        else roots * np.moveaxis(ladder[each[:, 0], ..., 0], 0, -1)
+    )
+    for k in range(1, unit.shape[-1]):
+        found = found * np.moveaxis(ladder[each[:, k], ..., k], 0, -1)
+    return found
+
+
+def _basis(beta: np.ndarray, highest: int) -> np.ndarray:
+    """cos beta, sin beta, cos 3 beta, sin 3 beta ... up to ``highest``: (..., highest + 1)."""
+    k = np.arange(1, highest + 1, 2)
+    waves = np.exp(1j * k * np.asarray(beta)[..., None])
+    return np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
+
+
+def fit(
+    velocity: Velocity,
+    axes,
+    count: int = 24,
+    degree: int = 3,
+    progress: Callable | None = None,
+    mirror: bool = False,
+    *,
+    highest: int = 9,
+    reversible: bool = False,
+    map: Map = each,
+) -> Harmonics:
+    """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their order,
+    as in `connection.fit`.
+
+    The series through ``count`` directions is exact up to the harmonic ``count`` - 1, and those above fold back onto
+    it (k onto 2 count - k); so keep ``highest`` well below. Of more than two joints a fit takes as many directions as it has
+    `terms`, and better twice that. ValueError if ``highest`` is even or asks for more directions.
+    """
+    number("directions", count, 2, 1e6, whole=True)
+    if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
+        raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {short(highest)}")
+    axes = as_axes(axes)
+    check_knobs(degree, progress)
+    d = len(axes)
+    if d < 2:
+        raise ValueError("harmonics are those of two joint rates or more, got 1 joint")
+    if d > 2 and count < terms(d, highest):
+        raise ValueError(
+            f"harmonics of {d} joints up to {highest} take {terms(d, highest)} directions or more, got {count}"
+        )
+    unit = directions(d, count)
+    at = basis(unit, highest)
+    inverse = at.T * (2.0 / count) if d == 2 else np.linalg.pinv(at)
+    unseen = (
+        1.0 if d == 2 else count / max(1, count - at.shape[1])
+    )  # what the fit leaves of directions that it has not seen
+
+    def keep(xi):
+        coefficients = np.einsum("jc,sci->ijs", inverse, xi)
+        return coefficients, unseen * np.sqrt(((xi - np.einsum("cj,ijs->sci", at, coefficients)) ** 2).mean(1)).T
+
+    found = sampled(velocity, axes, unit, keep, degree, progress, mirror, None, reversible, map)
+    return Harmonics(axes, *found, degree)

@@ -1,0 +1,165 @@
+"""The metric of shape space: what it costs to change shape, by the power that the medium takes.
+
+In a linear medium power is quadratic in the rate of shape, P = alphadot^T M(alpha) alphadot with the dissipation metric M,
+and the length of a path, the integral of sqrt(P), is what its fastest run at given mean power takes (R. L. Hatton and
+H. Choset, Eur. Phys. J. Special Topics 224, 3141 (2015)). In a dry one power is homogeneous of degree one in alphadot and
+does not tell slow from fast: F = P(alpha, alphadot) is a Finsler norm, and the length of a path is the work along it. Either
+way
+
+    length = integral of F(alpha, alphadot) dt,     F(alpha, c alphadot) = |c| F(alpha, alphadot),
+
+of which the gait's pacing is no part. F is in sqrt(drag length / time) x time, or drag length, per rad, drag being the whole
+body's along itself (`rft.work_done`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from geomech.core.errors import is_whole, real_array, short
+from geomech.core.work import Map, each
+from geomech.geometry.connection import SAMPLES_TOGETHER, directions
+from geomech.geometry.field import Field, as_axes
+from geomech.geometry.gait import Gait, checked_gait
+
+Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Metric:
+    """M on a grid. M: (d, d, N_1, ..., N_d), symmetric. degree: of the interpolating spline."""
+
+    axes: tuple[np.ndarray, ...]
+    M: np.ndarray
+    degree: int = 3
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.axes, self.M, self.degree)
+
+    def norm(self, alpha, alphadot) -> np.ndarray:
+        """F (...,) at alpha, alphadot (..., d); ValueError outside the grid."""
+        alphadot = real_array("alphadot", alphadot)
+        square = np.einsum("...i,...ij,...j->...", alphadot, self.field(alpha), alphadot)
+        return np.sqrt(np.maximum(square, 0.0))
+
+    def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
+        """(..., count, 2): alphadot of unit cost in every direction of the plane of two joints; an ellipse."""
+        return _indicatrix(self, alpha, count)
+
+
+@dataclass(frozen=True, eq=False)
+class Finsler:
+    """F on a grid, for two joints, by its even harmonics in the direction of alphadot. coefficients: (K + 1, N_1, N_2),
+    the mean, then cosine and sine of 2 beta, 4 beta ... K beta. residual: (N_1, N_2), rms over directions of what is left."""
+
+    axes: tuple[np.ndarray, ...]
+    coefficients: np.ndarray
+    residual: np.ndarray
+    degree: int = 3
+
+    @cached_property
+    def field(self) -> Field:
+        return Field(self.axes, self.coefficients, self.degree)
+
+    def norm(self, alpha, alphadot) -> np.ndarray:
+        """F (...,) at alpha, alphadot (..., 2); ValueError outside the grid."""
+        alphadot = real_array("alphadot", alphadot)
+        basis = _even(np.arctan2(alphadot[..., 1], alphadot[..., 0]), len(self.coefficients) - 1)
+        return np.maximum((self.field(alpha) * basis).sum(-1), 0.0) * np.hypot(alphadot[..., 0], alphadot[..., 1])
+
+    def indicatrix(self, alpha, count: int = 64) -> np.ndarray:
+        """(..., count, 2): alphadot of unit cost in every direction."""
+        return _indicatrix(self, alpha, count)
+
+
+def _indicatrix(metric, alpha, count: int) -> np.ndarray:
+    beta = 2 * np.pi * np.arange(count) / count
+    unit = np.stack([np.cos(beta), np.sin(beta)], -1)
+    alpha = real_array("alpha", alpha)[..., None, :]
+    size = metric.norm(np.broadcast_to(alpha, (*alpha.shape[:-2], count, 2)), unit)
+    return unit / np.where(size > 0, size, np.nan)[..., None]
+
+
+def _even(beta, highest: int) -> np.ndarray:
+    """1, cos 2 beta, sin 2 beta, ... up to ``highest``, (..., highest + 1)."""
+    k = np.arange(2, highest + 1, 2)
+    waves = np.exp(1j * k * np.asarray(beta)[..., None])
+    pairs = np.stack([waves.real, waves.imag], -1).reshape(*np.shape(beta), -1)
+    return np.concatenate([np.ones((*np.shape(beta), 1)), pairs], -1)
+
+
+def fit(power: Power, axes, degree: int = 3, progress: Callable | None = None, map: Map = each) -> Metric:
+    """M on the grid spanned by ``axes`` from powers (...,) that are quadratic in alphadot, exactly, by d (d + 1) / 2 of
+    them at each shape."""
+    axes = as_axes(axes)
+    d = len(axes)
+    i, j = np.triu_indices(d)
+    unit = np.eye(d)[i] + np.where(i == j, 0.0, 1.0)[:, None] * np.eye(d)[j]
+    P = _sampled(power, axes, unit, progress, map)  # (C, N...)
+    M = np.empty((d, d, *P.shape[1:]))
+    for c in np.flatnonzero(i == j):
+        M[i[c], i[c]] = P[c]
+    for c in np.flatnonzero(i != j):
+        M[i[c], j[c]] = M[j[c], i[c]] = (P[c] - M[i[c], i[c]] - M[j[c], j[c]]) / 2
+    return Metric(axes, M, degree)
+
+
+def fit_norm(
+    norm: Power,
+    axes,
+    count: int = 24,
+    degree: int = 3,
+    progress: Callable | None = None,
+    *,
+    highest: int = 14,
+    map: Map = each,
+) -> Finsler:
+    """Even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
+    if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
+        raise ValueError(f"harmonics must be even and below the number of directions ({count}), got {short(highest)}")
+    axes = as_axes(axes)
+    if len(axes) != 2:
+        raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
+    unit = directions(2, count)
+    return of_samples(_sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest)
+
+
+def of_samples(F: np.ndarray, axes, unit: np.ndarray, degree: int = 3, *, highest: int = 14) -> Finsler:
+    """As `fit_norm`, of norms F (C, N_1, N_2) of the rates ``unit`` (C, 2) that are known already."""
+    basis = _even(np.arctan2(unit[:, 1], unit[:, 0]), highest)
+    onto = np.linalg.pinv(basis)
+    coefficients = np.tensordot(onto, F, 1)
+    residual = np.sqrt(((F - np.tensordot(basis, coefficients, 1)) ** 2).mean(0))
+    return Finsler(axes, coefficients, residual, degree)
+
+
+def _sampled(power: Power, axes, unit: np.ndarray, progress: Callable | None, map: Map) -> np.ndarray:
+    """(C, N_1, ..., N_d): powers at every shape for the rates ``unit`` (C, d)."""
+    alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 1, len(axes))
+    out, step = np.empty((len(unit), len(alpha))), max(1, SAMPLES_TOGETHER // len(unit))
+    parts = [slice(k, min(k + step, len(alpha))) for k in range(0, len(alpha), step)]
+    for here, found in zip(parts, map(partial(_powers, (power, unit)), [alpha[x] for x in parts])):
+        out[:, here] = found.T
+        if progress:
+            progress(here.stop / len(alpha))
+    return out.reshape(len(unit), *map(len, axes))
+
+
+def _powers(asked: tuple, alpha: np.ndarray) -> np.ndarray:
+    """Of (power, unit) at some shapes."""
+    power, unit = asked
+    found = np.asarray(power(alpha, unit))
+    if found.shape != (len(alpha), len(unit)) or not np.isfinite(found).all():
+        raise ValueError(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates, got {found.shape}")
+    return found
+
+
+def path_length(norm: Power, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
+    """Length of a gait's cycle, for amplitudes (...,) or the gait's own. norm: F(alpha, alphadot) -> (...,)."""
+    alpha, alphadot = checked_gait(gait).cycle(phases, amplitudes)
+    return np.asarray(norm(alpha, alphadot)).mean(-1) * 2 * np.pi

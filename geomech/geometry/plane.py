@@ -1,0 +1,128 @@
+"""A plane of shape space: two joints move, the others are held. The CCF of the two is the component of the two-form there, of
+bodies with any number of joints and without a field of them all: its derivatives are along the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from geomech.core.errors import is_whole, real_array, short
+from geomech.core.work import Map, each
+from geomech.geometry.connection import Connection, Velocity, as_axes, directions, least_squares, sampled_on
+from geomech.geometry.curvature import ccf, error
+from geomech.geometry.field import UNTOLD, Field
+from geomech.geometry.gait import Gait
+from geomech.geometry.images import mirrored
+from geomech.geometry.tube import Tube
+
+IN_PLANE = 1e-9  # rad that the joints which are held may move
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """pair: the joints that move, from 0, the first on the first axis. at: (d,), a shape that it goes through, rad. connection:
+    of these two joints, columns of the least-squares A of all d."""
+
+    pair: tuple[int, int]
+    at: tuple[float, ...]
+    connection: Connection
+
+    @cached_property
+    def ccf(self) -> Field:
+        """CCF_ij, values (3, N, N)."""
+        return ccf(self.connection)
+
+    @cached_property
+    def error(self) -> Field:
+        """Of `ccf`, as `curvature.error` has it."""
+        return error(self.connection)
+
+    @property
+    def held(self) -> list[int]:
+        """The joints that do not move, from 0."""
+        return [k for k in range(len(self.at)) if k not in self.pair]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A gait of many joints as it is seen on a plane, along the joints that are held there."""
+
+    gait: Gait
+    plane: Plane
+
+    def shape(self, t, amplitudes=None) -> np.ndarray:
+        """(..., 2), as `Gait.shape`."""
+        return self.gait.shape(t, amplitudes)[..., list(self.plane.pair)]
+
+    @property
+    def lies(self) -> bool:
+        """Whether it moves on the plane itself."""
+        off = (
+            self.gait.shape(np.linspace(0.0, 2 * np.pi, 64))[..., self.plane.held]
+            - np.array(self.plane.at)[self.plane.held]
+        )
+        return bool(np.abs(off).max(initial=0.0) <= IN_PLANE)
+
+
+def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
+    """pair as two different joints from 0; ValueError, which counts them from 1, for any other."""
+    if len(pair) != 2 or not all(is_whole(k) and 0 <= k < joints for k in pair) or pair[0] == pair[1]:
+        raise ValueError(f"a pair must be two of the joints 1 to {joints}, got {', '.join(short(k + 1) for k in pair)}")
+    return int(pair[0]), int(pair[1])
+
+
+def plane(
+    velocity: Velocity,
+    axes,
+    pair: tuple[int, int],
+    at,
+    count: int,
+    degree: int = 3,
+    progress: Callable | None = None,
+    mirror: bool = False,
+    singularity: Callable | None = None,
+    *,
+    unit: str = UNTOLD,
+    length: float | None = None,
+    map: Map = each,
+) -> Plane:
+    """The plane of two joints, ``axes`` of each, through the shape ``at`` (d,). Other arguments as in `connection.fit`, whose A
+    it has: fitted over all directions of alphadot, the others' too."""
+    at, axes = real_array("at", at), as_axes(axes)
+    if at.ndim != 1 or not np.isfinite(at).all():
+        raise ValueError(f"at must be one finite shape, got {short(at.tolist())}")
+    pair = checked_pair(pair, len(at))
+    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
+    alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
+    rates = directions(len(at), count)
+    alike = mirrored(alpha.reshape(-1, len(at)), count) if mirror else ()
+    A, residual, speed = sampled_on(velocity, alpha, rates, least_squares(rates), progress, alike, singularity, map)
+    found = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
+    return Plane(pair, tuple(at.tolist()), found)
+
+
+def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
+    """The plane in a field of all joints, on its axes, interpolated between its points; near one gait nan where the data do not
+    reach. ValueError off the field, or for a plane that meets nothing of it."""
+    at, pair = fitted.field.inside(real_array("at", at)), checked_pair(pair, len(fitted.axes))
+    axes = tuple(fitted.axes[k] for k in pair)
+    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
+    alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
+    A = fitted.known.reached(alpha) if isinstance(fitted, Tube) else fitted(alpha)
+    if np.isnan(A).all():
+        held = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
+        there = ",".join(f"{x:.3f}" for x in fitted.known.loop.shape(np.array(0.0)))
+        raise ValueError(
+            f"the data do not reach the plane of {held}: slice it at a shape of the mean gait, --slice {there}"
+        )
+    A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
+    told = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit
+    left = [
+        Field(fitted.axes, x, 1) if told else lambda a: np.full(a.shape, np.nan)
+        for x in (fitted.residual, fitted.speed)
+    ]
+    residual, speed = (np.moveaxis(f(alpha)[..., :3], -1, 0) for f in left)
+    return Plane(pair, tuple(at.tolist()), Connection(axes, A, residual, speed, fitted.degree, **fitted.size))

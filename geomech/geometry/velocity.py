@@ -1,0 +1,116 @@
+"""What a local connection asks of a velocity, tried at a few shapes and rates before thousands are asked for."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+
+from geomech.core.errors import VelocityWarning, real_array, short
+
+Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+SHAPES = 11  # tried, scattered over the grid; more than a body of a field has joints, so that none is taken for one
+RATES = 13  # at each
+OFF = 1e-3  # of the velocity's rms: more than solvers and roundings leave
+SAME = 1e-12  # of it: what does not depend on the shape at all
+
+
+def tried(velocity: Callable, axes, masked: bool) -> Callable:
+    """The velocity, as `geomech.geometry.connection.evaluate` takes it. One that is written for a single shape is asked for
+    one at a time. VelocityWarning, one for all that it lacks, if it is not odd or not homogeneous in alphadot, or ignores
+    alpha.
+    """
+    rng = np.random.default_rng(0)
+    alpha = np.stack([rng.uniform(a[0], a[-1], SHAPES) for a in axes], -1)[:, None]
+    rates = rng.normal(size=(RATES, len(axes)))
+    velocity = in_batches(velocity, alpha, rates)
+    ask = lambda rates: np.broadcast_to(np.asarray(velocity(alpha, rates), float), (SHAPES, RATES, 3))
+    try:
+        xi, back, twice = ask(rates), ask(-rates), ask(2 * rates)
+    except ValueError:  # of another shape, or refused at these shapes: told in full where the grid is asked for
+        return velocity
+    good = np.isfinite(xi + back + twice).all(-1)
+    if (masked or good.all()) and good.any() and (scale := np.sqrt((xi[good] ** 2).mean())) > 0:
+        lacks = _lacking(xi, back, twice, good, scale)
+        if lacks:
+            warnings.warn(f"this velocity {'; it '.join(lacks)}", VelocityWarning, stacklevel=3)
+    return velocity
+
+
+def _lacking(xi, back, twice, good, scale) -> list[str]:
+    off = lambda difference: np.abs(difference[good]).max() / scale
+    lacks = []
+    if (by := off(back + xi)) > OFF:
+        lacks.append(
+            f"is not odd in alphadot (off by {by:.2g} of its size): a connection tells one direction of each two"
+        )
+    if (by := off(twice - 2 * xi) / 2) > OFF:
+        lacks.append(f"is not homogeneous in alphadot (off by {by:.2g}): a connection holds at |alphadot| = 1 only")
+    if np.ptp(np.where(good[..., None], xi, xi[good][0]), axis=0).max() <= SAME * scale and good.all():
+        lacks.append("ignores alpha: is it asked for at the shape that is passed?")
+    return lacks
+
+
+def in_batches(velocity: Callable, alpha, rates) -> Callable:
+    """The velocity if it takes shapes (S, 1, d) and rates (C, d) at once, else, if it takes a single shape and rate, one that
+    asks for each in turn."""
+    try:
+        if fits(velocity(alpha, rates), (*alpha.shape[:-2], *rates.shape[:-1], 3)):
+            return velocity
+    except (TypeError, ValueError, IndexError):
+        pass
+    each = one_by_one(velocity)
+    try:
+        each(alpha, rates)
+    except (TypeError, ValueError, IndexError):
+        return velocity  # says itself what is wrong
+    return each
+
+
+def fits(xi, shape) -> bool:
+    """Whether xi broadcasts to velocities of that shape, (..., 3)."""
+    found = np.shape(xi)
+    return (
+        found[-1:] == (3,) and len(found) <= len(shape) and all(n in (1, m) for n, m in zip(found[::-1], shape[::-1]))
+    )
+
+
+def one_by_one(velocity: Callable) -> Callable:
+    """A velocity of a single shape (d,) and rate (d,) as one of many."""
+
+    def each(alpha, alphadot):
+        alpha, alphadot = np.broadcast_arrays(alpha, alphadot)
+        pairs = zip(alpha.reshape(-1, alpha.shape[-1]), alphadot.reshape(-1, alphadot.shape[-1]))
+        xi = [np.asarray(velocity(a.copy(), r.copy()), float) for a, r in pairs]
+        if any(x.shape != (3,) for x in xi):
+            raise ValueError("velocity must return (3,) for one shape and rate")
+        return np.array(xi).reshape(*alpha.shape[:-1], 3)
+
+    return each
+
+
+class Telling:
+    """A velocity that tells more than xi, wherever it is asked: both(alpha, alphadot) gives xi and more, which is heard(more)
+    in the order of the shapes."""
+
+    def __call__(self, alpha, alphadot) -> np.ndarray:
+        return self.both(alpha, alphadot)[0]
+
+
+def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.ndarray:
+    """velocity(alpha, alphadot), or ValueError if that is not of shape (..., 3), and does not broadcast to it, or not finite
+    unless ``masked``."""
+    shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
+    if not callable(velocity):
+        raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
+    xi = real_array("what velocity returns", velocity(alpha, alphadot))
+    if xi.shape != shape and fits(xi, shape):
+        xi = np.broadcast_to(xi, shape).copy()
+    if xi.shape != shape:
+        raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
+    if not masked and not np.isfinite(xi).all():
+        where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
+        raise ValueError(f"velocity is not finite at alpha = {where}")
+    return xi

@@ -1,0 +1,249 @@
+"""Files on disk: read within limits, written whole or not at all, never over an input, and nothing left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import os
+import secrets
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from geomech.core.errors import SceneError, plain
+
+try:
+    import fcntl
+except ImportError:  # no such locks on Windows: what a kill leaves there is left
+    fcntl = None
+
+MARK = "owner"  # in a folder of ours, locked while its owner lives
+NEW = "new"  # beside the mark: what is being written
+ABANDONED = 60.0  # seconds after which a folder of ours without a mark has no owner who is about to set one
+ROOM = 24  # bytes of a name left for what is added to it
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+def note(text: str) -> None:
+    """A line on standard error that is no failure."""
+    print("note: " + plain(" ".join(text.split())), file=sys.stderr)
+
+
+def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
+    """The bytes of an ordinary file of at most ``largest``; OSError or ValueError otherwise, before anything is read. pipes:
+    or of a pipe that somebody writes to."""
+    path = Path(path)
+    if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
+        raise OSError(errno.EINVAL, "it is no ordinary file")
+    with open(path, "rb", opener=_opened if path.is_fifo() else None) as file:
+        if os.fstat(file.fileno()).st_size > largest or len(raw := file.read(largest + 1)) > largest:
+            raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB")
+        if not raw and path.is_fifo():
+            raise OSError(errno.EPIPE, "nothing came through this pipe")
+    return raw
+
+
+def _opened(path: str, flags: int) -> int:
+    """A pipe; nobody waits for one that nobody writes to."""
+    pipe = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(pipe, True)
+    return pipe
+
+
+def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
+    """The text of an ordinary file, or a pipe, in UTF-8, as `read`, line ends made equal."""
+    return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def why(error: Exception) -> str:
+    """What an error of the file system says."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def hidden(path: Path, ending: str) -> Path:
+    """A hidden name beside ``path`` that is its own; short where the file system would not take the long one."""
+    name = f".{path.name}{ending}"
+    if len(os.fsencode(name)) + ROOM > _longest_name(path.parent):
+        name = f".geomech-{_key(Path(path.name))}{ending}"
+    return path.with_name(name)
+
+
+def _longest_name(folder: Path) -> int:
+    try:
+        return os.pathconf(folder, "PC_NAME_MAX")
+    except (AttributeError, OSError, ValueError):
+        return 255
+
+
+def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """SceneError if an output is the same file as an input, by whatever name or link."""
+    inputs = list(inputs)
+    for output in outputs:
+        for source in inputs:
+            with contextlib.suppress(OSError):
+                if os.path.samefile(output, source):
+                    raise SceneError(f"cannot write {output}: it is an input, {source}; choose another output")
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """A path to write to, of the same name; moved to ``path`` on success, removed on failure. SceneError if nothing can
+    be written there."""
+    refused = lambda error: SceneError(f"cannot write {path}: {why(error)}; choose another output")
+    try:
+        target = Path(path).resolve()
+        if target.exists() and not target.is_file():
+            raise OSError("it is no ordinary file")
+        shown = target.name if target.parent.name == NEW else path
+    except (OSError, RuntimeError, ValueError) as error:
+        raise refused(error) from None
+    with _Workshop(target, target.parent, refused) as new:
+        try:
+            yield new / target.name
+            os.replace(new / target.name, target)
+        except OSError as error:
+            raise _unwritten(shown, error) from None
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+    """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
+    SceneError if that cannot be, or if one would replace an input."""
+    refused = lambda error: SceneError(f"cannot write the folder {path}: {why(error)}; choose another with -o")
+    try:
+        target = Path(path).resolve()
+        if os.path.lexists(target) and not target.is_dir():
+            raise OSError("it is not a folder")
+        there = next(p for p in (target, *target.parents) if p.exists())
+    except (OSError, RuntimeError, ValueError) as error:
+        raise refused(error) from None
+    with _Workshop(target, there, refused) as new:
+        try:
+            yield new
+            _move(sorted(new.iterdir()), target, Path(path), inputs)
+        except OSError as error:
+            raise _unwritten(f"the folder {path}", error) from None
+
+
+def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -> None:
+    replaced = [file.name for file in files if os.path.lexists(target / file.name)]
+    if blocked := [name for name in replaced if not (target / name).is_file()]:
+        raise SceneError(f"cannot write {path / blocked[0]}: it is no ordinary file; choose another with -o")
+    refuse_inputs([path / name for name in replaced], inputs)
+    target.mkdir(parents=True, exist_ok=True)
+    for file in files:
+        file.replace(target / file.name)
+    if replaced:
+        note(f"replaced in {path}: {', '.join(replaced)}")
+
+
+def _unwritten(what: object, error: OSError) -> Exception:
+    """A full disk, with the name of what does not fit; other errors as they are."""
+    if error.errno not in FULL:
+        return error
+    return SceneError(f"cannot write {what}: {error.strerror}; make room, or choose another output")
+
+
+class _Workshop:
+    """A hidden folder in ``there`` in which what is meant for ``target`` is made; gone at the end.
+
+    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to the
+    same target knows it for a stray, and sweeps it. The name is chosen before anything is there, and a signal may come at
+    any moment: then the folder goes all the same. refused: what to raise for an error of the file system at the start.
+    """
+
+    def __init__(self, target: Path, there: Path, refused: Callable[[Exception], Exception]):
+        self.target, self.there, self.refused = target, there, refused
+        self.folder = there / f"{_prefix(target)}{secrets.token_hex(8)}"
+        self.mark = None
+
+    def __enter__(self) -> Path:
+        try:
+            sweep_strays(self.target, self.there)
+            self.folder.mkdir(0o700)
+            self.mark = (self.folder / MARK).open("wb", buffering=0)
+            if _locked(self.mark):
+                self.mark.write(_words(self.target))
+            (self.folder / NEW).mkdir()
+        except BaseException as error:
+            self.__exit__()
+            if isinstance(error, (OSError, ValueError)):
+                raise self.refused(error) from None
+            raise
+        return self.folder / NEW
+
+    def __exit__(self, *_) -> None:
+        try:
+            _discard(self.folder)
+        except BaseException:  # a signal in the middle
+            _discard(self.folder)
+            raise
+        finally:
+            if self.mark:
+                self.mark.close()
+            if self.folder.is_dir():  # too many files are open: now there is one fewer, which is enough
+                _discard_plainly(self.folder)
+
+
+def _key(target: Path) -> str:
+    return hashlib.sha256(os.fsencode(target)).hexdigest()[:16]
+
+
+def _prefix(target: Path) -> str:
+    return f".geomech-{_key(target)}-"
+
+
+def _words(target: Path) -> bytes:
+    return b"geomech is writing " + os.fsencode(target)
+
+
+def _locked(file) -> bool:
+    """Whether the file is now locked by this process; False if another's, or if there are no locks here."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (AttributeError, OSError):
+        return False
+    return True
+
+
+def _discard(folder: Path) -> None:
+    """Remove a folder of ours, its mark after all that it stands for."""
+    shutil.rmtree(folder / NEW, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        (folder / MARK).unlink(missing_ok=True)
+        folder.rmdir()
+
+
+def _discard_plainly(folder: Path) -> None:
+    """Remove a folder of ours, with one open file at a time."""
+    for place, folders, names in os.walk(folder, topdown=False):
+        for remove, found in ((os.unlink, names), (os.rmdir, folders)):
+            for name in found:
+                with contextlib.suppress(OSError):
+                    remove(os.path.join(place, name))
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+def sweep_strays(target: Path, *more: Path) -> None:
+    """Remove the folders of killed writers to ``target``, and nobody else's, from its folder and ``more``."""
+    for place in {target.parent, *more}:
+        with contextlib.suppress(OSError, ValueError):
+            for path in [p for p in place.iterdir() if p.name.startswith(_prefix(target))]:
+                _sweep(path, target)
+
+
+def _sweep(path: Path, target: Path) -> None:
+    if path.is_symlink() or not path.is_dir():
+        return
+    with contextlib.suppress(OSError):
+        if not any(path.iterdir()):
+            if time.time() - path.stat().st_mtime > ABANDONED:
+                path.rmdir()
+            return
+        with (path / MARK).open("r+b") as mark:
+            if _locked(mark) and mark.read() == _words(target):
+                _discard(path)

@@ -1,0 +1,80 @@
+"""CSV files of measurements: rows of numbers under a header line, # starts a comment."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech.io import files
+
+LARGEST_NUMBER = 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a file holds. name, sha256: of the file. filled: (line number, text) of what is neither comment nor empty, the
+    header first. comments: what stands after #, line by line."""
+
+    name: str
+    sha256: str
+    filled: list[tuple[int, str]]
+    comments: list[str]
+
+    @property
+    def header(self) -> tuple[int, tuple[str, ...]]:
+        """(its line number, the words of the first line that is no comment), in small letters, without quotes."""
+        line, text = self.filled[0] if self.filled else (1, "")
+        return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
+
+    def numbers(self, columns: tuple[str, ...], wanted: tuple[str, ...] | None = None) -> np.ndarray:
+        """(N, columns), or those wanted: the numbers under the header; ValueError naming the line of a row that has others."""
+        wanted = columns if wanted is None else wanted
+        picks = [columns.index(name) for name in wanted]
+        rows = [_row(self.name, k, line, columns, picks) for k, line in self.filled[1:]]
+        return np.array(rows).reshape(-1, len(wanted))
+
+    @property
+    def lines(self) -> np.ndarray:
+        """(N,), the rows' line numbers."""
+        return np.array([k for k, _ in self.filled[1:]], int)
+
+
+def read(path: str | Path, largest: int, what: str) -> Rows:
+    """The rows of a CSV file of at most so many bytes; ValueError saying what it should be (``what``) if it is no text."""
+    try:
+        raw = files.read(path, largest)
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        if "\0" in text:
+            raise ValueError
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise ValueError(f"cannot read {str(path)!r}: {reason}; {what}") from None
+    parts = [line.partition("#") for line in text.split("\n")]
+    filled = [(k, line.strip()) for k, (line, _, _) in enumerate(parts, 1) if line.strip()]
+    comments = [comment.strip() for _, _, comment in parts if comment.strip()]
+    return Rows(Path(path).name, hashlib.sha256(raw).hexdigest(), filled, comments)
+
+
+def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[int]) -> list[float]:
+    cells = text.split(",")
+    if len(cells) == len(columns):
+        row = [_cell(cells[k]) for k in picks]
+        if all(abs(x) <= LARGEST_NUMBER for x in row):
+            return row
+    said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
+    at = next(
+        (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
+    )
+    raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}" + f", column {at}" * bool(at))
+
+
+def _cell(text: str) -> float:
+    """nan for what is no number."""
+    try:
+        return float(text.strip(' "'))
+    except ValueError:
+        return math.nan

@@ -1,0 +1,188 @@
+"""What a file of a connection holds, and how it is checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from geomech.core.errors import plain
+from geomech.geometry.connection import Connection
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.reconstruct import displacement
+from geomech.geometry.tube import Tube
+
+LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
+LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees
+LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
+SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
+ORDERS = ("ndgrid", "meshgrid")
+ROWS = ("x", "y", "theta")
+ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A connection as a file has it, turned to xi = + A alphadot and to axes (alpha_1, alpha_2, ...).
+
+    harmonics: the odd harmonics of xi beside A, where the file has them. even: (3, N_1, ...), rms of
+    xi(alphadot) + xi(-alphadot), if that is not 0. metric: what a change of shape costs, where the file has it, in body
+    lengths, power being its norm to power_degree. length: of the body, in ``unit``, "BL" or "m".
+    frame: of xi, in words. sign, order: as in the file. said: what the file does not say and was made out. sha256: of
+    the file. shapes: names of the shape variables, alpha_k where none are told. A_error: (3, d, N_1, ...), half widths of
+    intervals of A, which cover it in a share ``level`` of cases, where the file has them. sized: whether the file says length
+    and unit; body lengths are assumed where it does not."""
+
+    connection: Connection
+    harmonics: Harmonics | None = None
+    even: np.ndarray | None = None
+    length: float = 1.0
+    unit: str = "BL"
+    frame: str = "that of the table"
+    sign: str = "+"
+    order: str = "ndgrid"
+    said: tuple[str, ...] = ()
+    sha256: str = ""
+    shapes: tuple[str, ...] = ()
+    metric: Metric | Finsler | None = None
+    power_degree: float | None = None
+    A_error: np.ndarray | None = None
+    level: float | None = None
+    sized: bool = True
+
+    def __post_init__(self):
+        object.__setattr__(self, "frame", plain(" ".join(self.frame.split()))[:LONGEST_NAME])
+
+    @property
+    def table(self) -> Connection | Harmonics:
+        """What the velocity is looked up in."""
+        return self.harmonics or self.connection
+
+    @property
+    def highest(self) -> int:
+        """Harmonic that is kept; 1 for A alone."""
+        return self.harmonics.highest if self.harmonics else 1
+
+    @property
+    def told(self) -> bool:
+        """Whether the file tells what its fit left of the velocity."""
+        return bool(np.isfinite(self.table.residual).any())
+
+    @cached_property
+    def halves(self) -> tuple[Connection | Harmonics, ...]:
+        """`table` on every second point of each axis, from the first and from the second, with both ends kept."""
+        return self.table.half(0), self.table.half(1)
+
+    @cached_property
+    def mirror(self) -> bool:
+        """Whether left and right are alike: A_x even, A_y and A_theta of A odd times odd, to rounding."""
+        c = self.connection
+        if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
+            return False
+        there = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(3, 1, *[1] * len(c.axes))
+        return bool(np.abs(there - c.A).max() <= 1e-9 * np.abs(c.A).max())
+
+
+def scaled(held: Stored, factor: float) -> Stored:
+    """The same with all lengths times ``factor``, then in the unit that ``held`` has."""
+    if factor == 1.0 and held.sized:
+        return held
+    by = np.array([factor, factor, 1.0])
+    times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
+    c, h = held.connection, held.harmonics
+    more = {"unit": held.unit, "length": held.length}
+    more |= {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
+    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
+    h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
+    even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
+    return replace(held, connection=c, harmonics=h, even=even, A_error=error)
+
+
+def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
+    """values (N,) as ascending angles, or ValueError."""
+    axis = numbers(name, values)
+    if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
+        raise ValueError(f"has no grid: {name} must be at least 4 ascending angles in rad")
+    if np.abs(axis).max() > largest:
+        raise ValueError(
+            f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad: convert it if these are degrees"
+        )
+    return axis
+
+
+def checked_names(told, plain: list[str]) -> tuple[str, ...]:
+    """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
+    words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
+    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in told)
+    return tuple(told if good else plain)
+
+
+def numbers(name: str, values) -> np.ndarray:
+    """values as floats in the machine's order of bytes; ValueError if they are none, or not finite."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"has {name} that is no array of real numbers")
+    array = array.astype(float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}: mend it")
+    if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
+        raise ValueError(f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}: mend it")
+    return array
+
+
+def masks(name: str, values: np.ndarray, masked: np.ndarray, told: Mapping) -> None:
+    """ValueError where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), of which the file must
+    speak in what it has ``told``, or not all there."""
+    if masked.any() and "singular_shapes" not in told:
+        numbers(name, values)
+    if not np.isnan(values[..., masked]).all():
+        raise ValueError(f"has {name} at singular shapes, where A is nan: write it anew")
+    numbers(name, np.where(masked, 0.0, values))
+
+
+def checked_error(name: str, error: np.ndarray, A: np.ndarray, told: Mapping) -> np.ndarray:
+    """Half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; or ValueError."""
+    if error.shape != A.shape:
+        raise ValueError(f"has {name} of shape {error.shape} where A has {A.shape}")
+    masks(name, error, np.isnan(A).any((0, 1)), told)
+    if (error < 0).any():
+        raise ValueError(f"has {name} below 0 where it is half of an interval of A")
+    return error.astype(float)
+
+
+def checked_level(told: Mapping) -> float | None:
+    """The share of cases that intervals cover, as a file has told it; None where that makes no sense."""
+    level = told.get("level")
+    good = np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
+    return float(level) if good else None
+
+
+def _first(bad: np.ndarray) -> str:
+    return "index (" + ", ".join(map(str, np.argwhere(bad)[0])) + ")"
+
+
+def rms(A: np.ndarray, residual: np.ndarray | None = None) -> np.ndarray:
+    """(3, N_1, ...): rms of xi over uniform directions of alphadot, from A (3, d, N_1, ...) and its fit residual."""
+    return np.sqrt((A**2).mean(1) + (0.0 if residual is None else residual**2))
+
+
+def detected_sign(connection: Connection) -> str:
+    """ "+" if xi = + A alphadot, "-" if xi = - A alphadot, for a body of two joints that meets more drag across than along.
+
+    With alpha_k the heading of link k+1 minus that of link k, a counter-clockwise circle then carries it backwards, as
+    its CCF_x is negative about the straight shape, in every frame of the body (Hatton et al., PRL 110, 078101 (2013)).
+    ValueError where both signs, or neither, would have it so."""
+    half = min(float(a[-1] - a[0]) / 2 for a in connection.axes)
+    centre = np.array([a[0] + a[-1] for a in connection.axes]) / 2
+    t, radius = 2 * np.pi * np.arange(64) / 64, np.array([0.3, 0.5])[:, None, None] * half
+    alpha = centre + radius * np.stack([np.cos(t), np.sin(t)], -1)
+    alphadot = radius * np.stack([-np.sin(t), np.cos(t)], -1)
+    xi = connection.velocity(alpha, alphadot)
+    least = ROUNDING * np.abs(xi).max(initial=0.0)
+    for sign, value in (("+", 1.0), ("-", -1.0)):
+        if (displacement(value * xi)[:, 0] < -least).all() and (displacement(-value * xi)[:, 0] > least).all():
+            return sign
+    raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")

@@ -1,0 +1,159 @@
+"""A connection from a MATLAB file in sysplotter's layout: alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M).
+
+Source: https://github.com/OSU-LRAM/GeometricSystemPlotter, Granular_Local_Connection_Matrix.mat. Files that
+`geomech.output.mat` wrote say more, in the variables ABOUT, RESIDUAL and ERROR.
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+import json
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from geomech.geometry.connection import Connection
+from geomech.io.tables import matlab
+from geomech.io.tables.base import (
+    LARGEST_ANGLE,
+    ORDERS,
+    SIGNS,
+    Stored,
+    checked_axis,
+    checked_error,
+    checked_level,
+    checked_names,
+    detected_sign,
+    masks,
+    numbers,
+    rms,
+)
+
+ANGLES = ("alpha1", "alpha2")
+ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
+ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_error"
+SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
+
+
+def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
+    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
+    found = _variables(raw)
+    axes, order = _axes(found, order)
+    about = _about(found)
+    A = _entries(found, axes, order, about)
+    if not A.any():
+        raise ValueError("has a connection that is zero everywhere")
+    residual, error = _residual(found, A, order, about), _error(found, A, order, about)
+    degree = about.get("interpolation", 3)
+    degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
+    sized = about.get("unit") in ("BL", "m") and isinstance(about.get("length"), float) and 0 < about["length"] < 1e9
+    length, unit = (about["length"], about["unit"]) if sized else (1.0, "BL")
+    size = {"unit": unit, "length": length} if sized else {}
+    plain = Connection(axes, A, residual, rms(A, np.nan_to_num(residual)), degree, **size)
+    said = () if found[ANGLES[0]].ndim == 1 or order == "ndgrid" else ("its arrays run as meshgrid's",)
+    if not sign and about.get("sign") not in SIGNS:
+        said += (f"its sign is made out as {SIGNS[detected_sign(plain)]}; say sign = '+' or '-' if you know it",)
+    sign = sign or (about["sign"] if about.get("sign") in SIGNS else detected_sign(plain))
+    frame = about["frame"] if isinstance(about.get("frame"), str) else "that of the table"
+    turned = plain if sign == "+" else replace(plain, A=-A)
+    shapes = checked_names(about.get("shapes"), ["alpha_1", "alpha_2"])
+    known = {"A_error": error, "level": checked_level(about), "sized": sized}
+    return Stored(turned, None, None, length, unit, frame, sign, order, said, sha256, shapes, **known)
+
+
+def _variables(raw: bytes) -> dict[str, np.ndarray]:
+    """Those of the layout, arrays of real numbers, and what else there is; ValueError if one is missing."""
+    if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
+        raise ValueError(f"is a MATLAB 7.3 (HDF5) file: {SAVE}")
+    if raw[:3] == b"CDF":
+        raise ValueError("is no MATLAB file, but a NetCDF one: end its name in .nc")
+    try:
+        found = _of_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
+    except ValueError:
+        raise ValueError(f"is damaged, cut short, or no MATLAB file: {SAVE}") from None
+    for name in (*ANGLES, *ENTRIES):
+        if name not in found:
+            raise ValueError(f"has no {name}: a connection is {', '.join((*ANGLES, *ENTRIES))}")
+        if not isinstance(found[name], np.ndarray):
+            raise ValueError(f"has {name} that is no array of real numbers")
+    return found
+
+
+def _of_version_4(raw: bytes) -> dict[str, np.ndarray]:
+    """The variables of a file of that version, which SciPy reads in Python; ValueError for a damaged one."""
+    from scipy.io import loadmat
+
+    try:  # what is damaged makes SciPy raise whatever comes first
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return loadmat(io.BytesIO(raw), variable_names=[*ANGLES, *ENTRIES])
+    except Exception:
+        raise ValueError("damaged") from None
+
+
+def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
+    """(the angles of both axes, the order in which arrays run over them)."""
+    angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in found else 2 * np.pi)
+    first, second = (numbers(name, found[name]) for name in ANGLES)
+    if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
+        if not order:
+            raise ValueError(
+                "has alpha1 and alpha2 as rows, which leave the order open: say order = 'ndgrid' or 'meshgrid'"
+            )
+        return (angles("alpha1", first.ravel()), angles("alpha2", second.ravel())), order
+    if first.ndim != 2 or first.shape != second.shape:
+        raise ValueError(f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid")
+    for name, (a, b) in zip(ORDERS, ((first, second), (first.T, second.T))):
+        if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
+            if order not in ("", name):
+                raise ValueError(f"has arrays that run as {name}'s: drop order")
+            return (angles("alpha1", a[:, 0]), angles("alpha2", b[0])), name
+    raise ValueError(
+        "has alpha1 and alpha2 that span no grid: one must change along rows alone, the other along columns"
+    )
+
+
+def _about(found: dict) -> dict:
+    """What a file of our own says of itself; nothing if that makes no sense."""
+    try:
+        told = json.loads(str(found.get(ABOUT, "")))
+    except (ValueError, RecursionError):
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
+def _entries(found: dict, axes, order: str, about: dict) -> np.ndarray:
+    """A (3, 2, N, M); nan at singular shapes, if the file speaks of such, and there in all entries."""
+    arrays, expected = {}, tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
+    for name in ENTRIES:
+        values = found[name] if found[name].dtype.kind == "f" else numbers(name, found[name])
+        if values.shape != expected:
+            raise ValueError(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
+        arrays[name] = _of_ndgrid(values, order).astype(float)
+    masked = np.isnan([*arrays.values()]).any(0)
+    for name, values in arrays.items():
+        masks(name, values, masked, about)
+    return np.array([*arrays.values()]).reshape(3, 2, *masked.shape)
+
+
+def _of_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
+    """(..., N, M) of arrays that run as ``order``'s."""
+    return values if order == "ndgrid" else values.swapaxes(-1, -2)
+
+
+def _residual(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
+    """(3, N, M): rms of what the fit leaves, nan where the file does not say."""
+    values = found.get(RESIDUAL)
+    if not isinstance(values, np.ndarray) or _of_ndgrid(values, order).shape != (3, *A.shape[2:]):
+        return np.full((3, *A.shape[2:]), np.nan)
+    values = _of_ndgrid(values, order)
+    masks(RESIDUAL, values, np.isnan(A).any((0, 1)), about)
+    return values.astype(float)
+
+
+def _error(found: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
+    """(3, 2, N, M): half widths of intervals of A, None where the file does not say."""
+    values = found.get(ERROR)
+    return checked_error(ERROR, _of_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None

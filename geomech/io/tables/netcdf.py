@@ -1,0 +1,208 @@
+"""A connection from the NetCDF file that `geomech connection` wrote (`geomech.output.netcdf`)."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from geomech.geometry.connection import Connection
+from geomech.geometry.harmonics import Harmonics
+from geomech.geometry.metric import Finsler, Metric
+from geomech.geometry.tube import Known, Loop, Tube
+from geomech.io.tables.base import (
+    ROWS,
+    SIGNS,
+    Stored,
+    checked_axis,
+    checked_error,
+    checked_level,
+    checked_names,
+    masks,
+    numbers,
+    rms,
+)
+
+SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
+FITTED = "write it anew with 'geomech fit LOG.csv -o FILE.nc'"
+UNITS = {"body length": "BL", "m": "m"}
+ANGLES = ("rad", "radian", "radians")
+SHAPE = "shape variable "  # before the name of one that is no angle between links
+
+
+def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
+    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
+    if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
+        raise ValueError(_what_else(raw))
+    if order not in ("", "ndgrid"):
+        raise ValueError("names its dimensions: drop order")
+    from scipy.io import netcdf_file
+
+    try:  # what is damaged makes SciPy raise whatever comes first
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            file = netcdf_file(io.BytesIO(raw), mmap=False)
+            found = {name: (tuple(v.dimensions), np.array(v[:])) for name, v in file.variables.items()}
+            units = {name: _text(getattr(v, "units", b"")) for name, v in file.variables.items()}
+            names = {name: _text(getattr(v, "long_name", b"")) for name, v in file.variables.items()}
+            told = {name: value for name, value in vars(file).items() if not name.startswith("_")}
+    except Exception:
+        raise ValueError(f"is damaged or cut short: {SOURCE}") from None
+    stored = _stored(found, units, told, sign, sha256)
+    shapes = [f"alpha_{k + 1}" for k in range(len(stored.connection.axes))]
+    called = [names[x].removeprefix(SHAPE) if names[x].startswith(SHAPE) else x for x in shapes]
+    return replace(stored, shapes=checked_names(called, shapes))
+
+
+def _what_else(raw: bytes) -> str:
+    if raw[:4] == b"\x89HDF":
+        return "is NetCDF-4 (HDF5): save it as classic NetCDF, from xarray by to_netcdf(..., format='NETCDF3_64BIT')"
+    return f"is no NetCDF file{', but a MATLAB one: end its name in .mat' if raw[:6] == b'MATLAB' else f': {SOURCE}'}"
+
+
+def _text(value) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Stored:
+    joints = len(found["joint"][1]) if "joint" in found and found["joint"][1].ndim == 1 else 0
+    names = tuple(f"alpha_{k + 1}" for k in range(joints))
+    if missing := [name for name in ("joint", *names, "A", "fit_residual") if name not in found]:
+        raise ValueError(f"holds no connection, {missing[0]} is missing: {SOURCE}")
+    for name in names:
+        if units[name] not in ("", *ANGLES):
+            raise ValueError(f"has {name} in {units[name]!r}: shapes are angles in rad")
+    axes = tuple(checked_axis(name, found[name][1]) for name in names)
+    pick = lambda name, *lead: _array(found, name, (*lead, *names), axes)
+    A, residual = pick("A", "component", "joint"), pick("fit_residual", "component")
+    if A.shape[:2] != (3, joints) or residual.shape[0] != 3 or not _rows(found):
+        raise ValueError(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
+    masked = np.isnan(A).any((0, 1))
+    masks("A", A, masked, told)
+    unknown = np.isnan(residual).all() and not masked.all()
+    masks("fit_residual", np.where(unknown, 0.0, residual), masked, told)
+    speed = pick("speed", "component") if "speed" in found else rms(A, residual)
+    sized = "length_unit" in told
+    length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))
+    length = float(length) if np.ndim(length) == 0 and np.asarray(length).dtype.kind in "iuf" else np.nan
+    if unit is None or not 0 < length < 1e9:
+        raise ValueError(f"has a body_length or length_unit that makes no sense: {SOURCE}")
+    degree = int(d) if (d := told.get("interpolation", 3)) in (1, 2, 3, 4, 5) else 3
+    if min(map(len, axes)) <= degree:
+        raise ValueError(f"has too few shapes for a spline of degree {degree}: {SOURCE}")
+    stated = next((s for s, text in SIGNS.items() if text == _text(told.get("sign_of_A", b""))), "+")
+    sign = sign or stated
+    turn = 1.0 if sign == "+" else -1.0
+    harmonics = None
+    if "harmonics" in found and not masked.any():
+        rows = pick("harmonics", "component", "coefficient")
+        left = pick("harmonics_residual", "component") if "harmonics_residual" in found else residual
+        if rows.shape[0] != 3 or left.shape[0] != 3 or rows.shape[1] % 2 or not rows.size:
+            raise ValueError(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
+        harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
+    size = {"unit": unit, "length": length} if sized else {}
+    connection = Connection(axes, turn * A, residual, speed, degree, **size)
+    if "gait" in found:
+        connection = Tube(axes, turn * A, residual, speed, degree, _known(found, told, turn), **size)
+    frame = _text(told.get("frame", b"that of the table"))
+    even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
+    if even is not None and even.shape[0] != 3:
+        raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
+    _check_pairs(found, axes, masked)
+    metric, power = _metric(found, told, axes, degree)
+    has_error = "A_error" in found
+    error = checked_error("A_error", pick("A_error", "component", "joint"), A, told) if has_error else None
+    return Stored(
+        connection, harmonics, even, length, unit, frame, sign, "ndgrid", (), sha256, metric=metric, power_degree=power,
+        A_error=error, level=checked_level(told), sized=sized,
+    )  # fmt: skip
+
+
+def _known(found: dict, told: dict, turn: float) -> Known:
+    """What is known along a gait (`geomech.geometry.tube`), A times ``turn``."""
+    sized = {"gait": 2, "gait_A": 3, "gait_slope": 4, "gait_errors": 5, "gait_spread": 3, "gait_beyond": 1}
+    if missing := [name for name in sized if name not in found or found[name][1].ndim != sized[name]]:
+        raise ValueError(f"has a gait, but no {missing[0]} that fits it: {FITTED}")
+    gait, A, slope, errors, spread, beyond = (numbers(name, found[name][1]) for name in sized)
+    off = numbers("gait_off", found["gait_off"][1]) if "gait_off" in found else np.zeros((3, 2, 1))  # of an older file
+    d, wide = len(gait), A.shape[-1]
+    right = (A.shape == (3, d, wide), slope.shape == (3, d, d - 1, wide), errors.shape[1:] == (3, d, d, wide))
+    level, factor = (told.get(name, np.nan) for name in ("level", "error_factor"))
+    good = (
+        spread.shape[:2] == (d, d)
+        and beyond.shape == (3,)
+        and off.ndim == 3
+        and off.shape[:2] == (3, 2)
+        and off.size > 0
+        and (np.linalg.eigvalsh(np.moveaxis(spread, -1, 0)) > 0).all()
+    )
+    number = all(np.ndim(x) == 0 and np.asarray(x).dtype.kind in "iuf" for x in (level, factor))
+    if not (all(right) and good and number and wide % 2 and gait.shape[1] % 2 and 0 < level < 1 and 0 < factor < 1e6):
+        raise ValueError(f"has a gait whose parts do not fit each other: {FITTED}")
+    if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
+        raise ValueError(f"has a gait that does not move: {FITTED}")
+    beyond, off = np.abs(beyond), np.abs(off)
+    return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, beyond, off, float(factor), float(level))
+
+
+def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:
+    """What a change of shape costs, and the degree of its power, None where it is a metric of another kind; (None, None) of
+    a file that does not tell."""
+    power, names, joints = told.get("power_degree"), tuple(f"alpha_{k + 1}" for k in range(len(axes))), len(axes)
+    if "metric" not in found and ("norm" not in found or power is None):
+        return None, None
+    if power is not None and (np.ndim(power) or np.asarray(power).dtype.kind not in "iuf" or not 0 < power < 100):
+        raise ValueError(f"has a power_degree that makes no sense: {SOURCE}")
+    if "metric" in found:
+        M = numbers("metric", _array(found, "metric", ("joint", "other_joint", *names), axes))
+        if M.shape[:2] != (joints, joints) or not np.allclose(M, M.swapaxes(0, 1), rtol=0, atol=1e-9 * np.abs(M).max()):
+            raise ValueError(
+                f"has a metric of shape {M.shape} where it must be ({joints}, {joints}, ...) and symmetric"
+            )
+        return Metric(axes, M, degree), None if power is None else float(power)
+    rows = numbers("norm", _array(found, "norm", ("norm_coefficient", *names), axes))
+    if joints != 2 or len(rows) % 2 == 0:
+        raise ValueError(f"has a norm of shape {rows.shape} where it must be (an odd number, ...) of two joints")
+    left = (
+        numbers("norm_residual", _array(found, "norm_residual", names, axes))
+        if "norm_residual" in found
+        else 0 * rows[0]
+    )
+    return Finsler(axes, rows, left, degree), float(power)
+
+
+def _check_pairs(found: dict, axes, masked: np.ndarray) -> None:
+    """ValueError for a CCF of pairs of joints that fits neither grid nor pairs; what is looked up is made anew from A."""
+    pairs = np.array([*combinations(range(1, len(axes) + 1), 2)], float)
+    if "pair_joints" in found and not np.array_equal(found["pair_joints"][1], pairs):
+        raise ValueError(f"has pair_joints other than {pairs.astype(int).tolist()}: {SOURCE}")
+    dimensions = ("pair", "component", *(f"alpha_{k + 1}" for k in range(len(axes))))
+    for name in {"ccf_pairs", "ccf_pairs_error"} & found.keys():
+        values = _array(found, name, dimensions, axes)
+        if values.shape[:2] != (len(pairs), 3):
+            raise ValueError(f"has {name} of shape {values.shape} where it must be ({len(pairs)}, 3, ...): {SOURCE}")
+        if not masked.any():
+            numbers(name, values)
+
+
+def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:
+    """A variable, or ValueError unless its dimensions are those, in that order, and its shape ends in the grid's."""
+    given, values = found[name]
+    if given != dimensions:
+        raise ValueError(f"has {name} over ({', '.join(given)}) where it must be ({', '.join(dimensions)}): {SOURCE}")
+    if values.dtype.kind != "f" or values.shape[-len(axes) :] != tuple(map(len, axes)):
+        raise ValueError(f"has {name} of shape {values.shape} that does not fit its grid: {SOURCE}")
+    return values.astype(float)
+
+
+def _rows(found: dict) -> bool:
+    """Whether the components are x, y and theta, in that order, if they are named."""
+    if "component" not in found:
+        return True
+    names = found["component"][1]
+    if names.dtype.kind == "S" and names.ndim == 2:
+        names = [b"".join(row).rstrip(b"\0 ").decode("ascii", "replace") for row in names]
+    return [str(name) for name in names] == list(ROWS)

@@ -1,0 +1,51 @@
+"""Which back end a request takes: compiled code where its number of balances is worth it and all workers have it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from contextvars import ContextVar
+
+from geomech.core import version
+from rft import SOLVER
+from rft.balance import backend
+from rft.balance.backend import prefer, preferred, preferring
+from rft.threads import cores, one_thread
+
+__all__ = [
+    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "one_thread", "prefer", "prefer_for", "preferred", "preferring",
+    "suiting",
+]  # fmt: skip
+
+VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
+BACKENDS = "numpy", "numba"  # slow ones first
+MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
+
+_most: ContextVar[str] = ContextVar("most", default="numba")
+
+
+def fastest() -> str:
+    """Return the fastest back end that a request may take."""
+    return min(backend.fastest(), _most.get(), key=BACKENDS.index)
+
+
+@contextlib.contextmanager
+def at_most(name: str) -> Iterator[None]:
+    """Let no back end be taken in the body of the statement that is faster than this one."""
+    token = _most.set(min(name, fastest(), key=BACKENDS.index))
+    try:
+        with preferring(min(preferred(), fastest(), key=BACKENDS.index)):
+            yield
+    finally:
+        _most.reset(token)
+
+
+def suiting(balances: float) -> contextlib.AbstractContextManager[None]:
+    """Let "auto" be the fastest back end in the body of the statement if so many balances are worth its start."""
+    return preferring(fastest() if balances >= MANY else "")
+
+
+def prefer_for(balances: float) -> None:
+    """Let "auto" be the fastest back end from here on if so many balances are worth its start."""
+    if balances >= MANY:
+        prefer(fastest())

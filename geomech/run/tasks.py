@@ -1,0 +1,137 @@
+"""One task as it is sent to a process that may know nothing of it yet, and what comes back."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import pickle
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from geomech.core.errors import SceneError
+from geomech.run.backend import VERSION, one_thread, preferring
+
+
+class Order(NamedTuple):
+    """What all tasks of a request share. version: of the code. back_end: what "auto" stands for. plugins: (name, text) of the
+    files of one's own. classes: (module, name) of those that were registered. work: the function and what it is given, as
+    `pickle` has them, which takes the classes."""
+
+    version: str
+    back_end: str
+    plugins: tuple[tuple[str, str], ...]
+    classes: tuple[tuple[str, str], ...]
+    work: bytes
+
+
+class Outcome(NamedTuple):
+    """value, or the error that was raised; notes: warnings (text, category, file, line)."""
+
+    value: Any
+    error: BaseException | None
+    where: str
+    notes: tuple
+
+
+class Alone(Exception):
+    """Other processes cannot compute it, and why. worth_saying: not of a function that is made inside another."""
+
+    def __init__(self, text: str, worth_saying: bool = False):
+        super().__init__(text)
+        self.worth_saying = worth_saying
+
+
+def packed(task: Callable, common: Any, back_end: str) -> Order:
+    """Return the order of a task; `Alone` for what no other process could know."""
+    from geomech.scene import kinds
+
+    classes = kinds.registered()
+    if own := [name for module, name in classes if module == "__main__" or "<locals>" in name]:
+        raise Alone(f"the class {own[0]} is of the program that runs, or of a function in it", True)
+    try:
+        work = pickle.dumps((task, common))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise Alone(str(error)) from None
+    if b"__main__" in work:
+        raise Alone("it has to do with the program that runs", True)
+    return Order(VERSION, back_end, kinds.files(), classes, work)
+
+
+def here(task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True) -> Any:
+    """Return task(common, item), computed as anywhere else; the only one of a request may take all threads."""
+    with one_thread() if one_of_many else contextlib.nullcontext(), preferring(back_end):
+        return task(common, item)
+
+
+@functools.lru_cache(maxsize=4)
+def _known(order: Order) -> tuple[Callable, Any]:
+    """Return (task, common), once all that they are made of is known here."""
+    if order.version != VERSION:
+        raise SceneError(f"a worker has {VERSION}, this command {order.version}: install the same there")
+    if order.plugins or order.classes:
+        _learn(order)
+    return pickle.loads(order.work)
+
+
+def _learn(order: Order) -> None:
+    """Register the classes of one's own."""
+    from geomech.scene import kinds
+
+    for name, text in order.plugins:
+        kinds.load_text(name, text)
+    for module, name in order.classes:
+        kinds.register(functools.reduce(getattr, name.split("."), importlib.import_module(module)))
+
+
+def perform(order: Order, item: bytes) -> bytes:
+    """Return the `Outcome` of a task, pickled; what goes wrong is raised where the command is."""
+    value, error, where = None, None, ""
+    with _noted() as notes:
+        try:
+            task, common = _known(order)
+            value = here(task, common, pickle.loads(item), order.back_end)
+        except Exception as raised:
+            error, where = _sendable(raised), traceback.format_exc()
+    notes = tuple((str(w.message), w.category, w.filename, w.lineno) for w in notes or ())
+    return pickle.dumps(Outcome(value, error, where, notes))
+
+
+def _sendable(error: Exception) -> Exception:
+    """Return the error, or its text where its class cannot be sent."""
+    try:
+        pickle.loads(pickle.dumps(error))
+        return error
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+
+
+@contextlib.contextmanager
+def _noted() -> Iterator[list | None]:
+    """Warnings that are raised meanwhile; None in a process that does more than this (a thread of Dask's), whose filters
+    are not ours."""
+    if not getattr(sys, "geomech_worker", False):
+        yield None
+        return
+    with warnings.catch_warnings(record=True) as notes:
+        warnings.simplefilter("always")
+        yield notes
+
+
+def opened(outcome: bytes, told: set) -> Any:
+    """Return the value of an outcome; raises and warns as the task did. told: warnings already passed on."""
+    value, error, where, notes = pickle.loads(outcome)
+    for text, category, file, line in notes:
+        if (text, category) not in told:
+            told.add((text, category))
+            warnings.warn_explicit(text, category, file, line)
+    if error is not None:
+        raise error from Elsewhere(where)
+    return value
+
+
+class Elsewhere(Exception):
+    """Where in a worker an error was raised."""

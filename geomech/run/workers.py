@@ -1,0 +1,54 @@
+"""Who computes: this process, as many others as there are cores, or a Dask cluster.
+
+Large requests are computed in tasks that do not depend on who computes them, so that the numbers are the same to the last
+digit. `using` is said around a computation and is no argument of it:
+
+    with geomech.workers.using(4):
+        study.compute_field()
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+
+from geomech.core.errors import SceneError, number
+from geomech.run.backend import at_most, cores, fastest
+from geomech.run.jobs import Executor, runner, running
+
+__all__ = ["using"]
+
+MOST = 1024  # processes
+
+
+@contextlib.contextmanager
+def using(count: int | None = None, scheduler: str | None = None) -> Iterator[None]:
+    """Compute what is large in the body of the statement by ``count`` processes, by default one a core, or on the Dask
+    cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786". Processes start when something turns out to be
+    worth it. SceneError for what is none, and at once for a scheduler that does not answer."""
+    executor = _executor(count, scheduler)
+    try:
+        with (
+            at_most(getattr(executor, "back_end", fastest())),
+            running(dataclasses.replace(runner(), executor=executor)),
+        ):
+            yield
+    finally:
+        if executor:
+            executor.close()
+
+
+def _executor(count: int | None, scheduler: str | None) -> Executor | None:
+    if count is not None:
+        try:
+            number("--workers", count, 1, MOST, whole=True)
+        except ValueError as error:
+            raise SceneError(str(error)) from None
+    if scheduler is not None and count is not None:
+        raise SceneError("--workers are processes of this machine, --scheduler has its own: give one of the two")
+    if scheduler is None and (count or cores()) == 1:
+        return None
+    from geomech.run.executors import Cluster, Processes
+
+    return Processes(int(count or cores())) if scheduler is None else Cluster(scheduler)

@@ -1,6 +1,0 @@
-"""Tables of a connection read from files, whose contents are never believed: NetCDF as `geomech connection` writes it, and
-MATLAB files in sysplotter's layout."""
-
-from geomech.tables.base import ORDERS, SIGNS, Stored, load, scaled
-
-__all__ = ["ORDERS", "SIGNS", "Stored", "load", "scaled"]
