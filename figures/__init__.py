@@ -1,7 +1,7 @@
 """Published figures, one importable script each: compute() -> numbers, draw(numbers) -> Figure.
 
 `python -m figures.fig11e_displacement [FILE]` draws one to FILE (.png, .pdf or .svg). Some have table(numbers) -> text,
-which is printed too.
+which is printed too. What they look alike in is in `figures.style`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,11 @@ def main(name: str, compute: Callable, draw: Callable, table: Callable | None = 
     """Compute, draw and save to the file named on the command line, or to <name>.png; print the table if there is one."""
     from geomech.output import plots
 
-    path = sys.argv[1] if len(sys.argv) > 1 else f"{name}.png"
+    try:
+        path = plots.check_format(sys.argv[1] if len(sys.argv) > 1 else f"{name}.png")
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(2) from None
     numbers = compute()
     if table is not None:
         print(table(numbers))

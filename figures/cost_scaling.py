@@ -4,27 +4,29 @@ all, beside the usual loop of SciPy's; and time against links, directions and ph
 from __future__ import annotations
 
 import os
-import time
+import timeit
 from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import fsolve
 
-from figures import main
-from geomech import connection
+from figures import main, style
 from geomech.gaits import Circle
+from geomech.geometry import connection
 from geomech.output import plots
 from geomech.tiers.direct import direct
-from rft import CATALOGUE, Chain, backend, body_velocity
+from rft import CATALOGUE, Chain, body_velocity
+from rft.balance import backend
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
-NAMES, COLOURS = {"numpy": "NumPy", "numba": "compiled"}, {"numpy": "tab:blue", "numba": "tab:red"}
+NAMES = {"numpy": "NumPy", "numba": "compiled"}
+LOOKS = {"NumPy": (style.BLUE, "o"), "compiled": (style.VERMILION, "s")}
 REPEATS = 3
 TAN2, C = np.tan(np.radians(13.8)) ** 2, 1.8
 
 
 def one_scipy_solve(alpha, alphadot, segments=20):
-    """What a user writes today: midpoint segments in the middle link's frame, Eqs. 2-3 as printed, fsolve."""
+    """Solve one balance as one would by hand: midpoint segments in the middle link's frame, Eqs. 2-3 as printed, fsolve."""
     half = 1 / 6
     s = ((np.arange(segments) + 0.5) / segments * 2 - 1) * half
     headings = np.array([-alpha[0], 0.0, alpha[1]])
@@ -49,26 +51,24 @@ def one_scipy_solve(alpha, alphadot, segments=20):
 
 
 def backends() -> list[str]:
-    """NumPy, and compiled code where numba is installed."""
+    """Return the names of NumPy and, where numba is installed, of compiled code."""
     return ["numpy", *(["numba"] * backend.installed())]
 
 
 def quickest(f: Callable, repeats: int = REPEATS) -> float:
-    """Seconds."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        f()
-        times.append(time.perf_counter() - start)
-    return min(times)
+    """Return the seconds that the quickest of several calls takes."""
+    return min(timeit.repeat(f, number=1, repeat=repeats))
 
 
-def _random(links: int, count: int):
+def random_samples(links: int, count: int):
+    """Return shapes and rates (count, links - 1) within what such a body can bend."""
     rng, spread = np.random.default_rng(links), 2.5 / np.sqrt(links / 3)
     return rng.uniform(-spread, spread, (count, links - 1)), rng.normal(size=(count, links - 1))
 
 
-def _solver(how: str, threads: int | None = None) -> Callable:
+def solver(how: str, threads: int | None = None) -> Callable:
+    """Return the velocity of a chain in loose glass by a back end, None for all threads."""
+
     def velocity(alpha, alphadot):
         chain = Chain((1,) * (np.shape(alpha)[-1] + 1))
         return body_velocity(GLASS, chain, alpha, alphadot, backend=how, threads=threads).checked().xi
@@ -76,29 +76,31 @@ def _solver(how: str, threads: int | None = None) -> Callable:
     return velocity
 
 
-def _batches(scale: int) -> dict:
-    """Seconds a batch, by back end and cores, and of the loop of SciPy's a sample."""
+def batches(scale: int) -> dict:
+    """Return the seconds of a batch, by back end and cores, and of SciPy's loop the seconds of a sample."""
     sizes, series = [max(1, n // scale) for n in (1, 8, 64, 512, 4096, 32768)], {}
     for how in backends():
         for threads, cores in ((1, "one core"), (None, f"{os.cpu_count()} cores")):
-            velocity = _solver(how, threads)
-            velocity(*_random(3, 2))  # loads what is loaded once
-            series[f"{NAMES[how]}, {cores}"] = [quickest(lambda n=n: velocity(*_random(3, n))) for n in sizes]
-    some = list(zip(*_random(3, 40 // scale + 1)))
+            velocity = solver(how, threads)
+            velocity(*random_samples(3, 2))  # loads what is loaded once
+            series[f"{NAMES[how]}, {cores}"] = [quickest(lambda n=n: velocity(*random_samples(3, n))) for n in sizes]
+    some = list(zip(*random_samples(3, 40 // scale + 1)))
     return {"x": sizes, "seconds": series, "loop": quickest(lambda: [one_scipy_solve(*s) for s in some]) / len(some)}
 
 
 def compute(scale: int = 1) -> dict:
-    """{axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}; the exponent is NumPy's, of the larger half; axis
-    "samples" has "loop", too. scale: shrinks all."""
+    """Return {axis: {"x": [...], "seconds": {series: [...]}, "exponent": p}}, the exponent being NumPy's over the larger half.
+
+    The axis "samples" has "loop", too. scale: divides all sizes.
+    """
     sizes = {
-        "links": ([3, 6, 12, 25, 50, 100], lambda f, n: f(*_random(n, 2000 // scale))),
+        "links": ([3, 6, 12, 25, 50, 100], lambda f, n: f(*random_samples(n, 2000 // scale))),
         "directions": ([4, 8, 16, 32, 64], lambda f, n: connection.fit(f, connection.grid(2, 31 // scale), n)),
         "phases": ([n // scale for n in (500, 2000, 8000, 32000)], lambda f, n: direct(f, Circle(), phases=n)),
     }
-    out = {"samples": _batches(scale)}
+    out = {"samples": batches(scale)}
     for axis, (x, run) in sizes.items():
-        series = {NAMES[how]: [quickest(lambda n=n: run(_solver(how), n)) for n in x] for how in backends()}
+        series = {NAMES[how]: [quickest(lambda n=n: run(solver(how), n)) for n in x] for how in backends()}
         out[axis] = {"x": x, "seconds": series}
     for found in out.values():
         half, (seconds, *_) = len(found["x"]) // 2, found["seconds"].values()
@@ -114,22 +116,19 @@ def draw(numbers: dict):
         x, loop = np.array(found["x"], float), found.get("loop")
         per = x / 1e6 if loop else np.ones_like(x)  # microseconds a sample, or seconds
         for name, seconds in found["seconds"].items():
-            how = next(k for k, told in NAMES.items() if name.startswith(told))
-            one = name.endswith("one core")
-            ax.loglog(
-                x, seconds / per, "--o" if one else "-o", color=COLOURS[how], mfc="white" if one else None, label=name
-            )
+            colour, marker = LOOKS[name.partition(",")[0]]
+            look = {"ls": "--", "mfc": "white"} if name.endswith("one core") else {}
+            ax.loglog(x, seconds / per, color=colour, marker=marker, label=name, **look)
         if loop:
-            ax.axhline(1e6 * loop, color="0.3", lw=0.8, ls=":")
+            ax.axhline(1e6 * loop, **style.GUIDE, ls=":")
             ax.text(x[-1], 1.1e6 * loop, "a loop of scipy.optimize.fsolve", ha="right", va="bottom", fontsize=8)
             ax.set(xlabel="samples in a batch", ylabel="microseconds a sample", title="Cost of a balance of forces")
             ax.set_ylim(top=1e7 * loop)
         else:
             ax.set(xlabel=axis, ylabel="seconds", title=f"exponent {found['exponent']:.2f}")
         shown = x[:: 1 if len(x) < 5 else 2]
-        ax.set_xticks(shown, [f"{v:,.0f}" for v in shown])
-        ax.minorticks_off()
-        ax.grid(True, which="major", lw=0.3, color="0.85")
+        style.named_ticks(ax, shown, [f"{v:,.0f}" for v in shown])
+        style.grid(ax)
     axes[0, 0].legend(loc="center right", bbox_to_anchor=(1.0, 0.56))
     return fig
 

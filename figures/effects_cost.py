@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
 from rft import BodyInertia, DepthProfile, DisturbedGround, EndCaps, GrainInertia, SkinFriction, Transient
@@ -34,13 +34,14 @@ SETS = {
     **{name: (effect,) for name, effect in MARCHING.items()},
     "all but the slope": (*ALGEBRAIC.values(), *list(MARCHING.values())[1:]),
 }
-COLOURS = {"algebraic": "#0072B2", "time stepping": "#D55E00", "dynamic": "#009E73"}
+ENGINES = {"algebraic": (style.BLUE, ""), "time stepping": (style.VERMILION, "///"), "dynamic": (style.GREEN, "...")}
 
 
 def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> dict:
-    """{name: {"ratio": median over rounds of time over the plain time of that round, "engine", "cycles"}}.
+    """Return {name: {"ratio", "engine", "cycles"}}, the ratio being the median over rounds of time over plain time.
 
-    cycles: of time stepping; None: as many as it takes to reach the limit cycle."""
+    cycles: of time stepping; None: as many as it takes to reach the limit cycle.
+    """
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
@@ -67,17 +68,18 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
 def draw(numbers: dict):
     fig, axes = plots.figure(5.6, 3.4)
     ax, names = axes[0, 0], list(numbers)[::-1]
-    ratios = [numbers[n]["ratio"] for n in names]
-    ax.barh(names, ratios, color=[COLOURS[numbers[n]["engine"]] for n in names], height=0.6, left=0)
+    ratios = [numbers[name]["ratio"] for name in names]
+    for engine, (colour, hatch) in ENGINES.items():
+        rows = [k for k, name in enumerate(names) if numbers[name]["engine"] == engine]
+        ax.barh(rows, [ratios[k] for k in rows], color=colour, hatch=hatch, edgecolor="white", height=0.6, label=engine)
     for k, name in enumerate(names):
         cycles = numbers[name]["cycles"]
         passes = f", {cycles} cycles" if cycles > 1 else ""
         ax.text(ratios[k] * 1.08, k, f"{ratios[k]:.3g}{passes}", va="center", fontsize=8)
-    for engine, colour in COLOURS.items():
-        ax.plot([], [], "s", color=colour, label=engine)
-    ax.axvline(1.0, color="0.6", lw=0.8)
+    ax.set_yticks(range(len(names)), names)
+    ax.axvline(1.0, **style.GUIDE)
     ax.set(xlabel="time / time with no effect", xscale="log", xlim=(0.5, 5 * max(ratios)))
-    ax.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=3, title="engine")
+    style.legend_above(ax, 3, title="engine")
     return fig
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.study.calibration import of_drag
 from rft import CATALOGUE, Viscous
 
 
 def compute(angles: int = 181) -> dict:
-    """psi (N,) in rad; for each law (f_parallel, f_perpendicular), (2, N); the bed's forces and the law fitted to them."""
+    """Return psi (N,) in rad, drag along and across (2, N) by each law, the bed's forces and the law fitted to them."""
     psi = np.linspace(0.0, np.pi / 2, angles)
     laws = {
         "loose": CATALOGUE["glass-0.3mm-loose"].medium,
@@ -31,26 +31,26 @@ def compute(angles: int = 181) -> dict:
 
 @plots.styled
 def draw(numbers: dict):
-    """Solid: across the rod, dashed: along it."""
+    """Draw drag across the rod solid and along it dashed."""
     fig, axes = plots.figure(6.0, 3.0)
     ax, degrees = axes[0, 0], np.degrees(numbers["psi"])
-    styles = {
-        "loose": ("#D55E00", "loose 0.3 mm glass"),
-        "close": ("#0072B2", "close 0.3 mm glass"),
-        "viscous": ("0.5", "viscous, 2 : 1"),
+    curves = {
+        "loose": (style.LOOSE, "loose 0.3 mm glass"),
+        "close": (style.CLOSE, "close 0.3 mm glass"),
+        "viscous": (style.FLUID, "viscous, 2 : 1"),
     }
-    for name, (colour, label) in styles.items():
+    for name, (colour, label) in curves.items():
         along, across = numbers[name]
         ax.plot(degrees, across, color=colour, label=label)
         ax.plot(degrees, along, color=colour, ls="--")
     bed, fit = numbers["bed"], numbers["fit"]
     scale = fit["axial_N"]
-    style = {"color": "black", "ms": 4, "ls": "none"}
-    ax.plot(np.degrees(bed["psi"]), bed["perpendicular"] / scale, "o", label="6 mm grains,\ndiscrete elements", **style)
-    ax.plot(np.degrees(bed["psi"]), bed["parallel"] / scale, "o", mfc="white", **style)
+    dots = {"color": style.BLACK, "ms": 4, "ls": "none"}
+    ax.plot(np.degrees(bed["psi"]), bed["perpendicular"] / scale, "o", label="6 mm grains,\ndiscrete elements", **dots)
+    ax.plot(np.degrees(bed["psi"]), bed["parallel"] / scale, "o", mfc="white", **dots)
     ax.set(xlabel="attack angle $\\psi$ (degrees)", ylabel="drag / axial drag", xlim=(-2, 92), ylim=(0, None))
     ax.set_xticks(range(0, 91, 15))
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="solid, filled: across\ndashed, open: along")
+    style.legend_beside(ax, title="solid, filled: across\ndashed, open: along")
     return fig
 
 

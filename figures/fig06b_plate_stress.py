@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
-from rft.vertical import VERTICAL, Plate, loads
+from rft.plates import VERTICAL, Plate, loads
 
 LENGTH, WIDTH = 0.038, 0.025  # m, assumed
 DEEPEST = 0.08  # m, assumed
@@ -23,46 +23,46 @@ ANGLES = ((0, 90), (30, 90), (60, 30), (90, 0), (0, -90))  # (beta, gamma) in de
 
 
 def compute(medium: str = "poppy-seeds-loose", angles=ANGLES, depths: int = 161) -> dict:
-    """Of each plate: "depth": (D,) of its middle, m. "plates": by (beta, gamma) in degrees {"sigma_x", "sigma_z": (D,), Pa,
-    against the motion's x and upwards, "alpha": (2,) slopes of both once the plate is under, N/cm^3}. "under": m, where all
-    are."""
+    """Return stresses on each plate against depth.
+
+    "depth": (D,) of its middle, m. "plates": by (beta, gamma) in degrees {"sigma_x", "sigma_z": (D,), Pa, against the motion's
+    x and upwards, "alpha": (2,) slopes of both once the plate is under, N/cm^3}. "under": m, where all are.
+    """
     depth, stress = np.linspace(0.0, DEEPEST, depths), VERTICAL[medium].stress
     under, plates = depth > LENGTH / 2, {}
     for beta, gamma in angles:
         plate = Plate(LENGTH, WIDTH, np.radians(beta)).outline(40)
         pose = np.stack([0 * depth, -depth, 0 * depth], -1)
-        way = np.cos(np.radians(gamma)), -np.sin(np.radians(gamma)), 0.0
-        force = loads(stress, plate, pose, way).force / (LENGTH * WIDTH)
+        velocity = np.cos(np.radians(gamma)), -np.sin(np.radians(gamma)), 0.0
+        force = loads(stress, plate, pose, velocity).force / (LENGTH * WIDTH)
         slopes = np.polyfit(depth[under], force[under] * [-1, 1], 1)[0] / 1e6
         plates[beta, gamma] = {"sigma_x": -force[:, 0], "sigma_z": force[:, 1], "alpha": slopes}
     return {"depth": depth, "plates": plates, "under": LENGTH / 2, "medium": medium}
 
 
 def table(numbers: dict) -> str:
-    """Slopes of the straight lines."""
-    lines = [numbers["medium"], "  beta  gamma   alpha_x   alpha_z  (degrees, N/cm^3)"]
-    for (beta, gamma), found in numbers["plates"].items():
-        lines.append("{:6}{:7}{:10.4f}{:10.4f}".format(beta, gamma, *(found["alpha"].round(9) + 0.0)))
-    return "\n".join(lines)
-
-
-COLOURS = ("black", "#0072B2", "#009E73", "#D55E00", "#CC79A7")
+    """Return the slopes of the straight lines."""
+    heads = "beta (degrees)", "gamma (degrees)", "alpha_x (N/cm^3)", "alpha_z (N/cm^3)"
+    slopes = {angles: plate["alpha"].round(9) + 0.0 for angles, plate in numbers["plates"].items()}
+    rows = [(f"{beta}", f"{gamma}", f"{x:.4f}", f"{z:.4f}") for (beta, gamma), (x, z) in slopes.items()]
+    return f"{numbers['medium']}\n{style.table(heads, rows)}"
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(8.0, 3.3, 2)
-    for ax, name, said in zip(axes[0], "xz", ("drag stress", "lift stress")):
-        ax.axvspan(1e2 * numbers["under"], 1e2 * DEEPEST, color="0.93", lw=0)
-        for colour, ((beta, gamma), found) in zip(COLOURS, numbers["plates"].items()):
+    depth = 1e2 * numbers["depth"]
+    for ax, name, stress in zip(axes[0], "xz", ("drag stress", "lift stress")):
+        ax.axvspan(1e2 * numbers["under"], depth[-1], **style.SHADED)
+        for k, ((beta, gamma), plate) in enumerate(numbers["plates"].items()):
             label = rf"$\beta$ = {beta}, $\gamma$ = ${gamma}$" + (", on the way up" if gamma < 0 else "")
-            dashes = "--" if gamma < 0 else "-"
-            ax.plot(1e2 * numbers["depth"], 1e-3 * found[f"sigma_{name}"], dashes, color=colour, label=label)
-        ax.axhline(0.0, color="0.6", lw=0.6)
-        ax.set(xlabel="depth |z| of the plate's middle (cm)", ylabel=rf"{said} $\sigma_{name}$ (kPa)")
-        ax.set(xlim=(0, 1e2 * DEEPEST))
-    axes[0, 0].text(1e2 * numbers["under"] + 0.1, axes[0, 0].get_ylim()[1], "all plates under", va="top", fontsize=8)
-    axes[0, 1].legend(title="tilt, direction (degrees)", loc="center left", bbox_to_anchor=(1.0, 0.5))
+            look = style.sparse(k, len(depth)) | {"ls": "--" if gamma < 0 else "-", "label": label}
+            ax.plot(depth, 1e-3 * plate[f"sigma_{name}"], **look)
+        style.zero_line(ax)
+        ax.set(xlabel="depth |z| of the plate's middle (cm)", ylabel=rf"{stress} $\sigma_{name}$ (kPa)")
+        ax.set(xlim=(0, depth[-1]))
+    axes[0, 0].text(1e2 * numbers["under"] + 0.1, axes[0, 0].get_ylim()[1], "all plates under", va="top", **style.NOTE)
+    style.legend_beside(axes[0, 1], title="tilt, direction (degrees)")
     return fig
 
 

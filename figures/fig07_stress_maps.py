@@ -3,24 +3,27 @@
 The first panel is the convention of plate, motion and stress (Fig. 6(a)), the second the coefficients of media that have
 nine of their own, each over the medium's zeta, beside the generic set M0: one number, the strength, takes one medium to the
 other. The maps are of M0, hatched where the grains would pull on the face that leads. Coefficients and zeta are those of
-`rft.vertical.VERTICAL`; the other media of the published panel have only their zeta there.
+`rft.plates.VERTICAL`; the other media of the published panel have only their zeta there.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
-from rft.vertical import VERTICAL, survey
-from rft.vertical.stress import COEFFICIENTS
+from rft.plates import VERTICAL, survey
+from rft.plates.stress import COEFFICIENTS
 
 OWN = {"poppy-seeds-loose": "poppy seeds, loose", "poppy-seeds-close": "poppy seeds, close"}
 
 
 def compute(cells: int = 180) -> dict:
-    """Of the nine: "names". "generic": (9,), N/cm^3. "media": {name: {"zeta", "coefficients" (9,), "off"}}, the coefficients
-    over zeta and the rms of what they differ from M0 by, over the rms of M0. "survey": of M0."""
+    """Return the nine coefficients and the survey of the generic map.
+
+    "names" and "generic": (9,) of M0, N/cm^3. "media": {name: {"zeta", "coefficients" (9,), "off"}}, the coefficients over
+    zeta, and the rms of their difference from M0 over the rms of M0. "survey": of M0.
+    """
     values = lambda name: np.array([getattr(VERTICAL[name].stress, c) for c in COEFFICIENTS])
     generic, media = values("generic"), {}
     for name in OWN:
@@ -46,17 +49,17 @@ def draw(numbers: dict):
 
 
 def draw_convention(ax) -> None:
-    """A plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force on it in the generic map."""
+    """Draw a plate at beta = 35 degrees that moves at gamma = 30 degrees, and the force on it in the generic map."""
     beta, gamma, middle = np.radians(35), np.radians(30), np.array([0.0, -0.85])
-    along, way = np.array([np.cos(beta), np.sin(beta)]), np.array([np.cos(gamma), -np.sin(gamma)])
+    along, velocity = np.array([np.cos(beta), np.sin(beta)]), np.array([np.cos(gamma), -np.sin(gamma)])
     a_x, a_z = VERTICAL["generic"].stress(beta, gamma)
     ax.axhspan(-1.6, 0.0, color="#f3ead8", lw=0)
-    ax.axhline(0.0, color="peru", lw=1.0)
-    ax.plot(*(middle + 0.45 * np.outer([-1, 1], along)).T, color="black", lw=4, solid_capstyle="butt")
+    ax.axhline(0.0, **style.SURFACE)
+    ax.plot(*(middle + 0.45 * np.outer([-1, 1], along)).T, color=style.BLACK, lw=4, solid_capstyle="butt")
     arrows = (
-        (way * 0.75, "#0072B2", "v", (0.05, -0.06)),
-        (0.9 * np.array([-a_x, 0.0]), "#D55E00", r"$-\alpha_x|z|$", (-0.02, 0.05)),
-        (0.9 * np.array([0.0, a_z]), "#D55E00", r"$\alpha_z|z|$", (0.04, 0.0)),
+        (velocity * 0.75, style.BLUE, "v", (0.05, -0.06)),
+        (0.9 * np.array([-a_x, 0.0]), style.VERMILION, r"$-\alpha_x|z|$", (-0.02, 0.05)),
+        (0.9 * np.array([0.0, a_z]), style.VERMILION, r"$\alpha_z|z|$", (0.04, 0.0)),
     )
     for vector, colour, label, (right, up) in arrows:
         tip = middle + vector
@@ -73,7 +76,7 @@ def draw_convention(ax) -> None:
         ax.text(middle[0] + (reach + 0.09) * np.cos(at), middle[1] + (reach + 0.09) * np.sin(at), label, va="center")
     ax.annotate("", (-0.85, middle[1]), (-0.85, 0.0), arrowprops={"arrowstyle": "<->", "color": "0.3", "lw": 0.8})
     ax.text(-0.82, middle[1] / 2, "|z|", va="center")
-    ax.text(-0.98, 0.03, "surface", fontsize=8, va="bottom", color="0.3")
+    ax.text(-0.98, 0.03, "surface", va="bottom", **style.NOTE)
     ax.set(aspect="equal", xlim=(-1, 1.1), ylim=(-1.6, 0.3), xticks=[], yticks=[])
     for spine in ax.spines.values():
         spine.set_visible(False)
@@ -81,9 +84,9 @@ def draw_convention(ax) -> None:
 
 def draw_coefficients(ax, numbers: dict) -> None:
     at = np.arange(len(numbers["names"]))
-    ax.axhline(0.0, color="0.6", lw=0.6)
-    ax.plot(at, numbers["generic"], color="black", lw=1.5, marker="*", ms=8, label="generic, $M_0$")
-    for (name, medium), colour, mark in zip(numbers["media"].items(), ("#0072B2", "#D55E00"), "os"):
+    style.zero_line(ax)
+    ax.plot(at, numbers["generic"], color=style.BLACK, lw=1.5, marker="*", ms=8, label="generic, $M_0$")
+    for (name, medium), colour, mark in zip(numbers["media"].items(), (style.LOOSE, style.CLOSE), "os"):
         label = rf"{OWN[name]}, $\zeta$ = {medium['zeta']:.3f}"
         ax.plot(at, medium["coefficients"], mark, color=colour, mfc="none", ms=5, label=label)
     labels = [f"${c[0]}_{{{c[1:].replace('m', '-')}}}$" for c in numbers["names"]]

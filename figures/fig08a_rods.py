@@ -22,9 +22,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
-from rft.vertical import VERTICAL, HalfCylinder, RoundRod, SquareRod, loads, parts
+from rft.plates import VERTICAL, HalfCylinder, RoundRod, SquareRod, loads, parts
 
 RADIUS, WIDTH = 0.0127, 0.1  # m, assumed
 RODS = {
@@ -38,18 +38,21 @@ LEVEL = (1.0, 0.0, 0.0)
 
 
 def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) -> dict:
-    """ "beta": (B,) radians. "normal", "tangent": (B,) by plates, N/cm^3. "cylinder": {"beta", "normal", "tangent"} of its
+    """Return stresses around a cylinder, and drag and lift on the rods against depth.
+
+    "beta": (B,) radians. "normal", "tangent": (B,) by plates, N/cm^3. "cylinder": {"beta", "normal", "tangent"} of its
     elements. "pulled": beta from which on the grains pull. "depth": (D,) of the axis, m. "rods": by name and tension
-    {"drag", "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0 where it is not known."""
+    {"drag", "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0 where it is not known.
+    """
     keep = VERTICAL[medium].stress
     beta = np.linspace(0.0, np.pi, 361)
     normal, tangent = on_face(keep, beta)
     here = parts(RODS["round"][0].outline(48), (0, -1, 0), LEVEL)
     leads = (here.depth > 0).ravel()
     around = np.mod(np.arctan2(here.n[0].ravel(), -here.n[1].ravel())[leads], np.pi)
-    t_x, t_z = (t.ravel()[leads] for t in keep.traction(here.n, here.v))
+    a_x, a_z = (a.ravel()[leads] for a in keep.alpha(here.n, here.v))
     sin, cos = np.sin(around), np.cos(around)
-    cylinder = {"beta": around, "normal": (cos * t_z - sin * t_x) / 1e6, "tangent": (cos * t_x + sin * t_z) / 1e6}
+    cylinder = {"beta": around, "normal": cos * a_z + sin * a_x, "tangent": sin * a_z - cos * a_x}
     return {
         "beta": beta, "normal": normal, "tangent": tangent, "cylinder": cylinder,
         "pulled": float(beta[(normal < 0) & (beta > np.pi / 2)].min()), "depth": np.linspace(RADIUS, DEEPEST, depths),
@@ -60,13 +63,14 @@ def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) ->
 
 
 def on_face(stress, beta):
-    """Normal and tangential stress per depth on plates that move level, N/cm^3."""
+    """Return normal and tangential stress per depth on plates that move level, N/cm^3."""
     a_x, a_z = stress(beta, 0.0)
     sin, cos = np.sin(beta), np.cos(beta)
     return sin * a_x + cos * a_z, sin * a_z - cos * a_x
 
 
 def rod_forces(stress, outline, depths: int) -> dict:
+    """Return drag and lift (D,) on a rod, N, and lift over drag deep down."""
     depth = np.append(np.linspace(RADIUS, DEEPEST, depths), DEEP)
     force = loads(stress, outline, np.stack([0 * depth, -depth, 0 * depth], -1), LEVEL).force
     drag, lift = -force[:, 0], force[:, 1]
@@ -74,15 +78,16 @@ def rod_forces(stress, outline, depths: int) -> dict:
 
 
 def table(numbers: dict) -> str:
-    """Lift over drag deep down, and the measured sign."""
-    lines = ["lift over drag     map as it is   tension cut   measured"]
-    for name, found in numbers["rods"].items():
-        said = {1: "up", -1: "down", 0: "not told"}[numbers["measured"][name]]
-        lines.append(f"{name:19}{found['keep']['ratio']:+12.2f}{found['cut']['ratio']:+14.2f}   {said}")
-    return "\n".join(lines)
+    """Return lift over drag deep down, and the measured sign."""
+    signs = {1: "up", -1: "down", 0: "not known"}
+    rows = [
+        (name, f"{rod['keep']['ratio']:+.2f}", f"{rod['cut']['ratio']:+.2f}", signs[numbers["measured"][name]])
+        for name, rod in numbers["rods"].items()
+    ]
+    return style.table(("lift over drag", "map as it is", "tension cut", "measured"), rows)
 
 
-COLOURS = dict(zip(RODS, ("black", "#D55E00", "#0072B2", "#009E73")))
+COLOURS = dict(zip(RODS, style.SEQUENCE))
 
 
 @plots.styled
@@ -90,48 +95,47 @@ def draw(numbers: dict):
     fig, axes = plots.figure(7.8, 6.2, 2, 2)
     draw_stress(axes[0, 0], numbers)
     for ax, what in ((axes[0, 1], "drag"), (axes[1, 0], "lift")):
-        for name, found in numbers["rods"].items():
-            for tension, dashes in (("keep", "-"), ("cut", "--")):
-                label = name if tension == "keep" else None
-                ax.plot(1e2 * numbers["depth"], found[tension][what], dashes, color=COLOURS[name], label=label)
+        for k, (name, rod) in enumerate(numbers["rods"].items()):
+            look = style.sparse(k, len(numbers["depth"]))
+            ax.plot(1e2 * numbers["depth"], rod["keep"][what], label=name, **look)
+            ax.plot(1e2 * numbers["depth"], rod["cut"][what], "--", **look | {"marker": ""})
         ax.set(xlabel="depth of the axis (cm)", ylabel=f"{what} (N)", xlim=(0, 1e2 * DEEPEST))
         ax.set_xticks(range(0, 16, 5))
-        ax.axhline(0.0, color="0.6", lw=0.6)
-    axes[0, 1].plot([], [], "--", color="0.4", label="tension cut")
+        style.zero_line(ax)
+    style.entry(axes[0, 1], "tension cut", ls="--")
     axes[0, 1].legend(loc="upper left")
     draw_ratios(axes[1, 1], numbers)
-    for ax, letter in zip(axes.flat, "abcd"):
-        ax.set_title(f"({letter})", loc="left")
+    style.lettered(axes)
     return fig
 
 
 def draw_stress(ax, numbers: dict) -> None:
     around = numbers["cylinder"]
-    ax.axvspan(np.degrees(numbers["pulled"]), 180, color="0.92", lw=0)
-    for what, colour, said in (("normal", "#D55E00", "normal"), ("tangent", "#0072B2", "tangential")):
-        ax.plot(np.degrees(numbers["beta"]), numbers[what], color=colour, label=f"{said}, plates")
-        ax.plot(np.degrees(around["beta"]), around[what], "o", color=colour, mfc="white", ms=4, label="cylinder")
-    ax.axhline(0.0, color="0.6", lw=0.6)
+    ax.axvspan(np.degrees(numbers["pulled"]), 180, **style.SHADED)
+    looks = (("normal", style.VERMILION, "o", "normal"), ("tangent", style.BLUE, "s", "tangential"))
+    for what, colour, marker, name in looks:
+        ax.plot(np.degrees(numbers["beta"]), numbers[what], color=colour, label=f"{name}, plates")
+        dots = {"color": colour, "mfc": "white", "ms": 4, "label": f"{name}, cylinder"}
+        ax.plot(np.degrees(around["beta"]), around[what], marker, **dots)
+    style.zero_line(ax)
     ax.set(xlabel=r"tilt $\beta$ of the face: underside 0, front 90, top 180", ylabel="stress / depth (N/cm$^3$)")
     ax.set(xlim=(0, 180), xticks=range(0, 181, 45))
-    ax.text(178, ax.get_ylim()[1], "grains pull", ha="right", va="top", fontsize=8)
+    ax.text(178, ax.get_ylim()[1], "grains pull", ha="right", va="top", **style.NOTE)
     ax.legend(loc="lower left")
 
 
 def draw_ratios(ax, numbers: dict) -> None:
-    for k, (name, found) in enumerate(numbers["rods"].items()):
-        style = {"color": COLOURS[name], "ls": "none", "marker": "o"}
-        ax.plot(k, found["keep"]["ratio"], ms=5, label="map as it is" if k == 0 else None, **style)
-        ax.plot(k, found["cut"]["ratio"], ms=9, mfc="none", label="tension cut" if k == 0 else None, **style)
+    arrow = {"arrowstyle": "-|>", "color": "0.3", "lw": 1.6}
+    for k, (name, rod) in enumerate(numbers["rods"].items()):
+        ax.plot(k, rod["keep"]["ratio"], "o", ms=5, color=COLOURS[name])
+        ax.plot(k, rod["cut"]["ratio"], "o", ms=9, mfc="none", color=COLOURS[name])
         if sign := numbers["measured"][name]:
-            ax.annotate(
-                "", (k + 0.3, 0.3 * sign), (k + 0.3, 0.0), arrowprops={"arrowstyle": "-|>", "color": "0.3", "lw": 1.6}
-            )
-            up = "up" if sign > 0 else "down"
-            ax.text(
-                k + 0.3, 0.34 * sign, f"measured:\n{up}", fontsize=7, ha="center", va="bottom" if sign > 0 else "top"
-            )
-    ax.axhline(0.0, color="0.6", lw=0.6)
+            ax.annotate("", (k + 0.3, 0.3 * sign), (k + 0.3, 0.0), arrowprops=arrow)
+            way, side = ("up", "bottom") if sign > 0 else ("down", "top")
+            ax.text(k + 0.3, 0.34 * sign, f"measured:\n{way}", fontsize=7, ha="center", va=side)
+    style.entry(ax, "map as it is", ls="", marker="o", ms=5)
+    style.entry(ax, "tension cut", ls="", marker="o", ms=9, mfc="none")
+    style.zero_line(ax)
     ax.set(xticks=range(len(RODS)), xticklabels=[n.replace(", ", ",\n") for n in RODS], ylabel="lift / drag, deep down")
     ax.set(xlim=(-0.4, len(RODS) - 0.3), ylim=(-0.6, 1.3))
     ax.legend(loc="upper left", ncols=2)

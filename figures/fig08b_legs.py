@@ -3,7 +3,7 @@
 All three have the projected length 2 R with R = 3.8 cm, and turn at 2 pi rad/s; doubling that changes no force, in the text
 and here. Angle 0 is where a leg points straight down, and positive angles come later. The forces are not symmetric about it:
 a leg presses into the grains on its way down and is held back by them on its way up, where they are weaker. What the
-curvature does to this is told by `asymmetry`, the odd part of a force in the angle over its even part. The c-leg, its bulge
+curvature does to this shows in `asymmetry`, the odd part of a force in the angle over its even part. The c-leg, its bulge
 ahead, meets the grains first, feels most lift and is pushed up until it has all but left; the flat leg and the reversed one
 are pulled down at the end, and the reversed one, its hollow ahead, has its peaks after straight down.
 
@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
 
@@ -27,8 +27,11 @@ HUBS = (-0.01, 0.0, 0.01)  # m, added to the scene's height
 
 
 def compute(legs=LEGS, hubs=HUBS, samples: int = 541) -> dict:
-    """By leg: {"outline": (N, 2), m, "hub": its height, m, "angle": (T,), radians, "force": (H, T, 2), N, for hubs at the
-    scene's height plus ``hubs``}. The angles are alike on both sides of 0."""
+    """Return {"legs", "own": row of the scene's own height among ``hubs``}.
+
+    By leg: {"outline": (N, 2), m, "hub": its height, m, "angle": (T,), radians, "force": (H, T, 2), N, for hubs at the scene's
+    height plus ``hubs``}. The angles are symmetric about 0.
+    """
     found = {}
     for name in legs:
         scene = load(name)
@@ -43,13 +46,13 @@ def compute(legs=LEGS, hubs=HUBS, samples: int = 541) -> dict:
 
 
 def asymmetry(angle, force) -> float:
-    """Norm of the part of a force that is odd in the angle over that of the even one; angles alike on both sides of 0."""
+    """Return the norm of the odd part of a force over that of its even part, at angles (T,) symmetric about 0."""
     even, odd = (force + force[::-1]) / 2, (force - force[::-1]) / 2
     return float(np.sqrt(np.trapezoid(odd**2, angle) / np.trapezoid(even**2, angle)))
 
 
 def peaks(numbers: dict, name: str) -> dict:
-    """Of the hub at the scene's height, by component "x", "z": {"peak", "least": N, "at": degrees, "asymmetry"}."""
+    """Return, at the scene's height, {"peak", "least": N, "at": degrees, "asymmetry"} by component "x", "z"."""
     leg, out = numbers["legs"][name], {}
     for k, axis in enumerate("xz"):
         force = leg["force"][numbers["own"], :, k]
@@ -61,17 +64,17 @@ def peaks(numbers: dict, name: str) -> dict:
 
 
 def table(numbers: dict) -> str:
-    """Peaks, where they are, and asymmetry."""
-    lines = ["leg              force   peak (N)   at (degrees)   least (N)   odd / even in the angle"]
-    for name in numbers["legs"]:
-        for axis, p in peaks(numbers, name).items():
-            lines.append(
-                f"{name:17}F_{axis}{p['peak']:12.2f}{p['at']:12.0f}{p['least'] + 0.0:14.2f}{p['asymmetry']:16.2f}"
-            )
-    return "\n".join(lines)
+    """Return peaks, the angles at which they are, and asymmetry."""
+    heads = "leg", "force", "peak (N)", "at (degrees)", "least (N)", "odd / even in the angle"
+    rows = [
+        (name, f"F_{axis}", f"{p['peak']:.2f}", f"{p['at']:.0f}", f"{p['least'] + 0.0:.2f}", f"{p['asymmetry']:.2f}")
+        for name in numbers["legs"]
+        for axis, p in peaks(numbers, name).items()
+    ]
+    return style.table(heads, rows)
 
 
-COLOURS = dict(zip(LEGS, ("#0072B2", "black", "#D55E00")))
+LOOKS = dict(zip(LEGS, ((style.BLUE, "o"), (style.BLACK, "s"), (style.VERMILION, "^"))))
 LABELS = dict(zip(LEGS, ("c-leg", "flat leg", "reversed c-leg")))
 DRAWN = (-75, -25, 25, 75)  # degrees
 
@@ -80,31 +83,34 @@ DRAWN = (-75, -25, 25, 75)  # degrees
 def draw(numbers: dict):
     fig, axes = plots.figure(8.4, 5.2, 3, 2)
     for ax, (name, leg) in zip(axes[0], numbers["legs"].items()):
-        draw_leg(ax, leg, COLOURS[name])
+        draw_leg(ax, leg, *LOOKS[name])
         ax.set_title(LABELS[name])
-    axes[0, 0].text(-10.5, -9.2, "light to dark: 75 degrees\nbefore to 75 after", fontsize=7, va="bottom", color="0.3")
-    for ax, k, said in ((axes[1, 0], 0, "$F_x$, forwards (N)"), (axes[1, 1], 1, "$F_z$, upwards (N)")):
+    note = "light to dark: 75 degrees\nbefore to 75 after"
+    axes[0, 0].text(-10.5, -9.2, note, va="bottom", **style.NOTE | {"fontsize": 7})
+    for ax, k, label in ((axes[1, 0], 0, "$F_x$, forwards (N)"), (axes[1, 1], 1, "$F_z$, upwards (N)")):
         for name, leg in numbers["legs"].items():
-            angle = np.degrees(leg["angle"])
-            for row, force in enumerate(leg["force"]):
-                own = row == numbers["own"]
-                ax.plot(angle, force[:, k], "-" if own else ":", color=COLOURS[name], lw=1.4 if own else 0.8)
-        ax.axhline(0.0, color="0.6", lw=0.6)
-        ax.axvline(0.0, color="0.8", lw=0.6, zorder=0)
-        ax.set(xlabel=r"angle $\theta$ (degrees), 0: straight down", ylabel=said, xlim=(-135, 135))
+            angle, (colour, marker) = np.degrees(leg["angle"]), LOOKS[name]
+            ax.plot(angle, leg["force"][:, :, k].T, ":", color=colour, lw=0.8)
+            own = leg["force"][numbers["own"], :, k]
+            ax.plot(angle, own, color=colour, lw=1.4, marker=marker, ms=4, markevery=[own.argmax()])
+        style.zero_line(ax)
+        ax.axvline(0.0, **style.GUIDE)
+        ax.set(xlabel=r"angle $\theta$ (degrees), 0: straight down", ylabel=label, xlim=(-135, 135))
         ax.set_xticks(range(-90, 91, 45))
     draw_asymmetry(axes[1, 2], numbers)
     return fig
 
 
-def draw_leg(ax, leg: dict, colour: str) -> None:
-    """Poses at a few angles, the first the lightest."""
+def draw_leg(ax, leg: dict, colour: str, marker: str) -> None:
+    """Draw poses at a few angles, the first the lightest; the marker at the tip is that of the leg's peaks."""
     for strength, degrees in zip((0.25, 0.5, 0.75, 1.0), DRAWN):
         cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
         x, z = (leg["outline"] @ np.array([[cos, -sin], [sin, cos]])).T
-        ax.plot(1e2 * x, 1e2 * (z + leg["hub"]), color=colour, alpha=strength, lw=1.8)
+        ax.plot(
+            1e2 * x, 1e2 * (z + leg["hub"]), color=colour, alpha=strength, lw=1.8, marker=marker, ms=5, markevery=[-1]
+        )
     ax.plot(0.0, 1e2 * leg["hub"], "o", color="0.3", ms=4)
-    ax.axhline(0.0, color="peru", lw=1.0, zorder=0)
+    ax.axhline(0.0, **style.SURFACE)
     ax.set(aspect="equal", xlabel="x (cm)", ylabel="z (cm)", xlim=(-11, 11), ylim=(-9.5, 5.5))
 
 
@@ -112,9 +118,9 @@ def draw_asymmetry(ax, numbers: dict) -> None:
     for k, name in enumerate(numbers["legs"]):
         for axis, marker, right in (("x", "o", -0.1), ("z", "s", 0.1)):
             at = peaks(numbers, name)[axis]["asymmetry"]
-            ax.plot(k + right, at, marker, ms=6, color=COLOURS[name], mfc="white" if axis == "x" else None)
-    ax.plot([], [], "o", ms=6, mfc="white", color="0.3", label="$F_x$")
-    ax.plot([], [], "s", ms=6, color="0.3", label="$F_z$")
+            ax.plot(k + right, at, marker, ms=6, color=LOOKS[name][0], mfc="white" if axis == "x" else None)
+    style.entry(ax, "$F_x$", ls="", marker="o", ms=6, mfc="white")
+    style.entry(ax, "$F_z$", ls="", marker="s", ms=6)
     ax.set(xticks=range(len(LEGS)), xticklabels=[LABELS[n].replace(" c", "\nc") for n in LEGS], ylim=(0, None))
     ax.set(ylabel="odd / even part in the angle", xlim=(-0.5, len(LEGS) - 0.5))
     ax.legend(loc="upper right")

@@ -16,16 +16,17 @@ The paper's text and caption define the efficiency by the wavelength and show it
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.gaits import Sine
 from geomech.output import plots
-from geomech.scene import Scene, load
+from geomech.scene import load
 from geomech.study import undulation
 
-SCENES = {"sandfish-loose": "#D55E00", "sandfish-close": "#0072B2", "shovel-nosed-snake": "#009E73"}
+SCENES = {"sandfish-loose": style.LOOSE, "sandfish-close": style.CLOSE, "shovel-nosed-snake": style.GREEN}
 ROUGHER = "shovel-nosed-snake, rod 0.2"  # the snake, if the law's rod had that friction, not the 0.15 of Fig. 5
 COLOURS = {**SCENES, ROUGHER: "#8FD3B6"}
 ENDLESS = {  # how an endless wave is drawn: with the head's drag, kinematics, dashes, label
@@ -43,8 +44,8 @@ MEASURES = {  # what is best: the largest (1) or the least (-1)
 
 
 def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
-    """For each scene and ROUGHER, with ``finer`` times its elements, its `undulation.performance` over amplitudes A /
-    lambda (B,), and "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the
+    """Return for each scene and ROUGHER, with ``finer`` times its elements, its `undulation.performance` over amplitudes
+    A / lambda (B,), and "best": {measure: (amplitude, value)} of progress and MEASURES that have an optimum among the
     amplitudes. For the sandfish efficiencies (B,) of ENDLESS waves, "animal", its own A / lambda (the snake's is
     assumed, and not marked), and "cycle" (N, 3), body velocity at that amplitude.
 
@@ -53,40 +54,23 @@ def compute(amplitudes=AMPLITUDES, finer: int = 3) -> dict:
     """
     out = {}
     for name in COLOURS:
-        scene = refined(load(name.partition(",")[0]), finer)
+        scene = undulation.refined(load(name.partition(",")[0]), finer)
         if name == ROUGHER:
             skin, *others = scene.system.effects
             scene = scene.changed(effects=(dataclasses.replace(skin, reference=0.2), *others))
         found = undulation.performance(scene, amplitudes)
-        best = {k: optimum(amplitudes, found[k], sign) for k, (sign, _) in {"progress": (1, ""), **MEASURES}.items()}
-        found["best"] = {k: v for k, v in best.items() if v is not None}
+        signs = {"progress": 1, **{key: sign for key, (sign, _) in MEASURES.items()}}
+        best = {key: undulation.optimum(amplitudes, found[key], sign) for key, sign in signs.items()}
+        found["best"] = {key: place for key, place in best.items() if place is not None}
         if name.startswith("sandfish"):
             for key, (capped, kinematics, _, _) in ENDLESS.items():
                 cap = scene.system.effects[0] if capped else None
-                waves = [
-                    undulation.endless_sine(scene.system.medium, a, cap, kinematics=kinematics) for a in amplitudes
-                ]
-                found[key] = np.array(waves)
+                wave = functools.partial(undulation.endless_sine, scene.system.medium, kinematics=kinematics)
+                found[key] = np.array([wave(a, cap) for a in amplitudes])
             found["animal"] = scene.gait.amplitude
             found["cycle"] = undulation.performance(scene, [scene.gait.amplitude])["velocity"][0]
         out[name] = found
     return out
-
-
-def refined(scene: Scene, finer: int) -> Scene:
-    """The scene with that many times its elements."""
-    elements = finer * scene.gait.elements
-    gait = dataclasses.replace(scene.gait, elements=elements)
-    return scene.changed(body=dataclasses.replace(scene.system.body, elements=elements), gait=gait)
-
-
-def optimum(amplitudes, values, sign: int) -> tuple[float, float] | None:
-    """Amplitude and height of the largest (sign 1) or least (-1) of positive values; None at the edge of the range."""
-    heights = sign * np.log(values)
-    if np.argmax(heights) in (0, len(heights) - 1):
-        return None
-    place, height = undulation.best(amplitudes, heights)
-    return place, float(np.exp(sign * height))
 
 
 @plots.styled
@@ -105,7 +89,7 @@ def draw(numbers: dict):
     axes[-2, 1].set_xlabel(r"$A/\lambda$")
     for ax, name in zip(axes[-1], ("sandfish-loose", "sandfish-close")):
         draw_cycle(ax, numbers[name]["cycle"], name)
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.6)
+        style.legend_above(ax, 3, columnspacing=1.0, handlelength=1.6)
     axes[-1, 0].set_ylabel("body velocity")
     fig.align_ylabels(axes[:, 0])
     legend(fig, axes[0, 0], numbers["sandfish-loose"]["animal"])
@@ -126,37 +110,30 @@ def draw_measure(ax, numbers: dict, key: str, against: str):
             if unit is not None and endless in found:
                 values = found[endless] * unit
                 ax.plot(x, values, color=colour, ls=dashes, lw=1.0)
-                if best := optimum(found["amplitude"], values, 1):
+                if best := undulation.optimum(found["amplitude"], values):
                     ax.plot(place(best[0]), best[1], "o", mfc="white", color=colour, ms=4, mew=1.0)
-    ax.axvline(place(numbers["sandfish-loose"]["animal"]), color="0.6", ls="-.", lw=0.8, zorder=0)
+    ax.axvline(place(numbers["sandfish-loose"]["animal"]), **style.GUIDE, ls="-.")
     ax.set_xlim(0, place(0.6))
 
 
 def draw_cycle(ax, velocity: np.ndarray, name: str):
-    """xi over a cycle, closed."""
+    """Draw xi over a cycle, closed."""
     t = 2 * np.pi * np.arange(len(velocity) + 1) / len(velocity)
     closed = np.concatenate([velocity, velocity[:1]])
-    styles = (("-", r"$\xi_x$ (BL/rad)"), ("--", r"$\xi_y$ (BL/rad)"), ("-.", r"$\xi_\theta$ (rad/rad)"))
-    for values, (dashes, label) in zip(closed.T, styles):
+    looks = (("-", r"$\xi_x$ (BL/rad)"), ("--", r"$\xi_y$ (BL/rad)"), ("-.", r"$\xi_\theta$ (rad/rad)"))
+    for values, (dashes, label) in zip(closed.T, looks):
         ax.plot(t, values, ls=dashes, color=SCENES[name], label=label)
-    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
-    ax.set(xlabel=f"phase of the cycle (rad), {name.replace('-', ' ')}", xlim=(0, 2 * np.pi))
-    ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
+    style.zero_line(ax)
+    style.phase_axis(ax, label=f"phase of the cycle (rad), {name.replace('-', ' ')}")
 
 
 def legend(fig, ax, animal: float):
-    """Of all panels but the last two, above them."""
-    from matplotlib.lines import Line2D
-
-    handles, labels = ax.get_legend_handles_labels()
-    for style, label in (
-        *(({"color": "0.3", "ls": dashes, "lw": 1.0}, label) for _, _, dashes, label in ENDLESS.values()),
-        ({"color": "0.3", "ls": "", "marker": "o", "ms": 5}, "optimum (open: endless)"),
-        ({"color": "0.6", "ls": "-.", "lw": 0.8}, rf"sandfish, $A/\lambda = {animal:g}$"),
-    ):
-        handles.append(Line2D([], [], **style))
-        labels.append(label)
-    fig.legend(handles, labels, loc="outside upper center", ncols=3)
+    """Draw that of all panels but the last two, above them."""
+    for _, _, dashes, label in ENDLESS.values():
+        style.entry(ax, label, ls=dashes, lw=1.0)
+    style.entry(ax, "optimum (open: endless)", ls="", marker="o", ms=5)
+    style.entry(ax, rf"sandfish, $A/\lambda = {animal:g}$", **style.GUIDE, ls="-.")
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3)
 
 
 if __name__ == "__main__":

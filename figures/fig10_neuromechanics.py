@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.gaits import Sine
 from geomech.output import plots
 from geomech.scene import load
@@ -37,8 +37,9 @@ PLACES = (0.25, 0.5, 0.75)  # of the table
 
 
 def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
-    """Of a sandfish in loose glass at the scene's A / lambda, for ``waves`` (W,) on its body, without head drag:
+    """Return the activation of a sandfish in loose glass at the scene's A / lambda, with ``waves`` (W,) on its body.
 
+    Without head drag:
     "waves": (W,). "s": (S,), tail 0 to head 1. "lag": (W, S), rad. "speed", "fundamental_speed": (W,), ratios by the lines
     of onset and offset and by the first harmonic. "one": all of `undulation.activation` for one wave.
     "head": {"lag", "speed", "fundamental_speed"}, the same with head drag.
@@ -57,22 +58,17 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
 
 
 def shown(numbers: dict) -> list[int]:
-    """Rows of the waves in SHOWN."""
+    """Return the rows of the waves in SHOWN."""
     return [k for k, w in enumerate(numbers["waves"]) if np.isclose(w, SHOWN).any()]
 
 
 def table(numbers: dict) -> str:
-    """For the waves in SHOWN: speed ratios, and phase in rad by which activation is ahead of curvature at three places."""
-    lines = [
-        "        speed of activation / curvature wave     activation ahead by (rad)",
-        "waves   lines   harmonic   lines, head drag     " + "".join(f"s = {s:<6}" for s in PLACES).rstrip(),
-    ]
-    for k in shown(numbers):
-        ratios = numbers["speed"][k], numbers["fundamental_speed"][k], numbers["head"]["speed"][k]
-        lags = np.interp(PLACES, numbers["s"], numbers["lag"][k])
-        row = "{:5.2f}{:8.2f}{:11.2f}{:19.2f}".format(numbers["waves"][k], *ratios)
-        lines.append((row + " " * 5 + "".join(f"{x:<10.2f}" for x in lags)).rstrip())
-    return "\n".join(lines)
+    """Return speed ratios and the phase by which activation is ahead of curvature at three places."""
+    heads = "waves", "speed ratio: lines", "harmonic", "lines, head drag", *(f"ahead at s = {s} (rad)" for s in PLACES)
+    columns = numbers["waves"], numbers["speed"], numbers["fundamental_speed"], numbers["head"]["speed"]
+    lags = np.array([np.interp(PLACES, numbers["s"], lag) for lag in numbers["lag"]])
+    rows = np.column_stack([*columns, lags])[shown(numbers)]
+    return style.table(heads, [[f"{x:.2f}" for x in row] for row in rows])
 
 
 @plots.styled
@@ -82,70 +78,65 @@ def draw(numbers: dict):
     draw_trace(axes[0, 1], numbers["one"])
     draw_lag(axes[1, 0], numbers)
     draw_speed(axes[1, 1], numbers)
-    for ax, letter in zip(axes.flat, "abcd"):
-        ax.set_title(f"({letter})", loc="left")
+    style.lettered(axes)
     return fig
-
-
-SHADE = {"color": "0.82", "lw": 0}
-GREEN, BLUE = "#009E73", "#0072B2"
-QUARTERS = np.pi / 2 * np.arange(5)
-QUARTER_LABELS = ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
 
 
 def draw_map(ax, one: dict):
     s, t = one["s"], np.append(one["t"], 2 * np.pi)
     rate = np.concatenate([one["bend_rate"], one["bend_rate"][:1]])
-    ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[SHADE["color"]])
+    ax.contourf(s, t, rate, levels=[-np.inf, 0.0], colors=[style.SHADED["color"]])
     for key, dashes in (("onset", "-"), ("offset", "--")):
         for turn in (-2 * np.pi, 0.0, 2 * np.pi):  # the lines leave the cycle and come back into it
-            ax.plot(s, one[key] + turn, color=GREEN, ls=dashes, label=f"{key} of right side" if turn == 0 else None)
-    ax.fill([], [], label="bending to the right", **SHADE)
-    ax.set(xlabel="place on the body, tail 0 to head 1", ylabel="phase of the cycle (rad)", xlim=(0, 1))
-    ax.set(ylim=(0, 2 * np.pi), yticks=QUARTERS, yticklabels=QUARTER_LABELS)
+            ax.plot(
+                s, one[key] + turn, color=style.GREEN, ls=dashes, label=f"{key} of right side" if turn == 0 else None
+            )
+    ax.fill([], [], label="bending to the right", **style.SHADED)
+    ax.set(xlabel="place on the body, tail 0 to head 1", xlim=(0, 1))
+    style.phase_axis(ax, "y")
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
 def draw_trace(ax, one: dict):
-    """Curvature and moment over a cycle at PLACE, each over its largest value, and the span in which the right works."""
+    """Draw curvature and moment over a cycle at PLACE, each over its largest value, and the span in which the right works."""
     k, t = np.abs(one["s"] - PLACE).argmin(), np.append(one["t"], 2 * np.pi)
-    for key, color, label in (
-        ("bend", BLUE, "curvature, + to the left"),
-        ("moment", GREEN, "moment, + left side works"),
-    ):
+    looks = (
+        ("bend", style.BLUE, 1.0, "curvature, + to the left"),
+        ("moment", style.GREEN, 2.0, "moment, + left side works"),
+    )
+    for key, colour, width, label in looks:
         trace = np.append(one[key][:, k], one[key][0, k])
-        ax.plot(t, trace / np.abs(trace).max(), color=color, label=label)
+        ax.plot(t, trace / np.abs(trace).max(), color=colour, lw=width, label=label)
     falls = np.append(one["bend_rate"][:, k], one["bend_rate"][0, k]) < 0
-    ax.fill_between(t, -1.1, 1.1, where=falls, label="bending to the right", **SHADE)
+    ax.fill_between(t, -1.1, 1.1, where=falls, label="bending to the right", **style.SHADED)
     for key, dashes in (("onset", "-"), ("offset", "--")):
-        ax.axvline(np.mod(one[key][k], 2 * np.pi), color=GREEN, ls=dashes, lw=1.0)
-    ax.axhline(0.0, color="0.5", lw=0.6)
-    ax.set(xlabel="phase of the cycle (rad)", ylabel=f"over its largest value, at s = {PLACE}", ylim=(-1.1, 1.1))
-    ax.set(xlim=(0, 2 * np.pi), xticks=QUARTERS, xticklabels=QUARTER_LABELS)
+        ax.axvline(np.mod(one[key][k], 2 * np.pi), color=style.GREEN, ls=dashes, lw=1.0)
+    style.zero_line(ax)
+    ax.set(ylabel=f"over its largest value, at s = {PLACE}", ylim=(-1.1, 1.1))
+    style.phase_axis(ax)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
 def draw_lag(ax, numbers: dict):
-    from cmcrameri import cm
-
-    for k in shown(numbers):
-        waves = numbers["waves"][k]
-        colour = cm.batlow(0.8 * (waves - SHOWN[0]) / (SHOWN[-1] - SHOWN[0]))
-        ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=f"{waves:g}")
-    ax.axhline(np.pi / 2, color="0.5", lw=0.6)
-    ax.text(0.02, np.pi / 2 - 0.08, "works while\nit shortens", va="top", fontsize=8, color="0.3")
+    rows = shown(numbers)
+    for k, colour in zip(rows, style.shades(len(rows))):
+        ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=f"{numbers['waves'][k]:g}")
+    ax.axhline(np.pi / 2, **style.GUIDE)
+    ax.text(0.02, np.pi / 2 - 0.08, "works while\nit shortens", va="top", **style.NOTE)
     ax.set(xlabel="place on the body, tail 0 to head 1", ylabel="activation ahead of curvature (rad)", xlim=(0, 1))
-    ax.set(yticks=QUARTERS[:4], yticklabels=QUARTER_LABELS[:4])
+    style.quarter_ticks(ax, "y", 4)
     ax.legend(title="waves on the body", loc="upper right", ncols=2)
 
 
 def draw_speed(ax, numbers: dict):
     waves, head = numbers["waves"], numbers["head"]
-    for key, colour, label in (("speed", "black", "onset, offset"), ("fundamental_speed", "#D55E00", "first harmonic")):
-        ax.plot(waves, numbers[key], color=colour, label=label)
-        ax.plot(waves, head[key], color=colour, ls="--", lw=1.0)
-    ax.plot([], [], "--", color="0.4", lw=1.0, label="with head drag")
-    ax.axhline(1.0, color="0.5", lw=0.6)
+    looks = ("speed", "o", style.BLACK, "onset, offset"), ("fundamental_speed", "^", style.VERMILION, "first harmonic")
+    for key, marker, colour, label in looks:
+        look = {"color": colour, "marker": marker, "markevery": 4}
+        ax.plot(waves, numbers[key], label=label, **look)
+        ax.plot(waves, head[key], ls="--", lw=1.0, **look)
+    style.entry(ax, "with head drag", ls="--", lw=1.0)
+    ax.axhline(1.0, **style.GUIDE)
     ax.set(xlabel="waves on the body", ylabel="speed of activation / curvature", ylim=(0, None))
     ax.legend(loc="lower left")
 

@@ -10,11 +10,10 @@ from geomech.study.bench import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:
-    """The CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
+    """Return the CCF on its grid and its error (Fields with values (3, N, N)), and the gaits."""
     loaded = load(scene).with_numerics(**numerics)
     study = Study(loaded)
-    fields = {"ccf": study.curvature, "error": study.curvature_error}
-    return {**fields, "gaits": [loaded.gait, Butterfly()]}
+    return {"ccf": study.curvature, "error": study.curvature_error, "gaits": [loaded.gait, Butterfly()]}
 
 
 @plots.styled

@@ -16,7 +16,7 @@ AMPLITUDES = {"circle": np.linspace(0.125, 2.25, 18), "butterfly": np.linspace(0
 
 
 def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> dict:
-    """For each gait a table as `Study.study` gives it."""
+    """Return a table for each gait, as `Study.study` gives it."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
     study = Study(loaded)
     tables = {name: study.study(a, METHODS, GAITS[name]) for name, a in amplitudes.items()}

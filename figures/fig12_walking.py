@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.output.walk_sweeps import curves
 from geomech.scene import load
@@ -22,7 +22,7 @@ AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
 
 
 def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR) -> dict:
-    """walk: of Xplorer as it is built in; legs, flow: as `geomech.study.walking.sweep` gives them."""
+    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.study.walking.sweep` gives them."""
     xplorer, sandbot = load("xplorer"), load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
     flows = {"effects.aeration.air_speed": air, "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist()}
@@ -33,32 +33,31 @@ def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR
 def draw(numbers: dict):
     fig, axes = plots.figure(10.4, 3.1, 3)
     walk, (ax, legs, flow) = numbers["walk"].walk, axes[0]
-    some = walk.t <= 3.0
-    ax.plot(walk.t[some], walk.twist[some, 0], color="black", lw=0.9)
-    ax.axhline(walk.speed, color="C3", ls="--", lw=1.0)
+    shown = walk.t <= 3.0
+    ax.plot(walk.t[shown], walk.twist[shown, 0], color=style.BLACK, lw=0.9)
+    ax.axhline(walk.speed, color=style.VERMILION, ls="--", lw=1.0)
     ax.set(xlabel="$t$ (s)", ylabel="forward speed (m/s)", xlim=(0, 3), title="(b) Xplorer, 2 Hz; dashed: mean")
     for ax, name, unit, scale in ((legs, "legs", "Hz", 1.0), (flow, "flow", "rad/s", 2 * np.pi)):
         values, second = numbers[name]["over"].values()
         curves(ax, list(values), numbers[name], [f"{scale * f:.3g} {unit}" for f in second])
-        ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+        style.zero_line(ax)
     legs.set(xlabel="leg curvature $R/r$", ylabel="mean speed (m/s)", title="(d) Xplorer")
     flow.set(xlabel="air speed (m/s)", ylabel="mean speed (m/s)", title="(f) SandBot; open: stuck or sunk")
     return fig
 
 
 def table(numbers: dict) -> str:
-    """Mean speeds, m/s, and what does not walk."""
-    rows = []
-    for name in ("legs", "flow"):
-        found = numbers[name]
-        values, second = found["over"].values()
-        rows.append(f"{name:8}" + "".join(f"{v:9.3g}" for v in values))
-        for k, v in enumerate(second):
-            cells = zip(found["speed"][:, k], found["status"][:, k])
-            rows.append(
-                f"{v:6.3g}Hz" + "".join(f"{s:8.3f}{' ' if kind == 'walking' else kind[1]}" for s, kind in cells)
-            )
-    return "\n".join(rows)
+    """Return mean speeds, m/s, and what became of those that do not walk."""
+    tables = []
+    for name, of in (("legs", "leg curvature"), ("flow", "air speed (m/s)")):
+        values, frequencies = numbers[name]["over"].values()
+        status = np.where(numbers[name]["status"] == "walking", "", numbers[name]["status"])
+        rows = [
+            [f"at {f:.3g} Hz", *(f"{speed:.3f} {kind}".strip() for speed, kind in zip(speeds, kinds))]
+            for f, speeds, kinds in zip(frequencies, numbers[name]["speed"].T, status.T)
+        ]
+        tables.append(style.table((of, *(f"{x:.3g}" for x in values)), rows))
+    return "\n\n".join(tables)
 
 
 if __name__ == "__main__":

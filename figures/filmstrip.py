@@ -10,7 +10,7 @@ from geomech.study.motion import motion
 
 
 def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:
-    """The motion (`geomech.study.motion.Motion`), and the CCF with its error."""
+    """Return the motion (`geomech.study.motion.Motion`), and the CCF with its error."""
     study = Study(load(scene).with_numerics(**numerics))
     return {"motion": motion(study.scene, cycles), "ccf": study.curvature, "error": study.curvature_error}
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.gaits import Butterfly, Circle
 from geomech.output import plots
 from geomech.scene import load
 from geomech.study.bench import Study
 
-FRAMES = {"mean": "#D55E00", "link-2": "#0072B2", "minimum-perturbation": "#009E73"}
+FRAMES = "mean", "link-2", "minimum-perturbation"
 GAITS = {
     "circle": (Circle(), 2.0, "radius of the circle (rad)"),
     "butterfly": (Butterfly(), 1.2, "scale of the butterfly"),
@@ -24,8 +24,10 @@ GAITS = {
 
 
 def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) -> dict:
-    """{gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body lengths and rad, each in its own frame. The field
-    reaches as far as the gaits."""
+    """Return {gait: {"amplitude": (B,), frame: {tier: (B, 3)}}} of net poses, body lengths and rad, each in its own frame.
+
+    The field reaches as far as the gaits.
+    """
     study = Study(load(scene)).turned(grid=grid, extent=2.7)
     found: dict = {name: {"amplitude": np.linspace(0, top, count + 1)[1:]} for name, (_, top, _) in GAITS.items()}
     for frame in FRAMES:
@@ -37,12 +39,8 @@ def compute(scene: str = "three-link-glass", count: int = 20, grid: int = 31) ->
 
 
 def missed(poses: dict, tier: str) -> np.ndarray:
-    """(B,): distance of a tier's positions from those of the force balance."""
+    """Return the distances (B,) of a tier's positions from those of the force balance."""
     return np.hypot(*(poses[tier] - poses["direct"])[:, :2].T)
-
-
-def _handles(*axes) -> list:
-    return [line for ax in axes for line in ax.lines if not line.get_label().startswith("_")]
 
 
 @plots.styled
@@ -51,14 +49,15 @@ def draw(numbers: dict):
     for (name, (_, _, label)), above, below in zip(GAITS.items(), *axes):
         a = numbers[name]["amplitude"]
         above.plot(a, np.hypot(*numbers[name]["mean"]["direct"][:, :2].T), color="0.72", lw=4, label="force balance")
-        for frame, colour in FRAMES.items():
-            poses = numbers[name][frame]
-            above.plot(a, np.hypot(*poses["area"][:, :2].T), color=colour, label=f"area, {frame} frame")
-            below.plot(a, missed(poses, "area"), color=colour)
-        below.plot(a, missed(numbers[name]["mean"], "path"), ":", color="black", label="path, any frame")
+        for k, frame in enumerate(FRAMES, 1):
+            poses, look = numbers[name][frame], style.sparse(k, len(a))
+            above.plot(a, np.hypot(*poses["area"][:, :2].T), label=f"area, {frame} frame", **look)
+            below.plot(a, missed(poses, "area"), **look)
+        below.plot(a, missed(numbers[name]["mean"], "path"), ":", color=style.BLACK)
+        style.entry(above, "path, any frame", ls=":", color=style.BLACK)
         above.set(title=name, ylabel="net distance (BL)", ylim=(0, None))
         below.set(xlabel=label, ylabel="off the force balance by (BL)", ylim=(0, None))
-    fig.legend(loc="outside lower center", handles=_handles(axes[0, 0], axes[1, 0]), ncols=3)
+    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return fig
 
 

@@ -12,11 +12,11 @@ import dataclasses
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
-from rft.vertical.effects import Aeration, DisturbedGround, GrainInertia, Slope
-from rft.vertical.effects.slope import REPOSE
+from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope
+from rft.ground.slope import REPOSE
 
 SEEN = 230.0  # rpm
 SHARE = 0.1  # of the force, from which an effect counts as seen; assumed
@@ -24,7 +24,7 @@ PLACES = (-0.04, 0.0, 0.04)  # m
 
 
 def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0, 0.2, 0.4, 0.6, 0.8)) -> dict:
-    """rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
+    """Return rates (R,), rpm; added (S, R); at (S,): the rate at which SHARE is added. shares (N,), aerated, rising and
     falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
     REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
@@ -48,13 +48,14 @@ def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0,
 
 
 def _added(leg, plain, strength: float, rpm: float) -> float:
+    """Return the rms over the turn of the force that the inertia of grains adds, N."""
     fast = dataclasses.replace(leg.motion, rate=rpm * 2 * np.pi / 60)
     found = leg.changed(motion=fast, effects=(GrainInertia(strength),)).run()
     return np.sqrt(((found.force - plain.force) ** 2).sum(-1).mean())
 
 
 def table(numbers: dict) -> str:
-    """From which rate on the inertia of grains is seen."""
+    """Return the rates from which on the inertia of grains is seen."""
     at_seen = numbers["added"][:, list(numbers["rates"]).index(SEEN)]
     return "\n".join(
         f"lambda = {k:g}: {100 * share:.0f} % of the force at {SEEN:.0f} rpm, {100 * SHARE:.0f} % at {at:.0f} rpm"
@@ -66,25 +67,29 @@ def table(numbers: dict) -> str:
 def draw(numbers: dict):
     fig, axes = plots.figure(10.2, 3.2, 3)
     left, middle, right = axes[0]
-    for k, added, shade in zip(numbers["strengths"], numbers["added"], ("#9ecae1", "#4292c6", "#084594")):
-        left.loglog(numbers["rates"], added, "o-", ms=3, lw=1.0, color=shade, label=rf"$\lambda$ = {k:g}")
-    left.axvline(SEEN, color="0.5", lw=0.8, ls="--")
-    left.axhline(SHARE, color="0.7", lw=0.6)
-    left.set(xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without", xticks=numbers["rates"])
-    left.set_xticklabels([str(x) for x in numbers["rates"]])
-    left.minorticks_off()
+    strengths = numbers["strengths"]
+    for strength, added, shade in zip(strengths, numbers["added"], style.shades(len(strengths))):
+        left.loglog(numbers["rates"], added, "o-", lw=1.0, color=shade, label=rf"$\lambda$ = {strength:g}")
+    left.axvline(SEEN, **style.GUIDE, ls="--")
+    left.axhline(SHARE, **style.GUIDE)
+    left.set(xlabel="rate of turning (rpm)", ylabel="added by grain inertia / force without")
+    style.named_ticks(left, numbers["rates"], [str(x) for x in numbers["rates"]])
     left.legend(loc="upper left")
-    middle.plot(numbers["shares"], numbers["aerated"], "o-", ms=3, lw=1.0, color="C0", label="air speed / fluidisation")
-    for name, marker, way in (("rising", "s-", "down"), ("falling", "s--", "up")):
-        label = f"slope / angle of repose, leg sweeps {way}hill"
-        middle.plot(numbers["shares"], numbers[name], marker, ms=3, lw=1.0, color="C3", label=label)
+    looks = (
+        ("aerated", "o-", style.BLUE, "air speed / fluidisation"),
+        ("rising", "s-", style.VERMILION, "slope / angle of repose, leg sweeps downhill"),
+        ("falling", "s--", style.VERMILION, "slope / angle of repose, leg sweeps uphill"),
+    )
+    for name, line, colour, label in looks:
+        middle.plot(numbers["shares"], numbers[name], line, lw=1.0, color=colour, label=label)
     middle.set(xlabel="share", ylabel="peak lift / that without", xlim=(0, 1), ylim=(0, 1.02))
-    middle.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    for place, colour in zip(numbers["lift"], ("0.2", "C1", "C2", "C4")):
+    style.legend_above(middle)
+    angle = np.degrees(numbers["angle"])
+    for k, (place, lift) in enumerate(numbers["lift"].items()):
         label = "untouched" if place is None else f"earlier at x = {1e3 * place:g} mm"
-        right.plot(np.degrees(numbers["angle"]), numbers["lift"][place], color=colour, lw=1.0, label=label)
+        right.plot(angle, lift, lw=1.0, label=label, **style.sparse(k, len(angle)))
     right.set(xlabel="angle of the leg (degrees)", ylabel="lift (N)")
-    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    style.legend_above(right, 2)
     return fig
 
 

@@ -1,7 +1,7 @@
 """Where kinks keep the linear connection and its odd harmonics from the truth: maps over shape space.
 
-Left: the fraction of directions of alphadot for which some link stands still. Middle and right: what the first harmonic
-(the connection) and all odd harmonics up to the 15th leave of the velocity, rms over directions, turning rate.
+Left: the fraction of directions of alphadot for which some link stands still. Middle and right: the residual of the turning
+rate, rms over directions, by the first harmonic (the connection) and by all odd harmonics up to the 15th.
 """
 
 from __future__ import annotations
@@ -11,30 +11,30 @@ import functools
 import numpy as np
 
 from figures import main
-from geomech import connection, harmonics
+from geomech.geometry import connection, harmonics
 from geomech.output import plots
 from geomech.scene import load
 
 
 def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 48) -> dict:
-    """axes; stuck (N, N); left: {1: (N, N), 15: (N, N)} in rad per rad."""
+    """Return axes; stuck (N, N); residual: {1: (N, N), 15: (N, N)} in rad per rad."""
     loaded = load(scene).with_numerics(grid=grid)
     axes = connection.grid(2, grid, loaded.numerics.extent)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
     solution = loaded.system.solve(alpha, connection.directions(2, directions)).checked()
     fit = functools.partial(harmonics.fit, loaded.system.velocity, axes, directions, mirror=True)
-    left = {k: fit(highest=k).residual[2] for k in (1, 15)}
-    return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "left": left}
+    residual = {k: fit(highest=k).residual[2] for k in (1, 15)}
+    return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "residual": residual}
 
 
 @plots.styled
 def draw(numbers: dict):
     fig, axes = plots.figure(10.8, 3.0, 3)
-    left = numbers["left"]
+    residual = numbers["residual"]
     maps = (
         (numbers["stuck"], "directions with a link at rest", 1.0),
-        (left[1], "left by the connection (rad/rad)", left[1].max()),
-        (left[15], "left by 15 harmonics (rad/rad)", left[15].max()),
+        (residual[1], "residual of the connection (rad/rad)", residual[1].max()),
+        (residual[15], "residual of 15 harmonics (rad/rad)", residual[15].max()),
     )
     for ax, (values, label, top) in zip(axes[0], maps):
         image = ax.pcolormesh(

@@ -20,12 +20,19 @@ JOINTS = ("alpha_1", "alpha_2")
 
 
 def compute(scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1) -> Fitted:
-    """What the log tells."""
+    """Return what the log says of the gait."""
     made = synthetic.made(load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed)
     return fit_log(Log("log.csv", made.t, made.alpha, made.pose, JOINTS, np.arange(len(made.t)) + 2))
 
 
-draw, table = plots.measured_figure, measured.text
+def draw(numbers: Fitted):
+    return plots.measured_figure(numbers)
+
+
+def table(numbers: Fitted) -> str:
+    """Return displacements and what the connection explains."""
+    return measured.text(numbers)
+
 
 if __name__ == "__main__":
     main("measured", compute, draw, table)

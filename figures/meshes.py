@@ -9,23 +9,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
-from rft.spatial import Cylinder, Spatial, Sphere, law, wrench
-from rft.vertical import VERTICAL
+from rft.meshes import Cylinder, Spatial, Sphere, law, wrench
+from rft.plates import VERTICAL
 
 SCENES = ("sphere", "cylinder", "screw", "extruded-c-leg")
 BODIES = {"sphere": Sphere(0.02), "cylinder": Cylinder(0.02, 0.06)}
 DEPTHS = {"deep": 0.1, "half out": 0.004}  # m, of the middle
-COLOURS = {"sphere": "#0072B2", "cylinder": "#D55E00"}
+LOOKS = {"sphere": (style.BLUE, "o"), "cylinder": (style.VERMILION, "s")}
 STEP = 4  # degrees
 
 
 def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
-    """pictures: {scene: (faces, above)}. errors: {(body, depth): (triangles, error, order)}. angles: beta and gamma in rad,
-    (2, B, G); two, three: (2, B, G), alpha_x against the motion and alpha_z upwards over that straight down, of two and three
-    dimensions."""
+    """Return the faces of the pictures, errors of forces, and the laws of two and three dimensions.
+
+    pictures: {scene: (faces, above)}. errors: {(body, depth): (triangles, error, order)}. angles: (2, B, G), beta and gamma,
+    rad. two, three: (2, B, G), alpha_x against the motion and alpha_z upwards over that straight down.
+    """
     pictures = {}
     for name in SCENES:
         scene = load(name)
@@ -45,7 +47,7 @@ def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
 
 
 def _errors(body: str, depth: float, ladder):
-    """Of a body dragged aside and down while it turns."""
+    """Return triangles, errors and order of the force on a body that is dragged aside and down while it turns."""
     medium, meshes = Spatial(3e5, 0.3), [BODIES[body].mesh(n) for n in ladder]
     forces = [wrench(medium, m, np.eye(3), [0, 0, -depth], [0.03, 0.05, -0.1], [2.0, -1.0, 3.0]).force for m in meshes]
     triangles = np.array([len(m.faces) for m in meshes[:-1]])
@@ -54,7 +56,7 @@ def _errors(body: str, depth: float, ladder):
 
 
 def table(numbers: dict) -> str:
-    """Orders of convergence, and how the two laws agree."""
+    """Return orders of convergence, and how the two laws agree."""
     lines = [f"{body}, {depth}: order {order:.2f} in the number of triangles, error {e[-1]:.1e} at {n[-1]}"
              for (body, depth), (n, e, order) in numbers["errors"].items()]  # fmt: skip
     for name, two, three in zip("xz", numbers["two"], numbers["three"]):
@@ -80,7 +82,7 @@ def draw(numbers: dict):
     for ax, name, two, three in zip(axes[1, 2:], "xz", numbers["two"], numbers["three"]):
         ax.plot(two.ravel(), three.ravel(), ".", ms=1.5, color="0.3", rasterized=True)
         ends = np.array([min(two.min(), three.min()), max(two.max(), three.max())])
-        ax.plot(ends, ends, color="0.7", lw=0.8, zorder=0)
+        ax.plot(ends, ends, **style.GUIDE)
         ax.set(xlabel=rf"$\alpha_{name}$, map of two dimensions", ylabel=rf"$\alpha_{name}$, law of three")
         r = np.corrcoef(two.ravel(), three.ravel())[0, 1]
         ax.set_title(f"all angles, r = {r:.2f}", fontsize=8)
@@ -89,8 +91,8 @@ def draw(numbers: dict):
 
 def _convergence(ax, errors) -> None:
     for (body, depth), (n, e, order) in errors.items():
-        dash = "-" if depth == "deep" else "--"
-        ax.loglog(n, e, "o" + dash, ms=3, lw=1.0, color=COLOURS[body], label=f"{body}, {depth}: {order:.2f}")
+        (colour, marker), dashes = LOOKS[body], "-" if depth == "deep" else "--"
+        ax.loglog(n, e, marker + dashes, lw=1.0, color=colour, label=f"{body}, {depth}: {order:.2f}")
     ax.set(xlabel="triangles", ylabel="error of the force", ylim=(None, 10))
     ax.set_title("order in 1 / triangles (declared: 1)", fontsize=8)
     ax.legend(fontsize=7, loc="upper right", handlelength=2.6)
@@ -98,12 +100,12 @@ def _convergence(ax, errors) -> None:
 
 def _tilts(ax, numbers) -> None:
     beta, gamma = numbers["angles"]
-    for degrees, colour in ((88, "#0072B2"), (44, "#D55E00"), (0, "#009E73")):
+    for degrees, colour in zip((88, 44, 0), style.shades(3)):
         k = int(np.abs(np.degrees(gamma[0]) - degrees).argmin())
-        for law_, dash in (("two", "--"), ("three", "-")):
-            label = rf"$\gamma$ = {np.degrees(gamma[0, k]):.0f}°" if law_ == "three" else None
-            ax.plot(np.degrees(beta[:, k]), numbers[law_][1][:, k], dash, lw=1.0, color=colour, label=label)
-    ax.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+        label = rf"$\gamma$ = {np.degrees(gamma[0, k]):.0f}°"
+        ax.plot(np.degrees(beta[:, k]), numbers["two"][1][:, k], "--", lw=1.0, color=colour)
+        ax.plot(np.degrees(beta[:, k]), numbers["three"][1][:, k], lw=1.0, color=colour, label=label)
+    style.zero_line(ax)
     ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"$\alpha_z$ / that straight down", xticks=[-90, -45, 0, 45, 90])
     ax.set_title("dashed: two dimensions; solid: three", fontsize=8)
     ax.set_ylim(-0.15, 1.6)

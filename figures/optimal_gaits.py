@@ -16,41 +16,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.optimise import optimise
 from geomech.output import plots
 from geomech.output.plots.optimum import PHASES, along
 from geomech.scene import load
 
 SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
-AIMS = {"displacement": "black", "efficiency": "#009E73"}
+AIMS = {"displacement": (style.BLACK, "-"), "efficiency": (style.GREEN, "--")}
 
 
-def compute(harmonics: int = 5, **numerics) -> dict:
-    """By medium: the optimum for each of AIMS, and "ccf", the CCF along the displacement on its grid."""
+def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
+    """Return, by medium, the optimum for each of AIMS, and "ccf", the CCF along the displacement on its grid."""
     out = {}
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)
-        out[medium] = {aim: optimise(scene, aim, harmonics=harmonics) for aim in AIMS}
+        out[medium] = {aim: optimise(scene, aim, harmonics=harmonics, starts=starts) for aim in AIMS}
         out[medium]["ccf"] = along(out[medium]["displacement"])
     return out
 
 
 def table(numbers: dict) -> str:
-    """A line for each optimum."""
-    lines = [f"{'':24s}{'aim':14s}{'BL a cycle':>11s}{'path length':>12s}{'BL a unit':>10s}{'reach (rad)':>12s}"]
-    for medium, found in numbers.items():
-        for aim in AIMS:
-            best = found[aim].best
-            net = float(np.hypot(*best.displacement[:2]))
-            lines.append(
-                f"{medium:24s}{aim:14s}{net:11.4f}{best.length:12.4f}{net / best.length:10.4f}{reach(best.gait):12.2f}"
-            )
-    return "\n".join(lines)
+    """Return a line for each optimum."""
+    heads = "medium", "aim", "BL a cycle", "path length", "BL a unit", "reach (rad)"
+    best = {(medium, aim): found[aim].best for medium, found in numbers.items() for aim in AIMS}
+    rows = [
+        (*names, f"{net(x):.4f}", f"{x.length:.4f}", f"{net(x) / x.length:.4f}", f"{reach(x.gait):.2f}")
+        for names, x in best.items()
+    ]
+    return style.table(heads, rows)
+
+
+def net(best) -> float:
+    """Return the net distance of a gait in a cycle, body lengths."""
+    return float(np.hypot(*best.displacement[:2]))
 
 
 def reach(gait) -> float:
-    """The largest joint angle, rad."""
+    """Return the largest joint angle, rad."""
     return float(np.abs(gait.cycle(PHASES)[0]).max())
 
 
@@ -61,13 +64,11 @@ def draw(numbers: dict):
         plots.ccf_map(found["ccf"], ax=ax)
         ax.set_title(medium)
         ax.collections[0].colorbar.set_label(rf"CCF ({found['ccf'].unit}/rad$^2$)")
-        for aim, colour in AIMS.items():
+        for aim, (colour, dashes) in AIMS.items():
             best = found[aim].best
-            net = float(np.hypot(*best.displacement[:2]))
-            ax.plot(
-                *best.gait.shape(np.linspace(0, 2 * np.pi, PHASES)).T, color=colour, lw=1.6,
-                label=f"{aim}: {net:.3f} BL, path {best.length:.2f}",
-            )  # fmt: skip
+            loop = best.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
+            label = f"{aim}: {net(best):.3f} BL, path {best.length:.2f}"
+            ax.plot(*loop.T, color=colour, ls=dashes, lw=1.6, label=label)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22))
     fig.suptitle("CCF along the displacement, minimum-perturbation frame", fontsize=9)
     return fig

@@ -7,6 +7,7 @@ from geomech.output import plots
 
 
 def compute() -> dict:
+    """Return the numbers of both figures."""
     return {"map": fig11d_ccf.compute(), "tables": fig11e_displacement.compute()}
 
 

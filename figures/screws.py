@@ -11,9 +11,10 @@ import dataclasses
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
+from rft import se2
 from rft.walking import Fineness, Walker, cruise, engine, turning
 from rft.walking.craft import PER_SQUARE
 
@@ -24,8 +25,11 @@ PATHS = {("mirrored", 1.0): 10, ("alike", 2.5): 10, ("alike", 1.0): 4}  # turns 
 
 
 def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness: Fineness | None = None) -> dict:
-    """slip; pulled {height: Turning}; pitch; advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
-    the scene's mass; paths {(pair, mass): (turns, x, y, Cruise)}, x and y in m."""
+    """Return what a screw pulls, how far craft advance a turn, and their paths.
+
+    slip, pulled {height: Turning}; pitch, advance {mass: (P,)}, m a turn; found (T,): MuJoCo's at the pitches ``tried`` with
+    the scene's mass; paths {(pair, mass): (time, x, y, Cruise)}, s and m.
+    """
     scene, slip = load("screws"), np.linspace(-0.2, 1.0, slips)
     fineness = fineness or scene.numerics
     triangles = PER_SQUARE * fineness.elements**2
@@ -50,7 +54,7 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
 
 
 def table(numbers: dict) -> str:
-    """MuJoCo beside the balance."""
+    """Return what MuJoCo finds beside the balance."""
     lines, by_balance = [], np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
     for p, found, wanted in zip(numbers["tried"], numbers["found"], by_balance):
         lines.append(f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {wanted:.4g} by the balance")
@@ -63,50 +67,38 @@ def table(numbers: dict) -> str:
 
 @plots.styled
 def draw(numbers: dict):
-    from cmcrameri import cm
-
     fig, ((thrust, advance), (torque, path)) = plots.figure(7.4, 5.6, 2, 2)
-    for k, (height, found) in enumerate(numbers["pulled"].items()):
-        style = {"color": cm.batlow(0.85 * k / len(HEIGHTS)), "label": _told(height)}
-        thrust.plot(numbers["slip"], found.thrust, **style)
-        torque.plot(numbers["slip"], 1e3 * found.torque, **style)
-    thrust.axhline(0.0, color="0.7", lw=0.6, zorder=0)
+    for (height, pulled), colour in zip(numbers["pulled"].items(), style.shades(len(numbers["pulled"]))):
+        thrust.plot(numbers["slip"], pulled.thrust, color=colour, label=described(height))
+        torque.plot(numbers["slip"], 1e3 * pulled.torque, color=colour)
+    style.zero_line(thrust)
     thrust.set(xlabel="slip", ylabel="thrust (N)", title="one screw")
     thrust.legend(title="axis", alignment="left")
     torque.set(xlabel="slip", ylabel="torque (mN m)", ylim=(0.0, None))
     pitch = 1e3 * numbers["pitch"]
-    for k, (mass, found) in enumerate(numbers["advance"].items()):
-        advance.plot(pitch, 1e3 * found, color=cm.batlow(0.4 * k), label=f"{mass:g} kg")
-    advance.plot(
-        1e3 * numbers["tried"], 1e3 * numbers["found"], "o", mfc="white", color=cm.batlow(0.4), label="1 kg, MuJoCo"
-    )
-    advance.plot(pitch, pitch, ":", color="0.5", label="as in a nut")
+    colours = dict(zip(numbers["advance"], style.shades(len(numbers["advance"]))))
+    for mass, found in numbers["advance"].items():
+        advance.plot(pitch, 1e3 * found, color=colours[mass], label=f"{mass:g} kg")
+    dots = {"color": colours[1.0], "ls": "", "marker": "o", "mfc": "white", "label": "1 kg, MuJoCo"}
+    advance.plot(1e3 * numbers["tried"], 1e3 * numbers["found"], **dots)
+    advance.plot(pitch, pitch, **style.GUIDE, ls=":", label="as in a nut")
     top = 1.9e3 * max(np.nanmax(found) for found in numbers["advance"].values())
     advance.set(xlabel="pitch (mm)", ylabel="advance a turn (mm)", title="craft on two", ylim=(0.0, top))
     advance.legend()
-    for k, ((pair, mass), (time, x, y, steady)) in enumerate(numbers["paths"].items()):
-        colour = cm.batlow(0.3 * k)
+    shades = style.shades(len(numbers["paths"]))
+    for ((pair, mass), (time, x, y, steady)), colour in zip(numbers["paths"].items(), shades):
         path.plot(1e2 * x, 1e2 * y, color=colour, label=f"{pair}, {mass:g} kg, {time:g} s")
-        path.plot(*_arc(steady, time), "--", lw=0.8, color=colour)
-    path.plot([], [], "--", lw=0.8, color="0.3", label="by balance")
+        way = se2.exp(np.linspace(0.0, time, 200)[:, None] * [*steady.velocity, steady.yaw_rate])
+        path.plot(1e2 * way[:, 0], 1e2 * way[:, 1], "--", lw=0.8, color=colour)
+    style.entry(path, "by balance", ls="--", lw=0.8)
     path.set(xlabel="$x$ (cm)", ylabel="$y$ (cm), to the left", aspect="equal")
     path.legend(loc="lower right")
     return fig
 
 
-def _told(height: float) -> str:
+def described(height: float) -> str:
+    """Return the height of an axis over the surface in words."""
     return f"{abs(1e3 * height):.0f} mm {'above' if height > 0 else 'below'}" if height else "at the surface"
-
-
-def _arc(steady, time: float):
-    """(x, y) in cm of a body velocity that stays."""
-    t = np.linspace(0.0, time, 200)
-    yaw = steady.yaw_rate * t
-    v = (
-        np.stack([np.cos(yaw), np.sin(yaw)]) * steady.velocity[0]
-        + np.stack([-np.sin(yaw), np.cos(yaw)]) * steady.velocity[1]
-    )
-    return 1e2 * np.cumsum(v, 1) * t[1]
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
 from rft.walking import Tripod, Walker, engine
@@ -23,6 +23,7 @@ FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 
 
 
 def _course(steps: int):
+    """Return the walk of Xplorer by so many steps a cycle, not begun yet."""
     from rft.walking.mujoco_walk import Course
 
     scene = load("xplorer")
@@ -31,7 +32,7 @@ def _course(steps: int):
 
 
 def way(start, steps: int, how: str) -> float:
-    """m, in one stride from a state."""
+    """Return the way in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
     import mujoco
 
     body, h = _course(steps).body, 1 / (FREQUENCY * steps)
@@ -55,7 +56,7 @@ def way(start, steps: int, how: str) -> float:
 
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """{"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
+    """Return {"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
     start = _course(64).walk(SETTLED).limit
     truth = way(start, finest, "implicit")
     study = {how: (n, np.array([abs(way(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
@@ -74,17 +75,16 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(8.4, 2.8, 1 + len(numbers["speeds"]))
     ax = axes[0, 0]
-    for (how, (steps, error)), colour in zip(numbers["steps"].items(), ("C0", "C3")):
-        good = np.isfinite(error)
-        label = how if how == "implicit" else "grains' forces held"
-        ax.loglog(np.array(steps)[good], error[good], "o-", color=colour, lw=1.0, label=label)
-    steps, error = (np.array(x, float) for x in numbers["steps"]["implicit"])
-    ax.loglog(steps, error[0] * (steps / steps[0]) ** -2, color="0.6", ls="--", lw=0.8, label="order 2")
+    looks = {"implicit": ("o-", style.BLUE, "implicit"), "held": ("s-", style.VERMILION, "grains' forces held")}
+    for how, (steps, error) in numbers["steps"].items():
+        line, colour, label = looks[how]
+        ax.loglog(steps, np.where(np.isfinite(error), error, np.nan), line, color=colour, lw=1.0, label=label)
+    style.order_line(ax, *numbers["steps"]["implicit"], 2)
     ax.set(xlabel="steps of a cycle", ylabel="error of the way")
     ax.legend(loc="best", fontsize=7)
     for ax, (name, (frequency, planar, full)) in zip(axes[0, 1:], numbers["speeds"].items()):
-        ax.plot(frequency, planar, "-", color="0.3", lw=1.2, label="planar")
-        ax.plot(frequency, full, "o", color="C0", ms=5, label="MuJoCo")
+        ax.plot(frequency, planar, color=style.BLACK, label="planar")
+        ax.plot(frequency, full, "o", color=style.BLUE, ms=5, label="MuJoCo")
         ax.set(xlabel="frequency (Hz)", ylabel="speed (m/s)", ylim=(0, None))
         ax.set_title(f"{name}: within {100 * np.abs(full / planar - 1).max():.1f} %")
         ax.legend(loc="best")

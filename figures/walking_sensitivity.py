@@ -12,22 +12,22 @@ import dataclasses
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
 from geomech.study import walking
-from rft.vertical import Polygon
-from rft.vertical.effects import Aeration
-from rft.vertical.outline import Outline
+from rft.ground import Aeration
+from rft.plates import Polygon
+from rft.plates.outline import Outline
 from rft.walking import Rhex
 
 FACTORS = (0.7, 1.0, 1.4)
 NAMES = {
-    "legs.radius": "leg radius", "legs.width": "leg width", "height": "body height", "width": "body width",
-    "hips": "hip spacing", "inertia": "inertia", "zeta": "ground strength", "duty": "share of stance",
-    "tension": "faces that pull", "belly": "belly",
+    "robot.legs.radius": "leg radius", "robot.legs.width": "leg width", "robot.height": "body height",
+    "robot.width": "body width", "robot.hips": "hip spacing", "robot.inertia": "inertia", "medium.zeta": "ground strength",
+    "gait.duty": "share of stance", "medium.tension": "faces that pull", "belly": "belly",
 }  # fmt: skip
-CHOICES = {"tension": ("keep", "cut"), "belly": ("box", "sheet")}  # as the scenes have it, and else
+CHOICES = {"medium.tension": ("keep", "cut"), "belly": ("box", "sheet")}  # as the scenes have it, and else
 
 
 class Sheet(Rhex):
@@ -39,30 +39,29 @@ class Sheet(Rhex):
 
 
 def varied(scene, name: str, factor: float | str):
-    """The scene with one of its assumed sizes times a factor, or with another choice."""
-    robot, medium, gait = scene.robot, scene.medium, scene.gait
-    if name == "tension":
-        return dataclasses.replace(scene, medium=dataclasses.replace(medium, tension=factor))
+    """Return the scene with one of its assumed sizes times a factor, or with another choice."""
     if name == "belly":
-        own = {f.name: getattr(robot, f.name) for f in dataclasses.fields(robot)}
-        return scene if factor == "box" else dataclasses.replace(scene, robot=Sheet(**own))
-    if name == "zeta":
-        return dataclasses.replace(scene, medium=dataclasses.replace(medium, zeta=medium.zeta * factor))
-    if name == "duty":
-        return dataclasses.replace(scene, gait=dataclasses.replace(gait, duty=gait.duty * factor))
-    part, _, key = name.rpartition(".")
-    owner = robot.legs if part else robot
-    value = getattr(owner, key)
-    changed = dataclasses.replace(
-        owner, **{key: tuple(np.multiply(value, factor)) if key == "hips" else value * factor}
-    )
-    if part and key == "radius" and robot.axle:
-        robot = dataclasses.replace(robot, axle=robot.axle * factor)
-    return dataclasses.replace(scene, robot=dataclasses.replace(robot, legs=changed) if part else changed)
+        return scene if factor == "box" else dataclasses.replace(scene, robot=Sheet(**vars(scene.robot)))
+    if name == "robot.legs.radius" and scene.robot.axle:
+        scene = changed(scene, "robot.axle", factor)
+    return changed(scene, name, factor)
+
+
+def changed(part, name: str, factor: float | str):
+    """Return a dataclass with a field, or a field of a field, times a factor, or replaced by a choice."""
+    first, _, rest = name.partition(".")
+    value = getattr(part, first)
+    if rest:
+        value = changed(value, rest, factor)
+    elif isinstance(factor, str):
+        value = factor
+    else:
+        value = tuple(np.multiply(value, factor)) if isinstance(value, tuple) else value * factor
+    return dataclasses.replace(part, **{first: value})
 
 
 def compute(factors=FACTORS, names=NAMES) -> dict:
-    """{robot: {curve: {name: [(factor or choice, speed, estimate, status)]}}}."""
+    """Return {robot: {curve: {name: [(factor or choice, speed, estimate, status)]}}}."""
     xplorer, sandbot = load("xplorer"), load("sandbot")
     legs = lambda c: dataclasses.replace(xplorer.robot.legs, relative_curvature=c)
     curves = {
@@ -87,7 +86,7 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
 
 
 def table(numbers: dict) -> str:
-    """By how many per cent each assumption moves each speed: the smaller size and the larger, or the other choice."""
+    """Return by how many per cent each assumption moves each speed: the smaller size and the larger, or the other choice."""
     curves = [found for some in numbers.values() for found in some.values()]
     rows = [
         "| assumed | " + " | ".join(f"{robot}: {curve}" for robot, some in numbers.items() for curve in some) + " |"
@@ -110,23 +109,22 @@ def draw(numbers: dict):
     fig, axes = plots.figure(1.2 * len(some), 4.8, len(some), len(numbers))
     for row, (robot, curves) in zip(axes, numbers.items()):
         for ax, name in zip(row, some):
-            for k, (curve, found) in enumerate(curves.items()):
-                f, speed, error, status = zip(*found[name])
+            for curve, colour, marker, dashes in zip(curves, style.SEQUENCE, style.MARKERS, ("-", "--", ":")):
+                f, speed, error, status = zip(*curves[curve][name])
                 f = (1.0, 2.0) if name in CHOICES else f  # one place beside the other
-                ax.errorbar(f, speed, yerr=error, color=f"C{k}", lw=1.0, capsize=2, label=curve)
+                ax.errorbar(f, speed, yerr=error, color=colour, ls=dashes, lw=1.0, capsize=2, label=curve)
                 for x, y, kind in zip(f, speed, status):
-                    ax.plot(x, y, "o", ms=4, color=f"C{k}", mfc=f"C{k}" if kind == "walking" else "white")
+                    ax.plot(x, y, marker, ms=4, color=colour, mfc=colour if kind == "walking" else "white")
             ax.set(xscale="log", xlabel="", ylim=(min(0.0, ax.get_ylim()[0]), None))
-            ax.set_xticks(f, CHOICES.get(name) or [f"{x:g}" for x in f])
+            style.named_ticks(ax, f, CHOICES.get(name) or [f"{x:g}" for x in f])
             if name in CHOICES:
                 ax.set_xlim(0.75, 2.7)
-            ax.minorticks_off()
             ax.set_title(NAMES[name], fontsize=7.5)
             ax.sharey(row[0])
         for ax in row[1:]:
             ax.tick_params(labelleft=False)
         row[0].set_ylabel(f"{robot}: speed (m/s)")
-        row[-1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        style.legend_beside(row[-1])
     fig.supxlabel("times the size that is assumed; open: not walking", fontsize=9)
     return fig
 

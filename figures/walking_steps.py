@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
 from rft.walking import Tripod, Walker
@@ -23,7 +23,7 @@ FREQUENCIES = (1.0, 3.0)
 
 
 def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
-    """One explicit step."""
+    """Take one explicit step, of order 2, for comparison: no walk is computed so."""
 
     def slope(at: State, where: float):
         a, motors, ground = robots.forces(at.pose[None], at.twist[None], *robots.turned(np.array([where]), of))
@@ -36,7 +36,7 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
 
 
 def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
-    """(progress, m; what is left of the balance of energy, of the work) after so many cycles from rest."""
+    """Return the progress, m, and what the balance of energy leaves of the work, after some cycles from rest."""
     scene = load("xplorer")
     robots = _strides([Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics).robots
     state = first = robots.placed()
@@ -54,7 +54,7 @@ def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
 
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """{frequency: {how: (steps, error of the progress over it, what is left of the energy's balance)}}."""
+    """Return {frequency: {how: (steps, error of the progress over it, what is left of the energy's balance)}}."""
     out = {}
     for f in frequencies:
         truth = way(f, finest, "implicit")[0]
@@ -67,19 +67,15 @@ def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
 def draw(numbers: dict):
     fig, axes = plots.figure(7.2, 4.8, len(numbers), 2)
     for column, (f, lines) in zip(axes.T, numbers.items()):
-        for (how, (steps, error, left)), colour in zip(lines.items(), ("C0", "C3")):
-            for ax, values in zip(column, (error, left)):
-                good = np.isfinite(values)
-                ax.loglog(np.array(steps)[good], values[good], "o-", color=colour, lw=1.0, label=how)
-        for ax, what, values in zip(
-            column, ("error of the progress", "energy not accounted for"), lines["implicit"][1:]
-        ):
-            steps = np.array(lines["implicit"][0], float)
-            ax.loglog(steps, values[0] * (steps / steps[0]) ** -2, color="0.6", ls="--", lw=0.8, label="order 2")
-            ax.set(xlabel="steps of a cycle", ylabel=what)
-            ax.grid(True, which="major", lw=0.3, color="0.85")
+        for k, (ax, label) in enumerate(zip(column, ("error of the progress", "energy not accounted for")), 1):
+            for (how, found), line, colour in zip(lines.items(), ("o-", "s-"), (style.BLUE, style.VERMILION)):
+                values = np.where(np.isfinite(found[k]), found[k], np.nan)
+                ax.loglog(found[0], values, line, color=colour, lw=1.0, label=how)
+            style.order_line(ax, lines["implicit"][0], lines["implicit"][k], 2)
+            ax.set(xlabel="steps of a cycle", ylabel=label)
+            style.grid(ax)
         column[0].set_title(f"{f:g} Hz")
-    axes[0, -1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    style.legend_beside(axes[0, -1])
     return fig
 
 

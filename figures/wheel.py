@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from figures import main
+from figures import main, style
 from geomech.output import plots
-from rft.vertical import VERTICAL, Wheel
-from rft.vertical.effects import GrainInertia
+from rft.ground import GrainInertia
+from rft.plates import VERTICAL, Wheel
 from rft.walking import rolling
 
 RATES = (1.0, 10.0, 30.0, 60.0)  # rad/s
@@ -19,7 +19,7 @@ WHEELS = {"smooth": Wheel(0.1, 0.1), "12 lugs": Wheel(0.1, 0.1, 12, 0.015, 0.006
 
 
 def compute(slips: int = 23, load: float = 20.0, strength: float = 1.0) -> dict:
-    """slip (N,); for each wheel {rate, or 0 without inertia: Rolling}."""
+    """Return slip (N,), the load, and "found": for each wheel {rate, or 0 without inertia: Rolling}."""
     slip, stress = np.linspace(-0.2, 0.9, slips), VERTICAL["poppy-seeds-loose"].stress
     inertia = [GrainInertia(strength)]
     found = {
@@ -32,17 +32,14 @@ def compute(slips: int = 23, load: float = 20.0, strength: float = 1.0) -> dict:
 
 @plots.styled
 def draw(numbers: dict):
-    from cmcrameri import cm
-
     fig, axes = plots.figure(7.4, 5.0, 2, 2)
     for column, (name, lines) in zip(axes.T, numbers["found"].items()):
-        for k, (rate, found) in enumerate(lines.items()):
-            colour = "black" if rate == 0 else cm.batlow(0.85 * k / len(lines))
+        for (rate, found), colour in zip(lines.items(), (style.BLACK, *style.shades(len(RATES)))):
             label = "no inertia, any rate" if rate == 0 else f"{rate:g} rad/s"
-            style = {"color": colour, "lw": 2.0 if rate == 0 else 1.0, "label": label}
-            column[0].plot(numbers["slip"], found.pull / numbers["load"], **style)
-            column[1].plot(numbers["slip"], 1e3 * found.sinkage, **style)
-        column[0].axhline(0.0, color="0.7", lw=0.6, zorder=0)
+            look = {"color": colour, "lw": 2.0 if rate == 0 else 1.0, "label": label}
+            column[0].plot(numbers["slip"], found.pull / numbers["load"], **look)
+            column[1].plot(numbers["slip"], 1e3 * found.sinkage, **look)
+        style.zero_line(column[0])
         column[0].set(title=name, ylabel="drawbar pull / load")
         column[1].set(xlabel="slip", ylabel="sinkage (mm)")
         column[1].invert_yaxis()
