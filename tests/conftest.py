@@ -1,7 +1,7 @@
 """One thread a process, as many processes as cores for the whole suite, the truths that are kept, and what solves."""
 
-import math
 import os
+import subprocess
 import sys
 
 import pytest
@@ -9,9 +9,9 @@ import pytest
 for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")  # before NumPy loads: the processes share the cores already
 
-from rft import backend, compiled  # noqa: E402
+from rft.balance import backend  # noqa: E402
 
-backend.AUTO.worked = -math.inf  # "auto" is NumPy, however long a process has been testing, but for `solved_by`
+backend._preferred.set("numpy")  # "auto" is NumPy, but for `solved_by`
 TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
 
@@ -24,6 +24,13 @@ def pytest_configure(config):
     from truths import Truths
 
     config.stash[TRUTHS] = Truths(config.getoption("--renew-truths"))
+
+
+def pytest_sessionstart(session):
+    """Compile the balance once, before the processes of the whole suite would do so side by side."""
+    full = session.config.args_source is session.config.ArgsSource.TESTPATHS
+    if full and backend.installed() and not hasattr(session.config, "workerinput"):
+        subprocess.run([sys.executable, "-m", "rft"], check=True, capture_output=True)
 
 
 def pytest_sessionfinish(session):
@@ -53,7 +60,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_xdist_auto_num_workers(config):
-    """None (a process for each core) for the whole suite; 0 for tests picked by hand, for what prints and what writes."""
+    """None (a process for each core) for the whole suite; 0 for tests picked by hand, for what prints and what
+    writes."""
     picked = config.args_source is not config.ArgsSource.TESTPATHS
     return 0 if picked or config.option.capture == "no" or config.getoption("--renew-truths") else None
 
@@ -66,27 +74,25 @@ def truths(request):
 @pytest.fixture(autouse=True)
 def no_lines_of_progress(monkeypatch):
     """What a command says does not hang on how busy the machine is."""
-    from geomech import progress
+    from geomech.run import progress
 
     monkeypatch.setattr(progress, "EVERY", 1e9)
 
 
 @pytest.fixture(scope="session")
 def compiled_code():
-    """Compiled descents. To make them takes some twenty seconds, so that is left to `python -m rft`, and to .ci/run."""
+    """The compiled driver."""
     if not backend.installed():
         pytest.skip("numba is not installed")
-    if not compiled.made():
-        pytest.skip("compiled code is not made yet: python -m rft")
 
 
 @pytest.fixture(params=["numpy", "numba"])
-def solved_by(request, monkeypatch):
+def solved_by(request):
     """Runs a test twice: "auto" is NumPy, and compiled code."""
     if request.param == "numba":
         request.getfixturevalue("compiled_code")
-        monkeypatch.setattr(backend.AUTO, "is_ready", True)
-    return request.param
+    with backend.preferring(request.param):
+        yield request.param
 
 
 @pytest.fixture

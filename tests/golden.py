@@ -28,8 +28,8 @@ from scipy.spatial.transform import Rotation
 
 import geomech
 import rft
-from rft.spatial import Spatial, wrench
-from rft.vertical import loads
+from rft.meshes import Spatial, wrench
+from rft.plates import loads
 from rft.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"

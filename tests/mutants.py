@@ -16,6 +16,7 @@ import importlib.util
 import os
 import random
 import resource
+import runpy
 import shutil
 import signal
 import sys
@@ -135,7 +136,7 @@ def start(tree: Path, tests: list[str], seconds: float) -> int:
         os.chdir(tree)
         os.environ["PYTHONPATH"] = sys.path[0] = str(tree)
         if "backend" in tests and importlib.util.find_spec("numba"):  # else they are skipped
-            importlib.import_module("rft.compiled").make()
+            runpy.run_module("rft")
         slow = [f"--deselect=tests/test_{name}.py::test_{x}" for name in tests for x in TABLE["slow"].get(name, ())]
         os._exit(importlib.import_module("pytest").main([*PYTEST, *slow, *(f"tests/test_{x}.py" for x in tests)]))
     finally:

@@ -24,10 +24,14 @@ from rft import (
     Transient,
     Viscous,
 )
-from rft.media import CATALOGUE, is_closed
-from rft.media import Table as Measured
-from rft.spatial import Cylinder, Leg, Screw, Sphere
-from rft.vertical import (
+from rft import Slope as Incline
+from rft.ground import Aeration, Slope
+from rft.ground import DisturbedGround as DisturbedPlaces
+from rft.ground import GrainInertia as GrainPressure
+from rft.laws import CATALOGUE, is_closed
+from rft.laws import Table as Measured
+from rft.meshes import Cylinder, Leg, Screw, Sphere
+from rft.plates import (
     VERTICAL,
     CLeg,
     FlatLeg,
@@ -41,9 +45,6 @@ from rft.vertical import (
     StressMap,
     Wheel,
 )
-from rft.vertical.effects import Aeration, Slope
-from rft.vertical.effects import DisturbedGround as DisturbedPlaces
-from rft.vertical.effects import GrainInertia as GrainPressure
 from rft.walking import Rhex, Roller, Tripod, Walker
 
 _PSI = np.linspace(0.0, math.pi / 2, 12)  # rad
@@ -147,6 +148,7 @@ EFFECTS = {
     "towed-sled": (lambda x: TowedSled(pull=x, distance=0.3), 1),
     "depth-profile": (lambda x: DepthProfile(along=(1, 1 + x)), 1),
     "depth-profile, slope": (lambda x: DepthProfile(slope=x, towards=1.0), 1),
+    "slope": (lambda x: Incline(angle=x, towards=2.0, repose=0.6, weight=0.3), 1),
     "grain-inertia": (lambda x: GrainInertia(frequency=x, length=0.7, depth=0.07, strength=1.5), 2),
     "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=x), 1),
     "body-inertia": (lambda x: BodyInertia(mass=x, frequency=0.6, length=0.8, drag=1.3), 1),

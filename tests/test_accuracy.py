@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from artists import curve, drawn
 
 from figures import cost_scaling, work_precision
-from geomech import connection
 from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import connection
 from geomech.study import accuracy
 from geomech.study.bench import Study
 from geomech.tiers.direct import direct
@@ -145,18 +146,30 @@ def test_a_linear_medium_has_no_dry_knobs(viscous):
 
 
 def test_the_diagram_draws(glass, tmp_path):
-    from geomech.output import plots
+    phases = line(glass, "direct: phases")
+    drawn_lines = [x for ax in drawn(work_precision, glass, tmp_path).axes for x in ax.lines]
+    assert any(np.array_equal(x.get_xydata().T, [phases["seconds"], phases["error"]]) for x in drawn_lines)
 
-    plots.save(work_precision.draw(glass), tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 30_000
+
+def test_costs_are_drawn_by_the_sample(tmp_path):
+    """Batches in microseconds a sample, as the loop is; the others in seconds, under their exponent."""
+    batches = {"NumPy, one core": [1e-4, 6.4e-4], "compiled, 2 cores": [2e-5, 6.4e-5]}
+    numbers = {
+        "samples": {"x": [1, 64], "seconds": batches, "loop": 5e-3, "exponent": 0.5},
+        "links": {"x": [3, 6], "seconds": {"NumPy": [0.1, 0.3], "compiled": [0.01, 0.02]}, "exponent": 1.1},
+    }
+    samples, links, *_ = drawn(cost_scaling, numbers, tmp_path).axes
+    np.testing.assert_allclose(curve(samples, "NumPy, one core"), [[1, 64], [100, 10]])
+    np.testing.assert_allclose(curve(samples, "compiled, 2 cores"), [[1, 64], [20, 1]])
+    assert samples.lines[-1].get_ydata()[0] == pytest.approx(5000)
+    np.testing.assert_allclose(curve(links, "compiled"), [[3, 6], [0.01, 0.02]])
+    assert links.get_title() == "exponent 1.10"
 
 
 @pytest.mark.benchmark
 def test_cost_is_linear_or_less(tmp_path):
-    from geomech.output import plots
-
     numbers = cost_scaling.compute()
     for axis, found in numbers.items():
         print(f"\n{axis}: exponent {found['exponent']:.2f}", end="")
         assert found["exponent"] < 1.15
-    plots.save(cost_scaling.draw(numbers), tmp_path / "c.png")
+    drawn(cost_scaling, numbers, tmp_path)

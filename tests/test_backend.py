@@ -1,9 +1,9 @@
-"""Compiled descents against NumPy's: the same answers for every medium, body and effect; and which of the two is taken."""
+"""Compiled descents against NumPy's: the same answers for every medium, body and effect; and which of the two is
+taken."""
 
 import dataclasses
 import errno
 import hashlib
-import itertools
 import json
 import os
 import resource
@@ -21,13 +21,16 @@ from geomech import scene as scenes
 from geomech.gaits import Ellipse
 from geomech.output.explain import explain
 from geomech.systems import solver
-from rft import Chain, EndCaps, GrainInertia, SkinFriction, TowedSled, backend, body_velocity, compiled, time_steps
-from rft.bodies.base import Kinematics
-from rft.contact import Model
-from rft.media.base import TermLaw
-from rft.newton import WARM, Balance
-from rft.samples import Jacobian
-from rft.workers import one_thread
+from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
+from rft.balance import backend
+from rft.balance import solver as balance
+from rft.balance.backend import Note
+from rft.bodies import Elements
+from rft.contact import assemble
+from rft.effects import Effect
+from rft.laws.base import TermLaw
+from rft.laws.records import record
+from rft.vectors import formula, sqrt
 
 BODY = Chain((1, 1.4, 0.8), frame="link-1", length=0.3)
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))
@@ -44,8 +47,8 @@ def apart(one, other, alphadot, body):
 @pytest.mark.usefixtures("compiled_code")
 @pytest.mark.parametrize("name", BODIES | STRANGE_BODIES)
 def test_the_same_answers(name):
-    """To 1e-10. A link of a millionth, or twelve that lie upon each other, make a balance so badly conditioned at the usual
-    regularisation that its residual leaves the sixth digit open; there at a wider one."""
+    """To 1e-10. A link of a millionth, or twelve that lie upon each other, make a balance so badly conditioned at the
+    usual regularisation that its residual leaves the sixth digit open; there at a wider one."""
     body = (BODIES | STRANGE_BODIES)[name]
     some = slice(None, None, 1 if body.joints < 5 else 3)
     cases, alpha, alphadot = (x[some] for x in hard(body.joints))
@@ -55,8 +58,8 @@ def test_the_same_answers(name):
             plain, fast = (body_velocity(medium, body, alpha, alphadot, backend=b, **given) for b in BOTH)
             assert (plain.status == fast.status).all()
             assert fast.residual.max() < 1e-9
-            same = np.mean(plain.iterations == fast.iterations)  # steps, but for rounding where that is amplified
-            assert same > (0.98 if name in ILL_CONDITIONED else 0.999)
+            differ = np.sum(plain.iterations != fast.iterations)  # steps, by rounding where that is amplified
+            assert differ <= max(1, (0.02 if name in ILL_CONDITIONED else 0.001) * plain.iterations.size)
             bad = apart(plain, fast, alphadot, body) > 1e-10
             bad &= name not in ILL_CONDITIONED or regularisation > 1e-6
             assert not bad.any(), set(cases[bad])
@@ -66,14 +69,14 @@ def test_the_same_answers(name):
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_same_marches(name, monkeypatch):
     """In as many evaluations: a tangent that is wrong costs more of them, and no digits."""
-    taken, solve = [], Balance.solve
+    taken, solve = [], balance.solve
 
-    def counted(self, *args, **kwargs):
-        solved = solve(self, *args, **kwargs)
+    def counted(*args, **kwargs):
+        solved = solve(*args, **kwargs)
         taken.append(solved.iterations)
         return solved
 
-    monkeypatch.setattr(Balance, "solve", counted)
+    monkeypatch.setattr("rft.stepping.solve", counted)
     alpha, alphadot = GAIT.cycle(12, np.array([0.4, 1.0]))
     effects = EFFECTS[name][0](0.2), EndCaps(radius=0.06, tail=1.0)
     effects = effects[:1] if name == "end-caps" else effects
@@ -96,8 +99,9 @@ class Both(TermLaw):
 
 @pytest.mark.parametrize("how", BOTH)
 def test_starts(how, compiled_code):
-    """From the answer, from one nearby, from none, from nonsense and from rest: the same answers and statuses, and few steps
-    from a good one. Asymmetric body, length not 1, rates from slow to fast, a viscous part in which speed counts."""
+    """From the answer, from one nearby, from none, from nonsense and from rest: the same answers and statuses, and few
+    steps from a good one. Asymmetric body, length not 1, rates from slow to fast, a viscous part in which speed
+    counts."""
     rng = np.random.default_rng(11)
     alpha, alphadot = rng.uniform(-2.6, 2.6, (90, 2)), rng.normal(size=(90, 2)) * 10.0 ** rng.uniform(-3, 3, (90, 1))
     alpha[:6], alphadot[:6], alphadot[6] = 1.5, 0.3, 0.0  # links stick; a sample at rest
@@ -134,29 +138,23 @@ def test_starts_whose_squares_overflow(size, rate, solved_by):
 
 
 @pytest.mark.parametrize("size", [1e40, 1e155, 1e300, np.nan])
-def test_no_overflow_is_a_solution(size, solved_by):
+def test_no_overflow_is_a_solution(size, solved_by, monkeypatch):
     """Whatever brought a descent there: a residual that is 0 because squares overflow, or nan, is none."""
-    alpha, alphadot = GAIT.cycle(8)
-    problem = Balance.of(Model.of(GLASS), BODY, 1e-6, 1e-10)
-    problem.backend = solved_by
-    motion = BODY.motion(alpha.T, alphadot.T)
-    solved = problem.solve(lambda index: motion.take(index), np.ones(8))
-    assert (solved.residual < 1e-10).all()
+    alpha, alphadot = (x.T for x in GAIT.cycle(8))
+    assembly = assemble(GLASS, BODY)
+    problem = assembly.rescaled(assembly.at(alpha, alphadot), np.ones(8))
+    given = np.ones(8), balance.Accuracy(1e-6, 1e-10), assembly.law, assembly.points, solved_by, 1
+    assert (balance.solve(problem.take, *given).residual < 1e-10).all()
+    for name in ("WALKS", "SLOW"):
+        monkeypatch.setattr(balance, name, ())
+    monkeypatch.setattr(balance, "QUICK", balance.WARM)
+    monkeypatch.setattr(
+        balance, "is_possible", lambda xi, real=balance.is_possible: real(xi) | (len(calls.append(1) or calls) == 1)
+    )
+    calls = []  # the first answer is about the guess, which is let through
     with np.errstate(all="ignore"):
-        problem._descend(np.arange(8), WARM, np.full((3, 8), size), solved, 1)
-    assert (solved.residual == np.inf).all()
-
-
-@pytest.mark.usefixtures("compiled_code")
-def test_a_moment_that_is_no_number_is_no_balance(monkeypatch):
-    """Where the force is 0, as that of overflowing speeds is."""
-    alpha, alphadot = GAIT.cycle(8)
-    problem = Balance.of(Model.of(GLASS), BODY, 1e-6, 1e-10)
-    problem.backend, motion = "numba", BODY.motion(alpha.T, alphadot.T)
-    solved = problem.solve(lambda index: motion, np.ones(8))
-    monkeypatch.setattr("rft.newton.FASTEST", np.inf)
-    problem._descend(np.arange(8), WARM, np.full((3, 8), 1e155), solved, 1)
-    assert (solved.residual > 1.0).all()
+        solved = balance.solve(problem.take, *given, np.full((3, 8), size))
+    assert not (solved.residual < 1e-10).any()
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((4, 3)), [0.0, np.inf, 0.0], "here", np.zeros((2, 3, 3))])
@@ -168,7 +166,7 @@ def test_starts_that_are_none(wrong):
 @pytest.mark.usefixtures("compiled_code")
 def test_parameters_of_each_sample_and_threads(monkeypatch):
     """Effects with a parameter for each sample, in a batch that is cut between threads."""
-    monkeypatch.setattr("rft.newton.COMPILED_WORTH", 64)
+    monkeypatch.setattr("rft.balance.solver.COMPILED_WORTH", 64)
     rng = np.random.default_rng(5)
     alpha, alphadot = rng.uniform(-2, 2, (300, 2)), rng.normal(size=(300, 2))
     some = rng.uniform(0.05, 1.0, (3, 300))
@@ -180,7 +178,7 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
     plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
     assert apart(plain, fast, alphadot, BODY).max() < 1e-10
     np.testing.assert_array_equal(plain.status, fast.status)
-    monkeypatch.setattr("rft.newton.COMPILED_WORTH", 10_000)
+    monkeypatch.setattr("rft.balance.solver.COMPILED_WORTH", 10_000)
     whole = body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend="numba")
     np.testing.assert_array_equal(whole.xi, fast.xi)  # to the last digit, whatever shares a lane or a thread
     alone = body_velocity(
@@ -190,9 +188,9 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
 
 
 @pytest.mark.usefixtures("compiled_code")
-def test_compiled_once_for_all():
-    """One signature: whatever the model, no call waits for another compilation."""
-    from rft.lanes import attempt
+def test_compiled_once_for_each_form_of_law():
+    """One signature: whatever the effects, no call waits for another compilation."""
+    from rft.balance.compiled import kernel
 
     alpha, alphadot = GAIT.cycle(8)
     every = [make(0.1) for name, (make, _) in EFFECTS.items() if "," not in name]
@@ -204,14 +202,14 @@ def test_compiled_once_for_all():
     ):
         time_steps(medium, BODY, alpha, alphadot, effects=effects, cycles=1, backend="numba")
     body_velocity(GLASS, BODY, np.asfortranarray(alpha), alphadot[:, ::-1], backend="numba")
-    assert len(attempt.signatures) == 1
+    assert len(kernel(type(record(GLASS))).signatures) == 1
 
 
 class Sheared:
-    """A law of one's own, without closed form."""
+    """A law of one's own, without closed form, whose traction is no formula."""
 
-    def traction(self, v_t, v_n, eps=0.0):
-        R = np.sqrt(v_t**2 + v_n**2 + eps**2)
+    def traction(self, v_t, v_n, rounding=0.0):
+        R = np.sqrt(v_t**2 + v_n**2 + rounding**2)
         return v_t / R, 2 * v_n / R
 
 
@@ -219,41 +217,44 @@ def test_what_stays_with_numpy_and_why():
     scene = scenes.load("three-link-glass")
     swimmer = scene.system
     line = lambda s: next(x for x in s.told() if x.startswith("back end: ")).removeprefix("back end: ")
-    assert line(swimmer).startswith("compiled code after 0.5 s of NumPy")
+    assert line(swimmer).startswith("compiled code")
+    assert line(swimmer).endswith("commands take NumPy where there is little to compute")
     assert line(swimmer) in explain(scene)
-    assert line(scene.with_numerics(backend="numba").system).startswith("compiled code;")
+    assert line(scene.with_numerics(backend="numba").system).startswith("compiled code")
     assert line(scene.with_numerics(backend="numpy").system) == "NumPy, as asked for"
-    by_rule = line(scene.with_numerics(loads="midpoint:20").system)
-    assert by_rule == "NumPy: compiled code does not know the law granular by quadrature"
-    assert "law Sheared by quadrature" in line(dataclasses.replace(swimmer, medium=Sheared()))
-    for make, _ in EFFECTS.values():  # all that ship are numbers
+    assert line(scene.with_numerics(loads="midpoint:20").system).startswith("compiled code")
+    by_numpy = line(dataclasses.replace(swimmer, medium=Sheared()))
+    assert by_numpy == "NumPy: compiled code does not know the law Sheared, whose traction is no formula"
+    assert not backend.compiles("numba", record(Sheared()))
+    for make, _ in EFFECTS.values():
         assert line(dataclasses.replace(swimmer, effects=(make(0.1),))).startswith("compiled code")
-    slower = dataclasses.replace(swimmer, effects=(Slower(),))
-    assert line(slower) == "NumPy: compiled code does not know Slower"
-    assert not backend.takes("numba", slower.effects[0].apply(Model.of(GLASS)))
-
-
-@dataclasses.dataclass(frozen=True)
-class Slower(SkinFriction):
-    """An effect of one's own, of which compiled code has no numbers."""
-
-    kind = "slower"
-    numbers = None
-
-    def __call__(self, v_t, v_n, spin):
-        return 0.5 + 0.0 * v_t, None
 
 
 def test_no_numba(monkeypatch):
     for module in (backend, solver):
         monkeypatch.setattr(module, "installed", lambda: False)
-    monkeypatch.setattr(backend.AUTO, "is_ready", True)
-    assert not backend.takes("auto", Model.of(GLASS))
+    with backend.preferring(""):
+        assert not backend.compiles("auto", record(GLASS))
+        assert backend.fastest() == "numpy"
     assert "numba is not installed (pip install 'geomech[fast]')" in explain(scenes.load("three-link-glass"))
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
         body_velocity(GLASS, BODY, (0.1, 0.2), (1.0, 0.0), backend="numba")
     with pytest.raises(ValueError, match=r"pip install 'geomech\[fast\]'"):
         scenes.load("three-link-glass").with_numerics(backend="numba")
+
+
+@pytest.mark.usefixtures("compiled_code")
+def test_auto_is_compiled_code_unless_something_else_is_preferred():
+    law = record(GLASS)
+    with backend.preferring("numba"):
+        assert backend.compiles("auto", law)
+        assert not backend.compiles("numpy", law)
+        with backend.preferring("numpy"):
+            assert not backend.compiles("auto", law)
+            assert backend.compiles("numba", law)
+            with backend.preferring(""):
+                assert backend.preferred() == "numpy"
+    assert backend.fastest() == "numba"
 
 
 def test_backends_that_are_none(tmp_path):
@@ -267,114 +268,150 @@ def test_backends_that_are_none(tmp_path):
     assert err.count("\n") == 1
 
 
-@pytest.fixture
-def auto(monkeypatch):
-    """What "auto" knows at the start of a process, and what it does: made, started."""
-    fresh, seen = backend.Auto(), types.SimpleNamespace(made=False, started=0, going=True)
-    clock = types.SimpleNamespace(process_time=(k * 1e-3 for k in itertools.count()).__next__)
-    monkeypatch.setattr(backend, "time", clock)  # the machine's stands still for some ms under a limit of CPU time
-    maker = types.SimpleNamespace(poll=lambda: None if seen.going else 0)
+@dataclasses.dataclass(frozen=True)
+class Quartic:
+    """f_t = v_t / |v|, f_n = v_n / |v| (1 + extra (v_n / |v|)^4): a law of one's own."""
 
-    def started():
-        seen.started += 1
-        return maker
+    extra: float = 3.0
+    mirror = True
 
-    monkeypatch.setattr(backend, "AUTO", fresh)
-    monkeypatch.setattr(backend, "installed", lambda: True)
-    monkeypatch.setattr(backend, "_started", started)
-    monkeypatch.setattr(compiled, "made", lambda: seen.made)
-    return fresh, seen
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        speed = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
+        s2 = v_n / speed * (v_n / speed)
+        return v_t / speed, v_n / speed * (1.0 + self.extra * s2 * s2)
 
 
-def test_auto_begins_with_numpy_and_loads_when_that_pays(auto):
-    fresh, seen = auto
-    seen.made, model = True, Model.of(GLASS)
-    assert not backend.takes("auto", model)
-    with backend.counted("auto"):
-        pass
-    assert 0 < fresh.worked < backend.TO_LOAD
-    fresh.worked = backend.TO_LOAD
-    assert backend.takes("auto", model)
-    assert not backend.takes("numpy", model)
-    assert seen.started == 0
+@dataclasses.dataclass(frozen=True)
+class Softening(Effect):
+    """Grains that an element slides through lose drag, to half after a travel in body lengths: an effect of one's own
+    with a past."""
+
+    travel: float
+
+    kind = "softening"
+    breaks = DisturbedGround.breaks
+
+    def begin(self, problem, site):
+        return np.zeros_like(problem.sides.elements.c)
+
+    def apply(self, problem, site, past):
+        share = self.travel / (self.travel + past)
+        return problem._replace(sides=problem.sides.multiplied(share, share, share))
+
+    def after(self, problem, site, past, v):
+        return 0.5 * past + site.dt * np.hypot(v[0], v[1])
 
 
-def test_auto_loads_at_once_for_a_batch_that_takes_long(auto, monkeypatch):
-    """Half a second of NumPy: by samples times elements, as the solver counts them."""
-    _, seen = auto
-    model, many = Model.of(GLASS), round(1.01 * backend.TO_LOAD / backend.AHEAD)
-    assert not backend.takes("auto", model, many)
-    seen.made = True
-    assert not backend.takes("auto", model, many // 2)
-    assert backend.takes("auto", model, many)
-    asked = []
-    monkeypatch.setattr(backend, "takes", lambda how, model, count: asked.append(count) or False)
-    body_velocity(GLASS, BODY, np.zeros((7, 2)), np.ones((7, 2)), loads="gauss:5")
-    body_velocity(GLASS, BODY, np.zeros((7, 2)), np.ones((7, 2)))
-    assert asked == [7 * 3 * 5, 7 * 3]
+class Turtle:
+    """A body of one's own: a trunk of 0.6 with two flippers of 0.2 at its head, whose angles to the trunk are the
+    joints."""
+
+    joints, length = 2, 1.0
+
+    def motion(self, alpha, alphadot):
+        along = np.exp(1j * np.stack([0 * alpha[0], 1.2 + alpha[0], -1.2 - alpha[1]]))
+        turn = np.stack([0 * alphadot[0], alphadot[0], -alphadot[1]])
+        half, shoulder = np.array([[0.3], [0.1], [0.1]]), np.array([[0.0], [0.3], [0.3]])
+        arm = half * along * (shoulder > 0)
+        return Elements.of(along, shoulder + arm, 1j * turn * arm, turn, half)
 
 
-def test_auto_waits_for_no_compilation(auto):
-    """Another process makes the code; until it has, NumPy goes on."""
-    fresh, seen = auto
-    model, fresh.worked = Model.of(GLASS), 1.0
-    assert not backend.takes("auto", model)
-    assert seen.started == 0  # not worth it yet
-    fresh.worked = 10.0
-    assert [backend.takes("auto", model) for _ in range(3)] == [False] * 3
-    assert seen.started == 1
-    seen.made, seen.going = True, False
-    assert backend.takes("auto", model)
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize("effects", [(), (Softening(0.1),), (Softening(0.1), DisturbedGround(0.05, 0.5))], ids=len)
+def test_what_somebody_else_writes_runs_by_both(effects):
+    """A law, an effect with a past and a body: balance, stepping, displacement and work, the same digits."""
+    alpha, alphadot = GAIT.cycle(16, np.array([0.4, 0.9]))
+    found = [
+        time_steps(Quartic(), Turtle(), alpha, alphadot, effects=effects, cycles=2, with_work=True, backend=b)
+        for b in BOTH
+    ]
+    for name in ("xi", "pose", "displacement", "residual"):
+        np.testing.assert_allclose(*(getattr(x, name) for x in found), rtol=0, atol=1e-10, err_msg=name)
+    np.testing.assert_allclose(*(x.work.power for x in found), rtol=1e-10)
+    assert found[0].residual.max() < 1e-9
+    if not effects:
+        balanced = [body_velocity(Quartic(), Turtle(), alpha, alphadot, backend=b).checked() for b in BOTH]
+        np.testing.assert_allclose(*(x.xi for x in balanced), rtol=0, atol=1e-11)
+        np.testing.assert_allclose(balanced[0].xi, found[0].xi, rtol=0, atol=1e-6)
 
 
-def test_what_is_settled_on_numpy_has_compiled_code_made_for_the_next_time(auto, monkeypatch):
-    """Once, if it takes long, and by the command itself: its workers are many."""
-    fresh, seen = auto
-    monkeypatch.setattr(backend, "LONG", -1.0)
-    with backend.settled("numba"), backend.counted("auto"):
-        pass
-    with backend.settled("numpy"), one_thread(), backend.counted("auto"):
-        pass
-    assert seen.started == 0
-    monkeypatch.setattr(backend, "LONG", 0.0)
-    with backend.settled("numpy"):
-        for _ in range(2):
-            with backend.counted("auto"):
-                sum(range(10_000))
-    assert seen.started == 1 and fresh.worked == 0.0
+def test_an_effect_of_ones_own_vanishes_at_its_limit():
+    alpha, alphadot = GAIT.cycle(16)
+    plain, soft = (
+        time_steps(GLASS, Turtle(), alpha, alphadot, effects=e, cycles=1).xi for e in ((), (Softening(1e9),))
+    )
+    np.testing.assert_allclose(soft, plain, rtol=0, atol=1e-7)
 
 
-def test_a_maker_that_fails_is_not_started_again(auto):
-    fresh, seen = auto
-    fresh.worked, seen.going = 10.0, False
-    assert [backend.takes("auto", Model.of(GLASS)) for _ in range(3)] == [False] * 3
-    assert seen.started == 1
+@pytest.mark.usefixtures("compiled_code")
+def test_parameters_of_a_law_are_no_part_of_its_code():
+    alpha, alphadot = (0.4, -0.7), (1.0, 0.3)
+    for extra in (0.0, 1.0, 7.5):
+        one, other = (body_velocity(Quartic(extra), BODY, alpha, alphadot, backend=b).xi for b in BOTH)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+    isotropic = body_velocity(Quartic(0.0), BODY, alpha, alphadot, backend="numba", loads="gauss:24").xi
+    np.testing.assert_allclose(
+        isotropic, body_velocity(MEDIA["coulomb"], BODY, alpha, alphadot, loads="gauss:24").xi, atol=1e-10
+    )
 
 
-def test_the_maker_ends_with_the_command(monkeypatch):
-    """By its own id; nothing is left running."""
-    left = []
-    monkeypatch.setattr(backend.atexit, "register", lambda f, *args: left.append((f, args)))
-    maker = backend._started()
-    ((end, args),) = left
-    assert maker.poll() is None
-    end(*args)
-    assert maker.poll() is not None
+LAW = """
+import numpy as np, sys
+from dataclasses import dataclass
+from rft import Chain, body_velocity
+from rft.vectors import formula, sqrt
+
+FACTOR = {factor}
+
+@formula
+def factor(x):
+    return FACTOR * x
+
+@dataclass(frozen=True)
+class Own:
+    @formula
+    def traction(self, v_t, v_n, rounding=0.0):
+        R = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
+        return v_t / R, factor(v_n / R)
+
+print(*map(repr, body_velocity(Own(), Chain(), (0.4, -0.7), (1.0, 0.3), loads="gauss:4", backend="numba").xi.tolist()))
+"""
 
 
-def test_a_folder_that_cannot_be_written(monkeypatch):
-    monkeypatch.setattr(compiled, "_file", lambda: None)
-    monkeypatch.setattr("rft.body_velocity", lambda *args, **kwargs: None)
-    assert not compiled.made()
-    assert not compiled.make()
-    assert compiled.folder() is None
+@pytest.mark.usefixtures("compiled_code")
+def test_compiled_code_on_disk_is_that_of_the_formulas(tmp_path):
+    """A changed constant, in a function that the law calls, gives the new answer; going back finds the old code;
+    damaged files are compiled anew; a folder that cannot be written costs nothing but time."""
+    where = tmp_path / "cache"
+
+    def run(factor, folder=where):
+        file = tmp_path / "law.py"
+        file.write_text(LAW.format(factor=factor))
+        env = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+        done = subprocess.run([sys.executable, file], capture_output=True, text=True, env=env)
+        assert done.returncode == 0, done.stderr
+        return done.stdout, "compiling" in done.stderr
+
+    two, compiled = run(2.0)
+    assert compiled
+    three, compiled = run(3.0)
+    assert compiled and three != two
+    assert run(2.0) == (two, False)
+    (tmp_path / "file").write_text("")
+    assert run(2.0, tmp_path / "file") == (two, True)
 
 
 @pytest.mark.usefixtures("compiled_code")
 def test_made_beforehand():
     done = subprocess.run([sys.executable, "-m", "rft"], capture_output=True, text=True, env=os.environ)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("compiled code is kept in ")
+
+
+def test_importing_loads_no_compiler():
+    code = "import rft, geomech, sys; print([m for m in ('numba', 'llvmlite') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
 
 
 def doubled(x):
@@ -385,16 +422,17 @@ def doubled(x):
 def small(tmp_path, monkeypatch):
     """(a function that compiles `doubled`, or loads it, and tells whether it was loaded, where it is kept)."""
     numba = pytest.importorskip("numba")
-    from rft.lane_cache import kept
+    from rft.balance.cache import Cache
 
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
 
     def loaded():
-        function = kept(numba.njit(doubled), "doubled")
+        function = numba.njit(doubled)
+        function._cache = Cache(doubled)
         assert function(3.5) == 7.0
         return bool(function.stats.cache_hits)
 
-    return loaded, kept(numba.njit(doubled), "doubled")._cache.file
+    return loaded, Cache(doubled)
 
 
 def test_compiled_code_is_kept_in_one_file(small):
@@ -402,7 +440,6 @@ def test_compiled_code_is_kept_in_one_file(small):
     assert file.read() is None
     assert [loaded() for _ in range(3)] == [False, True, True]
     assert [p.name for p in file.path.parent.iterdir()] == [file.path.name]
-    assert all(x in file.path.name for x in ("doubled.", sys.implementation.cache_tag, "numba0."))
 
 
 def flipped(at):
@@ -412,12 +449,12 @@ def flipped(at):
 def unloadable(raw):
     """Whole, and no pickle."""
     body = b"nothing that can be loaded"
-    return raw[:17] + hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+    return hashlib.sha256(body).digest() + body
 
 
 DAMAGES = {
     "empty": lambda raw: b"",
-    "in its first line": lambda raw: raw[:30],
+    "in its checksum": lambda raw: raw[:30],
     "cut short": lambda raw: raw[: len(raw) // 2],
     "longer": lambda raw: raw + b"\0",
     "another file": lambda raw: b"#!/bin/sh\n" * 30,
@@ -433,11 +470,11 @@ def test_damaged_code_is_set_aside_and_made_anew(damage, small):
     assert not loaded()
     bad = DAMAGES[damage](file.path.read_bytes())
     file.path.write_bytes(bad)
-    with pytest.warns(compiled.Note) as notes:
+    with pytest.warns(Note) as notes:
         assert not loaded()
     (note,) = (str(x.message) for x in notes)
     why = "it cannot be loaded (UnpicklingError)" if damage == "unloadable" else "it is damaged"
-    assert note.startswith(f"the compiled code in {file.path} is not taken, {why}: set aside as ")
+    assert note.startswith(f"the compiled code in {file.path} is not taken, {why}: renamed ")
     assert "python -m rft" in note and "\n" not in note
     assert file.path.with_name(file.path.name + ".damaged").read_bytes() == bad
     assert loaded()
@@ -448,7 +485,7 @@ def test_nothing_of_damaged_code_reaches_numba(small, monkeypatch):
     loaded, file = small
     loaded()
     raw, good = file.path.read_bytes(), file.read()
-    monkeypatch.setattr(file, "set_aside", lambda why: None)
+    monkeypatch.setattr(file, "rename", lambda why: None)
     rng = np.random.default_rng(3)
     for at in [*range(82), *rng.integers(82, len(raw), 100)]:
         file.path.write_bytes(raw[:at] + bytes([raw[at] ^ 1 << rng.integers(8)]) + raw[at + 1 :])
@@ -457,17 +494,14 @@ def test_nothing_of_damaged_code_reaches_numba(small, monkeypatch):
     assert file.read() == good
 
 
-def test_code_of_another_source_or_signature_is_not_taken(small, monkeypatch):
+def test_code_of_another_signature_is_not_taken(small):
     """Nor is it damaged."""
     loaded, file = small
     loaded()
     raw = file.path.read_bytes()
-    assert raw.startswith(compiled.STAMP.encode())
-    assert file.load("another signature") is None
-    file.path.write_bytes(b"0" * 16 + raw[16:])
-    assert file.read() is None
-    assert [loaded(), loaded()] == [False, True]
-    assert file.path.read_bytes().startswith(compiled.STAMP.encode())
+    assert file.load_overload("another signature", types.SimpleNamespace(refresh=lambda: None)) is None
+    assert file.path.read_bytes() == raw
+    assert loaded()
 
 
 def test_code_that_cannot_be_kept_is_used_all_the_same(small, monkeypatch):
@@ -477,28 +511,14 @@ def test_code_that_cannot_be_kept_is_used_all_the_same(small, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
-        patch.setattr("rft.lane_cache.os.replace", full)
-        with pytest.warns(compiled.Note, match="not kept in .*: No space left on device; make room"):
+        patch.setattr("rft.balance.cache.os.replace", full)
+        with pytest.warns(Note, match="not kept in .*: No space left on device; make room"):
             assert not loaded()
         assert list(file.path.parent.iterdir()) == []
-        file.path.write_bytes(b"")  # nor can it be set aside
-        with pytest.warns(compiled.Note) as notes:
+        file.path.write_bytes(b"")  # nor can it be renamed
+        with pytest.warns(Note) as notes:
             assert not loaded()
-    assert sum("cannot be set aside (No space left on device): remove it" in str(x.message) for x in notes) == 1
-
-
-def test_a_command_notes_damaged_code_and_goes_on(small, monkeypatch, tmp_path, geomech):
-    """By NumPy, in one line, where "auto" would have loaded it."""
-    _, file = small
-    file.path.write_bytes(b"")
-    auto = backend.Auto()
-    auto.worked = backend.TO_LOAD
-    monkeypatch.setattr(backend, "AUTO", auto)
-    monkeypatch.setattr(compiled, "_file", lambda: file)
-    code, out, err = geomech("velocity", "three-link-glass", "--alpha", "0.5,0.3", "--alphadot", "1,0")
-    assert code == 0 and out.startswith("xi = (")
-    assert err.startswith(f"note: the compiled code in {file.path} is not taken, it is damaged: ")
-    assert err.count("\n") == 1
+    assert sum("cannot be renamed (No space left on device): remove it" in str(x.message) for x in notes) == 1
 
 
 @pytest.mark.soak
@@ -515,7 +535,9 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
             [sys.executable, *args], capture_output=True, text=True, env=env, cwd=tmp_path, preexec_fn=small_files
         )
         assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)["direct"], [x for x in done.stderr.splitlines() if " under way for " not in x]
+        return json.loads(done.stdout)["direct"], [
+            x for x in done.stderr.splitlines() if " under way for " not in x and "compiling" not in x
+        ]
 
     full = damage == "full disk"
     first, notes = run(*[50_000] * full)
@@ -526,21 +548,3 @@ def test_a_command_outlives_the_cache(damage, tmp_path, compiled_code):
         again, (note,) = run()
         assert again == first and "is not taken" in note
     assert run() == (first, [])
-
-
-def test_one_matrix_does_what_a_motion_does():
-    """Carrying, the wrench and its tangent, of a body whose elements have points besides, and of some of its samples."""
-    rng = np.random.default_rng(4)
-    body = Chain((0.7, 1.4, 0.9), frame="link-1")
-    links = body.motion(rng.normal(size=(2, 6)), rng.normal(size=(2, 6)))
-    motion = Kinematics.stacked([links, links.points([0, 2], np.array([[-0.2], [0.3]]), np.full((2, 1), 0.4))])
-    xi, load = rng.normal(size=(3, 6)), rng.normal(size=(3, 4, 5, 6))
-    some = Jacobian.join([Jacobian.of(motion.take(np.arange(2))), Jacobian.of(motion).take(np.arange(2, 6))])
-    np.testing.assert_allclose(some.carried(xi), motion.carried(xi), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(some.wrench(load[:, 2]), motion.wrench(load[:, 2]), rtol=0, atol=1e-13)
-    v = rng.normal(size=(3, 5, 6))
-    net, slope = some.assembled(load, v)
-    np.testing.assert_allclose(net, motion.assembled(load), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(slope, motion.wrench(np.einsum("ijnb,jnb->inb", load[:, 1:], v)), rtol=0, atol=1e-13)
-    np.testing.assert_array_equal(some.assembled(load)[0], net)
-    np.testing.assert_array_equal(some.v, motion.v)

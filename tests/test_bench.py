@@ -9,7 +9,7 @@ from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
 
 import rft
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from figures.cost_scaling import NAMES, backends, one_scipy_solve, quickest
-from geomech import connection
 from geomech.gaits import Butterfly, Circle, Sine
+from geomech.geometry import connection
 from geomech.scene import load
 from geomech.study.bench import Study
 from geomech.systems import Solver, Swimmer

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm, qmc
 
 from geomech import cli, scene
-from geomech.rows import Rows
+from geomech.io.rows import Rows
 from geomech.scene import drag
 from geomech.study import calibration
 from rft import Coulomb, Granular, Viscous

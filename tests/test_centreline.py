@@ -14,7 +14,7 @@ from scipy.special import ellipe
 
 from geomech import cli
 from geomech import scene as scenes
-from geomech.errors import Note, SceneError, UnitWarning
+from geomech.core.errors import Note, SceneError, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
 from geomech.output import sweeps
@@ -271,15 +271,20 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     assert scenes.parse(toml.read_text()).gait == made.gait
 
 
-def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path):
+def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
     from geomech.study import sweep
 
-    toml = scene_in(tmp_path, 12)
+    toml, partial = scene_in(tmp_path, 12), tmp_path / "partial"
     write(tmp_path / "data", "points", count=12, places=20)
-    before = scenes.load(toml)
-    assert sweep.question(before, {}) == sweep.question(scenes.load(toml), {})
+    over = {"body.length": [1.0, 2.0]}
+    sweep.sweep(scenes.load(toml), over, partial)
+    calls, solve = [], sweep._rows
+    monkeypatch.setattr(sweep, "_rows", lambda *some: calls.append(some) or solve(*some))
+    sweep.sweep(scenes.load(toml), over, partial)
+    assert calls == []
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)
-    assert sweep.question(before, {}) != sweep.question(scenes.load(toml), {})
+    sweep.sweep(scenes.load(toml), over, partial)
+    assert calls
     swept = sweep.sweep(scenes.load(toml), {"body.length": [1.0, 2.0], "gait.amplitude": [0.5, 1.0]})
     assert np.isfinite(swept["displacement"]).all()
 

@@ -5,6 +5,8 @@ import pytest
 from registry import BODIES
 
 from rft import Chain
+from rft.balance.newton import carried, on_frame, to_frame
+from rft.link import Load
 
 
 def by_hand(body, alpha):
@@ -62,12 +64,19 @@ def test_carried_and_wrench_are_transposes():
     body, rng = BODIES["uneven"], np.random.default_rng(2)
     motion = body.motion(*rng.normal(size=(2, 2, 6)))
     xi, force = rng.normal(size=(3, 6)), rng.normal(size=(3, 3, 6))
-    power = (2 * motion.half * force * motion.carried(xi)).sum((0, 1))
-    np.testing.assert_allclose(power, (xi * motion.wrench(force)).sum(0), rtol=1e-12)
-    H, load = rng.normal(size=(3, 3, 3, 6)), np.empty((3, 4, 3, 6))
-    load[:, 0], load[:, 1:] = force, H
-    columns = [motion.wrench(np.einsum("ijnb,jnb->inb", H, motion.carried(e[:, None] * np.ones(6)))) for e in np.eye(3)]
-    np.testing.assert_allclose(motion.assembled(load), np.stack([motion.wrench(force), *columns], 1), rtol=1e-12)
+    power = sum(f * v for f, v in zip(force, carried(motion, *xi))).sum(0)
+    np.testing.assert_allclose(power, (xi * np.stack(to_frame(motion, *force)).sum(1)).sum(0), rtol=1e-12)
+    H = rng.normal(size=(3, 3, 3, 6))
+    load = Load(*(x for row in range(3) for x in (force[row], *H[row])))
+    v = rng.normal(size=(3, 3, 6))
+    net = on_frame(motion, load, v, 0.7)
+    wrench = lambda f: np.stack(to_frame(motion, *(motion.weight * f))).sum(1)
+    tangent = lambda v: wrench(np.einsum("ijnb,jnb->inb", H, np.stack(np.broadcast_arrays(*v, motion.c)[:3])))
+    total = lambda triple: np.stack(triple).sum(1)
+    np.testing.assert_allclose(total(net.force), wrench(force), rtol=1e-12)
+    for column, unit in zip(net[1:4], np.eye(3)):
+        np.testing.assert_allclose(total(column), 0.7 * tangent(carried(motion, *unit)), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(total(net.drift), 0.7 * tangent(v), rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +85,7 @@ def test_carried_and_wrench_are_transposes():
         (lambda: Chain((1,)), "at least two links, got 1"),
         (lambda: Chain((1, -2)), r"finite and > 0, got \[1.0, -2.0\]"),
         (lambda: Chain((1, float("inf"))), "finite and > 0"),
-        (lambda: Chain(length=0.0), "length must be a number from 1e-15 to 1e\\+15, got 0.0"),
+        (lambda: Chain(length=0.0), "length must be a number from 1e-15 to 1e\\+15 m, got 0.0"),
         (lambda: Chain(frame="link-4"), "'link-1' ... 'link-3', got 'link-4'"),
         (lambda: Chain(frame="head"), "got 'head'"),
         (lambda: Chain((1e308,) * 3), "finite and > 0"),

@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 import xarray
 
-from geomech import cli, curvature, files
+from geomech import cli
 from geomech import scene as scenes
+from geomech.geometry import curvature
+from geomech.io import files
 from geomech.output import plots, report
 from geomech.study import accuracy
 from geomech.study.bench import Study
@@ -475,7 +477,7 @@ def test_commands_load_what_they_use_and_no_more(tmp_path):
         ["sweep", "three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc"],
     ]
     heavy = ("matplotlib", "scipy.interpolate", "scipy.optimize", "scipy.spatial", "sympy", "numba", "distributed")
-    heavy += ("rft.walking", "rft.spatial", "geomech.scene.walker", "concurrent.futures.process", "rich.progress")
+    heavy += ("rft.walking", "rft.meshes", "geomech.scene.walker", "concurrent.futures.process", "rich.progress")
     code = f"""if True:
         import os, sys
         from geomech import cli

@@ -8,18 +8,20 @@ import tempfile
 
 import numpy as np
 import pytest
-from parts import always_dies, dies, fails
+from tasks import always_dies, dies, fails
 from test_cli import geomech
 from test_workers import OVER, power  # noqa: F401  power is a fixture
 
 from geomech import scene as scenes
-from geomech import workers
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
+from geomech.run import executors
+from geomech.run.executors import Cluster
+from geomech.run.jobs import runner
+from geomech.run.workers import using
 from geomech.study import sweep
 
 distributed = pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
 
-from geomech.workers import cluster  # noqa: E402
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")  # of Dask's own
@@ -37,7 +39,7 @@ def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa
     monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 4)
     for scene, over in ((GLASS, OVER), (GLASS.changed(medium=power(1.0)), {"medium.power": [0.9, 1.0]})):
         alone, told = sweep.sweep(scene, over), []
-        with workers.using(scheduler=address):
+        with using(scheduler=address):
             shared = sweep.sweep(scene, over, progress=told.append)
         for key in ("displacement", "estimate", "estimate_heading"):
             np.testing.assert_array_equal(shared[key], alone[key])
@@ -45,13 +47,13 @@ def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa
 
 
 def test_errors_of_parts_are_those_of_the_command(address):
-    with workers.using(scheduler=address), pytest.raises(SceneError, match="no such thing as 2"):
-        list(workers.each(fails, None, range(4), 4))
+    with using(scheduler=address), pytest.raises(SceneError, match="no such thing as 2"):
+        list(runner().map(fails, None, range(4), 4))
     with (
-        workers.using(scheduler=address),
+        using(scheduler=address),
         pytest.raises(SceneError, match="a cluster cannot know what is to be computed"),
     ):
-        list(workers.each(lambda c, x: x, None, range(4), 4))
+        list(runner().map(lambda c, x: x, None, range(4), 4))
 
 
 @pytest.fixture
@@ -74,24 +76,26 @@ def processes():
 def test_a_worker_that_is_ended_loses_nothing(processes, tmp_path, monkeypatch):
     """By its own id, with SIGKILL; then the other one, by a part that ends whoever does it."""
     local, both = processes
-    monkeypatch.setattr(cluster, "WAIT", 30.0)
-    monkeypatch.setattr(cluster, "SEEN", 0.2)
-    with workers.using(scheduler=local.scheduler_address):
-        assert list(workers.each(dies, str(tmp_path), range(8), 8)) == [*range(8)]
+    monkeypatch.setattr(executors, "WAIT", 30.0)
+    monkeypatch.setattr(executors, "SEEN", 0.2)
+    with using(scheduler=local.scheduler_address):
+        assert list(runner().map(dies, str(tmp_path), range(8), 8)) == [*range(8)]
         assert (tmp_path / "died").exists()
         assert sorted(process.poll() is None for process in both) == [False, True]
         local.scheduler.allowed_failures = 0
         with pytest.raises(RuntimeError, match="workers were ended again and again at the same part"):
-            list(workers.each(always_dies, None, [0], 1))
+            list(runner().map(always_dies, None, [0], 1))
 
 
 def test_a_worker_with_other_code_is_refused(address, monkeypatch):
-    monkeypatch.setattr(cluster, "VERSION", "geomech 9.9, solver 9")  # of this command; threads share it, parts bear it
-    monkeypatch.setattr(cluster, "_probe", lambda: ("geomech 9.8, solver 9", "numpy"))
+    monkeypatch.setattr(
+        executors, "VERSION", "geomech 9.9, solver 9"
+    )  # of this command; threads share it, parts bear it
+    monkeypatch.setattr(executors, "_probe", lambda: ("geomech 9.8, solver 9", "numpy"))
     with pytest.raises(
         SceneError, match="has geomech 9.8, solver 9, this command geomech 9.9, solver 9: install the same"
     ):
-        cluster.Cluster(address)
+        Cluster(address)
 
 
 def listening():
@@ -105,7 +109,7 @@ def listening():
     "word", ["tcp://127.0.0.1:{port}", "127.0.0.1:{port}", "nonsense", "http://127.0.0.1:{port}", ""]
 )
 def test_a_scheduler_that_is_none_is_one_line(word, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "WAIT", 0.3)
+    monkeypatch.setattr(executors, "WAIT", 0.3)
     word = word.format(port=listening())
     args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--scheduler", word]
     code, out, err = geomech("sweep", *args, cwd=tmp_path)
@@ -119,34 +123,34 @@ def test_no_client_is_made_of_what_is_no_address(monkeypatch):
     monkeypatch.setattr(distributed, "Client", None)
     for word in ("nonsense", "http://127.0.0.1:80", "tcp://127.0.0.1:1;x", ""):
         with pytest.raises(SceneError, match="missing port|unknown address|invalid literal"):
-            cluster.Cluster(word)
+            Cluster(word)
 
 
 def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
-    monkeypatch.setattr(cluster, "WAIT", 0.3)
+    monkeypatch.setattr(executors, "WAIT", 0.3)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
         with pytest.raises(SceneError, match="nothing answers there"):
-            cluster.Cluster(f"tcp://127.0.0.1:{silent.getsockname()[1]}")
+            Cluster(f"tcp://127.0.0.1:{silent.getsockname()[1]}")
 
 
 def test_a_cluster_without_workers_is_one_line(monkeypatch):
-    monkeypatch.setattr(cluster, "WAIT", 0.3)
+    monkeypatch.setattr(executors, "WAIT", 0.3)
     settings = {"processes": False, "n_workers": 0, "dashboard_address": ":0", "protocol": "tcp://"}
     none = pytest.raises(SceneError, match="it has no workers: start some")
     with distributed.LocalCluster(silence_logs=50, **settings) as local, none:
-        cluster.Cluster(local.scheduler_address)
+        Cluster(local.scheduler_address)
 
 
 def test_without_the_package_the_cure_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SceneError, match="pip install 'geomech.distributed.'"):
-        cluster.Cluster("tcp://127.0.0.1:1")
+        Cluster("tcp://127.0.0.1:1")
 
 
 def test_workers_and_a_scheduler_are_one_too_many():
-    with pytest.raises(SceneError, match="give one of the two"), workers.using(2, "tcp://127.0.0.1:1"):
+    with pytest.raises(SceneError, match="give one of the two"), using(2, "tcp://127.0.0.1:1"):
         pass
 
 

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file
 from test_cli import geomech as run
-from test_sweep import rows_in
 
-from geomech import connection, harmonics, terminal
 from geomech import scene as scenes
-from geomech.errors import SceneError
-from geomech.field import Field
+from geomech import terminal
+from geomech.core.errors import SceneError
+from geomech.geometry import connection, harmonics
+from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.study import accuracy, cost, estimate, sweep
 from geomech.study.bench import Study
+from rft.balance import solver as balance
 from rft.effects import SkinFriction
-from rft.newton import Balance
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -40,14 +40,15 @@ FIVE = scenes.parse(FIVE_LINKS)
 @pytest.fixture
 def solved(monkeypatch):
     """Counts the force balances that are solved; those of a body in other pieces by the share of its elements."""
-    counts, elements, solve = [], [], Balance.solve
+    counts, elements, solve = [], [], balance.solve
 
-    def counting(self, motion, speed, *args, **kwargs):
-        elements.append(len(motion(np.arange(1)).half))
+    def counting(problem_at, speed, *args, **kwargs):
+        elements.append(len(problem_at(np.arange(1)).sides.station))
         counts.append(speed.size * elements[-1] / elements[0])
-        return solve(self, motion, speed, *args, **kwargs)
+        return solve(problem_at, speed, *args, **kwargs)
 
-    monkeypatch.setattr(Balance, "solve", counting)
+    for module in ("rft.stepping", "rft.balance.velocity"):
+        monkeypatch.setattr(f"{module}.solve", counting)
     return counts
 
 
@@ -230,7 +231,10 @@ def test_pieces_change_no_numbers(monkeypatch):
     whole = everything()
     monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
     monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
-    for module in (connection, *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "family"))):
+    for module in (
+        connection,
+        *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "geometry.family")),
+    ):
         monkeypatch.setattr(module, "SAMPLES_TOGETHER", 17)
     monkeypatch.setattr(harmonics, "VALUES_TOGETHER", 23)
     for a, b in zip(whole, everything(), strict=True):
@@ -259,14 +263,12 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
         return rows(at, amplitudes)
 
     monkeypatch.setattr(sweep, "_rows", stopping)
-    with pytest.raises(terminal.Stopped) as stopped:
+    with pytest.raises(terminal.Stopped):
         sweep.sweep(VISCOUS, over, kept)
-    assert stopped.value.__notes__ == [f"10 of 14 points are kept in {kept}: the same command goes on from there"]
     again = sweep.sweep(VISCOUS, over, kept)
     assert calls == [(2.0, 3), (2.0, 3), (2.0, 1), (3.0, 3), (3.0, 3), (3.0, 3), (3.0, 1)]
     np.testing.assert_allclose(again["displacement"], whole["displacement"], rtol=1e-12, atol=1e-13)
     np.testing.assert_allclose(again["estimate"], whole["estimate"], rtol=1e-6, atol=1e-14)
-    assert kept.exists()  # until the caller has saved
 
 
 # Stopping.
@@ -284,39 +286,6 @@ def started(args, cwd):
     finally:
         for number, handler in zip((signal.SIGHUP, signal.SIGTERM, signal.SIGINT), (*before, interrupt)):
             signal.signal(number, handler)
-
-
-def stopped(args, cwd, number, when):
-    """(exit code, standard error) of a command that is sent a signal as soon as ``when()`` holds."""
-    process = started(args, cwd)
-    while not when():
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.05)
-    process.send_signal(number)
-    err = process.communicate(timeout=30)[1]
-    return process.returncode, err
-
-
-def test_a_signal_stops_a_sweep_and_keeps_what_is_done(large):
-    """SIGTERM: see the solver's threads below."""
-    number = signal.SIGHUP
-    (large / "v.toml").write_text(VISCOUS.text + "\n[numerics]\nphases = 32\n")
-    kept = large / ".s.nc.partial"
-    args = ["sweep", "v.toml", "--over", "gait.amplitude=0.1:2:99999", "--yes", "-o", "s.nc"]
-    code, err = stopped(args, large, number, kept.exists)
-    assert code == 128 + number
-    assert err.splitlines()[-1].startswith(f"error: stopped by {number.name}: ")
-    assert "of 99999 points are kept in .s.nc.partial: the same command goes on from there" in err
-    rows = rows_in(kept)
-    assert f" {len(rows)} of 99999" in err
-    scene = scenes.load("v.toml")
-    amplitudes = [0.1 + (2 - 0.1) * k / 99998 for k in range(99999)]
-    some = np.array(amplitudes[: len(rows) : 97])
-    np.testing.assert_allclose(rows[::97, :3], estimate.direct(scene, scene.gait, some, 32)[0], rtol=1e-12, atol=1e-15)
-    assert {p.name for p in large.iterdir()} - {kept.name} == {"v.toml", *(f"{n}.toml" for n in SCENES)}
-
-
-SCENES = ("directions", "harmonics", "phases", "elements", "five")
 
 
 def test_a_signal_stops_the_solvers_threads(large):
@@ -378,7 +347,8 @@ def test_a_second_signal_does_not_disturb_the_keeping():
 
 
 def geomech(*args, cwd, **env):
-    """(exit code, standard output, standard error) as a process with some of the environment changed, None: taken away."""
+    """(exit code, standard output, standard error) as a process with some of the environment changed, None: taken
+    away."""
     changed = {k: v for k, v in {**os.environ, **env}.items() if v is not None}
     done = subprocess.run(
         [sys.executable, "-m", "geomech", *args], capture_output=True, cwd=cwd, env=changed, timeout=120

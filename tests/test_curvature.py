@@ -7,8 +7,9 @@ import pytest
 import sympy as sp
 import xarray
 
-from geomech import connection, curvature, symbolic
 from geomech import scene as scenes
+from geomech import symbolic
+from geomech.geometry import connection, curvature
 from geomech.output import netcdf
 from geomech.study.bench import Study
 from geomech.tiers import TIERS

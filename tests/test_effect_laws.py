@@ -5,7 +5,9 @@ import itertools
 
 import numpy as np
 import pytest
+from loads import as_array, element_load
 from registry import BODIES
+from scipy import optimize
 
 from geomech import scene as scenes
 from geomech.gaits import Circle, Sine
@@ -18,6 +20,7 @@ from rft import (
     DisturbedGround,
     EndCaps,
     SkinFriction,
+    Slope,
     TowedSled,
     Transient,
     Viscous,
@@ -26,12 +29,11 @@ from rft import (
     work_done,
 )
 from rft.bodies.pieces import Pieces, subdivide
-from rft.contact import Averages, Contact, Model
-from rft.effects.base import Site, folded
-from rft.effects.disturbed import Ground
-from rft.effects.transient import _developed
-from rft.loads import element_load
-from rft.sides import parts, sided
+from rft.contact import assemble
+from rft.effects.base import Site
+from rft.effects.transient import sides
+from rft.laws.records import record
+from rft.link import Factor, Incline, Memory, developed, inclined, multiplied, sided, square
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
@@ -60,19 +62,20 @@ def test_end_caps_are_the_written_formula():
 
 
 def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():
-    """Forward over reference where an element slides towards its head, backward towards its tail; the drag across stays."""
+    """Forward over reference where an element slides towards its head, backward towards its tail; the drag across
+    stays."""
     a, m, w = np.random.default_rng(6).normal(size=(3, 3, 40))
     a += 0.01 * np.sign(a)
-    eps, plain = np.full(40, 1e-3), element_load(GLASS)
-    skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25).apply(Model.of(GLASS)).contacts["side"]
-    found, without = skin.load(a, m, w, eps), plain(a, m, w, eps)
+    skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25)
+    factor = straight((skin,)).sides.factor
+    plain = record(GLASS).average(a, m, w, 1e-3)
+    found = as_array(multiplied(plain, a, Factor(*(np.ravel(x) for x in factor))), a)
+    without = as_array(plain, a)
     np.testing.assert_allclose(found[0], without[0] * np.where(a > 0, 0.12, 0.31) / 0.25, rtol=1e-14)
     np.testing.assert_array_equal(found[1:], without[1:])
 
 
 def test_squared_speed_is_integrated_exactly():
-    from rft.effects.grain_inertia import squared_speed_load
-
     rng = np.random.default_rng(0)
     m, w = rng.normal(size=(2, 60))
     m[:10], w[10:20], w[20:30] = 0.0, 0.0, m[20:30] * rng.choice([-1.0, 1.0], 10)
@@ -84,6 +87,7 @@ def test_squared_speed_is_integrated_exactly():
         u = m + w * s
         part = np.array([np.abs(u) * u, s * np.abs(u) * u])
         exact += (weight[:, None] * part).sum(1) * (high - low) / 4
+    squared_speed_load = lambda m, w: as_array(square(m, w, 1.0), m)[1:]
     got = squared_speed_load(m, w)
     np.testing.assert_allclose(got[:, 0], exact, atol=1e-14)
     h = 1e-6
@@ -96,15 +100,15 @@ def test_squared_speed_is_integrated_exactly():
 
 
 def test_sides_are_parts_of_the_whole():
-    """Left and right add up to the element's load; each is that of the positive and of the negative velocities across."""
+    """Left and right add up to the element's load; each is that of the positive and of the negative velocities
+    across."""
     rng = np.random.default_rng(2)
     a, m, w = rng.normal(size=(3, 4, 50))
     m[0], w[1] = 0.0, 0.0
     eps, load = np.full(50, 1e-3), element_load(GLASS)
 
     def side(share):
-        one = lambda m, w: (np.stack([share + 0 * m, 1 - share + 0 * m]), None, None)
-        return lambda *v: sided(load, (one,), *v)
+        return lambda a, m, w, eps: as_array(sided(record(GLASS), a, m, w, eps, given(share, 1 - share)), a)
 
     left, right = (side(share)(a, m, w, eps) for share in (1.0, 0.0))
     np.testing.assert_allclose((left + right)[1:], load(a, m, w, eps)[1:], atol=1e-12)
@@ -122,21 +126,23 @@ def test_sides_are_parts_of_the_whole():
         np.testing.assert_allclose(left[1:, column][:, inner], slope[:, inner], rtol=1e-3, atol=1e-3)
 
 
-def test_elements_are_split_once_however_many_effects_tell_their_sides_apart():
-    """Two shares of a half and a third are one of a sixth; the law is asked once, for no more than two parts an element."""
-    rng, asked = np.random.default_rng(7), []
-    v, eps, law = rng.normal(size=(3, 4, 50)), np.full(50, 1e-3), element_load(GLASS)
-    share = lambda part: lambda v_n, spin: (np.full((2, *v_n.shape), part), None, None)
-    counted = lambda v_t, *rest: asked.append(len(v_t)) or law(v_t, *rest)
-    both = sided(counted, (share(1 / 2), share(1 / 3)), *v, eps)
-    np.testing.assert_allclose(both, sided(law, (share(1 / 6),), *v, eps), rtol=1e-12)
-    np.testing.assert_allclose(both[1:], law(*v, eps)[1:] / 6, atol=1e-12)
-    assert asked == [8]
+def given(left, right):
+    """A ground that leaves these shares of the drag across to either side, and develops none."""
+    return Memory(1.0, 1.0, 0.0, left, right, -1.0, 0.0)
+
+
+def test_shares_of_both_sides_multiply_the_drag_across():
+    rng = np.random.default_rng(7)
+    v, eps = rng.normal(size=(3, 4, 50)), np.full(50, 1e-3)
+    sixth, plain = (as_array(sided(record(GLASS), *v, eps, given(x, x)), v[0]) for x in (1 / 6, 1.0))
+    np.testing.assert_allclose(plain, element_load(GLASS)(*v, eps), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(sixth[1:], plain[1:] / 6, atol=1e-12)
+    np.testing.assert_allclose(sixth[0], plain[0], atol=1e-12)
 
 
 def test_transients_follow_their_equation():
-    """An oscillating rod: shares against dh/dx = 3 (1 - h) / travel one way and -3 h / travel the other, of order 2 in the
-    step; 95 % is there after the travel."""
+    """An oscillating rod: shares against dh/dx = 3 (1 - h) / travel one way and -3 h / travel the other, of order 2 in
+    the step; 95 % is there after the travel."""
     travel, t_end = 0.2, 7.0
     way = lambda t: np.sin(1.3 * t) + 0.3 * np.cos(2.1 * t)
 
@@ -149,8 +155,8 @@ def test_transients_follow_their_equation():
         return h
 
     def after(h, before, now, dt):
-        v = [{"side": np.array([0.0, u, 0.0])[:, None, None]} for u in (before, now)]
-        return Transient(travel=travel).after(h, Site(dt, np.zeros((3, 1)), {}, v[0]), v[1])
+        v = [np.array([0.0, u, 0.0])[:, None, None] for u in (before, now)]
+        return Transient(travel=travel).after(None, Site(1, dt, np.zeros((3, 1)), v[0]), h, v[1])
 
     def marched(steps):
         h, t = np.zeros((2, 1, 1)), np.linspace(0, t_end, steps + 1)
@@ -170,15 +176,15 @@ def test_slopes_of_shares_are_derivatives():
     rng = np.random.default_rng(3)
     memory, before, now, h = rng.uniform(size=(2, 5, 40)), *rng.normal(size=(2, 2, 5, 40)), 1e-6
     now = 0.01 + np.abs(now)
-    values, slopes = _developed(memory, before, now, 0.3, 2.0)
-    difference = _developed(memory, before, now + h, 0.3, 2.0)[0] - _developed(memory, before, now - h, 0.3, 2.0)[0]
+    values, slopes = developed(memory, before, now, 0.3, 2.0)
+    difference = developed(memory, before, now + h, 0.3, 2.0)[0] - developed(memory, before, now - h, 0.3, 2.0)[0]
     np.testing.assert_allclose(slopes, difference / (2 * h), atol=1e-7)
     assert (values >= 0).all()
     assert (values <= 1).all()
     assert (slopes >= 0).all()  # the faster to a side, the more of the drag to that side
-    paused = _developed(memory, np.abs(before), 0 * now, 0.3, 2.0)[0]  # it went on for a while before it stopped
+    paused = developed(memory, np.abs(before), 0 * now, 0.3, 2.0)[0]  # it went on for a while before it stopped
     np.testing.assert_allclose(paused, 1 - (1 - memory) * np.exp(-2.0 * 0.15 * np.abs(before)), rtol=1e-12)
-    still = _developed(memory, before, now, 0.3, np.inf)
+    still = developed(memory, before, now, 0.3, np.inf)
     assert (still[0] == 1).all()
     assert (still[1] == 0).all()
 
@@ -187,64 +193,74 @@ def test_parts_of_elements_are_means_of_their_velocities():
     rng = np.random.default_rng(6)
     m, w = rng.normal(size=(2, 60))
     m[0], w[1], w[2] = 0.0, 0.0, -m[2]
-    velocity, left, inside = parts(m, w)
+    velocity, left = sides(m, w)
     u = m + w * ((np.arange(200_000)[:, None] + 0.5) / 100_000 - 1)
     np.testing.assert_allclose(left, (u > 0).mean(0), atol=1e-5)
     for side, share, found in ((u > 0, left, velocity[0]), (u < 0, 1 - left, velocity[1])):
         np.testing.assert_allclose(share * found, (u * side).mean(0), atol=1e-5)
-    assert (inside == (np.abs(w) > np.abs(m))).all()
 
 
 def test_a_piece_that_turns_remembers_both_of_its_sides():
     """About its middle for a long way: each half has built up its own side, so that the piece has half of either."""
-    effect, chain = Transient(travel=0.01), Chain((1, 1))
-    motion = chain.motion(np.zeros((1, 1)), np.ones((1, 1)))
-    site = Site(1.0, np.zeros((3, 1)), {"side": motion}, {"side": np.zeros((3, 2, 1))})
+    effect, still = Transient(travel=0.01), np.zeros((3, 2, 1))
     v = np.array(
         [[[0.0], [0.0]], [[0.0], [0.5]], [[1.0], [1.0]]]
     )  # the second has its pivot at a quarter of its length
-    memory = effect.after(np.ones((2, 2, 1)), site, {"side": v})[..., 0]
+    memory = effect.after(None, Site(1, 1.0, np.zeros((3, 1)), still), np.ones((2, 2, 1)), v)[..., 0]
     np.testing.assert_allclose(memory, [[0.5, 0.75], [0.5, 0.25]], atol=1e-12)
 
 
+def straight(effects, body=None, rate=1.0, medium=GLASS):
+    """The balance of a straight body."""
+    body = body or Chain((1, 1))
+    return assemble(medium, body, effects, pieces=40).at(np.zeros((body.joints, 1)), np.full((body.joints, 1), rate))
+
+
 def test_ground_remembers_where_the_body_was():
-    ground = Ground(0.025, 2)
-    ground.mark(np.array([[0.3 + 0.2j, 0.0]]), 0.05)
+    effect = DisturbedGround(radius=0.05, weakening=1.0)
+    fresh = effect.begin(None, Site(0, 0.0, np.zeros((3, 2)), ()))
+    ground = effect.marked(fresh, np.array([[0.3 + 0.2j, 0.0]]))
+    at = lambda *places: effect.disturbance(ground, np.array(places))
     # A whole disturbance on the axis, nothing far off, and nothing in the other sample's ground.
-    assert ground.at(np.array([0.3 + 0.2j, 0.3 + 0.2j])) == pytest.approx([1, 0], abs=0.05)
-    assert ground.at(np.array([0.3 + 0.32j, 5.0])) == pytest.approx([0, 0], abs=1e-12)
-    assert ground.at(np.array([0.3 + 0.25j, 0.05])) == pytest.approx([0.5, 0.5], abs=0.1)
+    assert at(0.3 + 0.2j, 0.3 + 0.2j) == pytest.approx([1, 0], abs=0.05)
+    assert at(0.3 + 0.32j, 5.0) == pytest.approx([0, 0], abs=1e-12)
+    assert at(0.3 + 0.25j, 0.05) == pytest.approx([0.5, 0.5], abs=0.1)
     # A patch that wraps round onto the same cells is untouched ground, and taking it over forgets the old.
-    assert ground.at(np.array([0.3 + 0.2j + 4, 0.0])) == pytest.approx([0, 1], abs=0.05)
-    ground.mark(np.array([[4.3 + 0.2j, 0.0]]), 0.05)
-    assert ground.at(np.array([0.3 + 0.2j, 0.0])) == pytest.approx([0, 1], abs=0.05)
+    assert at(0.3 + 0.2j + 4, 0.0) == pytest.approx([0, 1], abs=0.05)
+    ground = effect.marked(ground, np.array([[4.3 + 0.2j, 0.0]]))
+    assert at(0.3 + 0.2j, 0.0) == pytest.approx([0, 1], abs=0.05)
+    assert all((x == 0).all() for x in fresh.value)  # a step leaves the state it came from as it was
+    assert sum(x is not y for x, y in zip(fresh.value, ground.value)) < 10  # and copies what it marks alone
+
+
+def shares(effect, problem, site, ground):
+    """What an effect leaves of the drag across, to the left and to the right, (2, n, B)."""
+    memory = effect.apply(problem, site, ground).memory
+    return np.stack([memory.given_left, memory.given_right])
 
 
 def test_a_body_that_finds_fresh_ground_is_not_weakened():
     """The first steps of a straight-ahead chain: its own track lies behind and under it, not at its sides."""
     effect = DisturbedGround(radius=0.03, weakening=1.0)
-    body = subdivide(Chain((1, 1, 1)), 40)
-    motion = body.motion(np.zeros((2, 1)), np.ones((2, 1)))
-    site = Site(0.1, np.zeros((3, 1)), {"side": motion}, {})
-    untouched = effect.after(effect.begin(site), site._replace(dt=0.0), {"side": motion.v})
+    problem = straight((), subdivide(Chain((1, 1, 1)), 40))
+    site = Site(1, 0.1, np.zeros((3, 1)), ())
+    untouched = effect.after(problem, site._replace(count=0), effect.begin(problem, site), ())
     aside = site._replace(pose=np.array([[0.0], [0.06], [0.0]]))
-    assert (effect.at(untouched, aside).left == 1.0).all()  # at the first step there is no track
-    ground = effect.after(untouched, site, {"side": motion.v})
-    np.testing.assert_allclose(effect.at(ground, site).left, 1.0, atol=1e-12)
-    left, right = effect.at(ground, aside).left
+    assert (shares(effect, problem, aside, untouched) == 1.0).all()  # at the first step there is no track
+    ground = effect.after(problem, site, untouched, ())
+    np.testing.assert_allclose(shares(effect, problem, site, ground), 1.0, atol=1e-12)
+    left, right = shares(effect, problem, aside, ground)
     assert right.max() < 0.1  # the track it left
     assert left.min() == 1.0
 
 
 def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
     """A track beside one half of an element takes half of that side's drag: the mean along it, not the most."""
-    effect, body = DisturbedGround(radius=0.03, weakening=1.0), Chain((1, 1))
-    motion = body.motion(np.zeros((1, 1)), np.ones((1, 1)))
-    site = Site(0.1, np.zeros((3, 1)), {"side": motion}, {})
-    ground = effect.begin(site)
+    effect, problem = DisturbedGround(radius=0.03, weakening=1.0), straight(())
+    site = Site(1, 0.1, np.zeros((3, 1)), ())
     track = np.linspace(-0.5, -0.25, 40)[:, None, None] + 0.06j  # along the tail half of the tail's link, to its left
-    ground.mark(track, 0.03)
-    left, right = effect.at(ground, site).left[..., 0]
+    ground = effect.marked(effect.begin(problem, site), track)
+    left, right = shares(effect, problem, site, ground)[..., 0]
     assert left[0] == pytest.approx(0.5, abs=0.08)
     assert [left[1], *right] == [1, 1, 1]
 
@@ -276,33 +292,129 @@ def test_depth_along_the_body():
 
 
 def test_a_slope_rises_where_it_says():
-    """Towards pi / 2 it is deeper where y > 0, so what lies there weighs more; every buried contact at its own place."""
-    body, effects = Chain((1, 1)), (EndCaps(radius=0.05), DepthProfile(slope=0.5, towards=np.pi / 2))
-    model = folded(effects, GLASS, body).touching("sledge", Contact(Averages(GLASS), buried=False))
-    motions = model.motions(body.motion(np.zeros((1, 1)), np.ones((1, 1))))
+    """Towards pi / 2 it is deeper where y > 0, so what lies there weighs more; every buried contact at its own
+    place."""
+    problem = straight((EndCaps(radius=0.05), TowedSled(pull=2.0)))
 
     def depths(effect, pose):
-        deep = effect.at(None, Site(0.1, np.array(pose)[:, None], motions, {})).apply(model)
-        assert deep.contacts["sledge"].factors == ()
-        return [deep.contacts[name].factors[0](None, None, None)[0][:, 0] for name in ("side", "ends")]
+        deep = effect.apply(problem, Site(1, 0.1, np.array(pose)[:, None], ()), None)
+        assert deep.points.factor.across[2, 0] == 2.0  # the sled lies on the surface
+        return [contact.factor.across[:2, 0] for contact in (deep.sides, deep.points)]
 
-    side, ends = depths(effects[1], (0.4, 0.1, np.pi / 2))  # standing along y, its middle at 0.1
+    along_y = DepthProfile(slope=0.5, towards=np.pi / 2)
+    side, ends = depths(along_y, (0.4, 0.1, np.pi / 2))  # standing along y, its middle at 0.1
     np.testing.assert_allclose(side, 1 + 0.5 * np.array([-0.15, 0.35]), atol=1e-15)
     np.testing.assert_allclose(ends, 1 + 0.5 * np.array([-0.4, 0.6]), atol=1e-15)
     side, _ = depths(DepthProfile(along=(1.0, 3.0), slope=0.5, towards=np.pi / 6), (1.0, 0.0, 0.0))
     np.testing.assert_allclose(side, [1.5 + 0.375 * np.cos(np.pi / 6), 2.5 + 0.625 * np.cos(np.pi / 6)], atol=1e-15)
 
 
+def test_a_slope_weakens_what_moves_downhill():
+    """Half the drag straight downhill at 20 degrees (Sec. IV B), none more uphill; the weight pulls downhill, and does no
+    work on the ground."""
+    unit, speed = np.exp(1j * 0.7), 0.3
+    for heading in (0.0, 2.0):
+        v = speed * -unit * np.exp(-1j * heading)  # straight downhill, in the element's frame
+        body, down = Chain((1.0, 1.0), frame="link-1"), -unit * np.exp(-1j * heading)
+        site = Site(0, 0.0, np.array([[0.0], [0.0], [heading]]), ())
+        level = assemble(GLASS, body).at(np.zeros((1, 1)), np.ones((1, 1)))
+        problem = Slope(np.radians(20.0), towards=0.7, weight=0.4).apply(level, site)
+        incline = problem.sides.incline
+        np.testing.assert_allclose([incline.down_t[0, 0], incline.down_n[0, 0]], [down.real, down.imag], atol=1e-15)
+        for sign, share in ((1, 0.5), (-1, np.cos(np.radians(20.0)))):
+            load = record(GLASS).average(sign * v.real, sign * v.imag, 0.0, 0.0)
+            row = Incline(*(x[0, 0] for x in incline))
+            found = inclined(load, (sign * v.real, sign * v.imag), 0.0, row)
+            pull = 0.4 * np.sin(np.radians(20.0)) * problem.unit
+            expected = share * load.t - pull * down.real, share * load.n - pull * down.imag, share * load.w
+            np.testing.assert_allclose((found.t, found.n, found.w), expected, atol=1e-12)
+
+
+def test_a_slope_has_the_slopes_of_its_load():
+    rng = np.random.default_rng(3)
+    law, row = record(GLASS), Incline(0.6, -0.8, 0.9, 0.5, 0.3)
+
+    def load(v):
+        return inclined(law.average(*v, 1e-2), v, 1e-2, row)
+
+    for v in rng.normal(size=(20, 3)):
+        found = load(v)
+        for k, column in enumerate((("t_t", "n_t", "w_t"), ("t_n", "n_n", "w_n"), ("t_w", "n_w", "w_w"))):
+            h = 1e-6 * np.eye(3)[k]
+            wanted = [(getattr(load(v + h), x) - getattr(load(v - h), x)) / 2e-6 for x in "tnw"]
+            np.testing.assert_allclose([getattr(found, x) for x in column], wanted, atol=2e-7)
+
+
+def test_a_body_on_a_slope_against_an_integral_over_points():
+    """Every point of the body by its own velocity, by SciPy; pieces count as their centres."""
+    body, effect = Chain((1, 1.4, 0.8)), Slope(0.35, towards=2.0, repose=0.6, weight=0.3)
+    alpha, alphadot = np.array([0.6, -0.4]), np.array([0.8, 1.1])
+    s, weights = (2 * np.arange(20_000) + 1) / 20_000 - 1, np.full(20_000, 1 / 20_000)
+    e = body.motion(alpha[:, None], alphadot[:, None])
+
+    def net(xi):
+        force = np.zeros(3)
+        for c, sn, r_t, r_n, half, _, v_t, v_n, v_w in zip(*(x[:, 0] for x in e)):
+            u_t = v_t + c * xi[0] + sn * xi[1] + r_t * xi[2] + 0 * s
+            u_n = v_n + c * xi[1] - sn * xi[0] + r_n * xi[2] + s * (v_w + half * xi[2])
+            down = -np.exp(2.0j) * (c - 1j * sn)
+            d = np.maximum(down.real * u_t + down.imag * u_n, 0.0) / np.hypot(u_t, u_n)
+            share = np.cos(0.35) - d * np.sin(0.35) / np.tan(0.6)
+            f_t, f_n = (share * f for f in GLASS.traction(u_t, u_n))
+            f_t, f_n = f_t - 0.3 * np.sin(0.35) * down.real, f_n - 0.3 * np.sin(0.35) * down.imag
+            t, n, w = (2 * half * np.sum(weights * f) for f in (f_t, f_n, s * f_n))
+            force += [c * t - sn * n, sn * t + c * n, r_t * t + r_n * n + half * w]
+        return force
+
+    exact = optimize.root(net, np.zeros(3), method="hybr", tol=1e-10)
+    assert exact.success
+    cycle = np.stack([alpha] * 8), np.stack([alphadot] * 8)
+    at = lambda n: time_steps(GLASS, body, *cycle, effects=(effect,), pieces=n, cycles=1).xi[0]
+    errors = [np.abs(at(n) - exact.x).max() for n in (40, 320, 2560)]
+    assert errors[2] < 1e-5
+    assert errors[1] < errors[0] / 5
+    assert errors[2] < errors[1] / 5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"angle": 0.7}, "below the angle of repose, 37.9 degrees"),
+        ({"angle": 0.3, "weight": 4.0}, "slides down"),
+        ({"angle": -0.1}, "angle must be a number from 0"),
+    ],
+)
+def test_slopes_that_slide_by_themselves_are_refused(wrong, says):
+    with pytest.raises(ValueError, match=says):
+        Slope(**wrong)
+    with pytest.raises(ValueError, match="takes a medium of grains, got Viscous"):
+        assemble(Viscous(), Chain(), (Slope(0.1),))
+
+
+def test_gravity_does_no_work_on_the_ground():
+    """Joints and gravity together do what the ground takes up."""
+    body, (alpha, alphadot) = Chain((1, 1.4, 0.8)), Circle(amplitude=0.8, centre=(0.2, -0.1)).cycle(256)
+    effect = Slope(0.3, towards=1.0, weight=0.3)
+    found = time_steps(GLASS, body, alpha, alphadot, effects=(effect,), cycles=1, with_work=True)
+    joints = np.sum(found.work.bending_moment * alphadot, -1).sum()
+    middle = np.array([mean_place(body, alpha[k], found.pose[k]) for k in range(256)])
+    fall = -np.diff(middle, axis=0) @ [np.cos(1.0), np.sin(1.0)]
+    gravity = 0.3 * np.sin(0.3) * fall.sum() / (2 * np.pi / 256)
+    assert found.work.power.sum() == pytest.approx(joints + gravity, rel=2e-3)
+    assert abs(gravity) > 0.01 * joints
+
+
+def mean_place(body, alpha, pose):
+    ends = body.points(alpha, pose)
+    return body.fractions @ (ends[1:] + ends[:-1]) / 2
+
+
 def test_places_run_from_the_tail_to_the_head():
-    body = Chain((1, 3))
-    caps = EndCaps(radius=0.05, tail=4.0, head=0.0)
-    model = folded((caps,), GLASS, body)
-    motions = model.motions(body.motion(np.zeros((1, 1)), np.zeros((1, 1))))
-    places = {name: model.contacts[name].places(motions[name]) for name in motions}
-    np.testing.assert_allclose(places["side"], [1 / 8, 5 / 8], atol=1e-15)
-    np.testing.assert_allclose(places["ends"], [0, 1], atol=1e-15)
-    np.testing.assert_allclose(motions["ends"].place[:, 0], [-0.5, 0.5], atol=1e-15)  # on which places they are
-    tail, head = motions["ends"].weight[:, 0]
+    problem = straight((EndCaps(radius=0.05, tail=4.0, head=0.0),), Chain((1, 3)))
+    np.testing.assert_allclose(problem.sides.station[:, 0], [1 / 8, 5 / 8], atol=1e-15)
+    np.testing.assert_allclose(problem.points.station[:, 0], [0, 1], atol=1e-15)
+    np.testing.assert_allclose(problem.points.elements.place[:, 0], [-0.5, 0.5], atol=1e-15)
+    tail, head = problem.points.elements.weight[:, 0]
     assert tail > head == 0
 
 
@@ -348,8 +460,8 @@ def test_drift_counts_all_of_a_cycle():
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_a_towed_sled_by_an_independent_sum_of_forces(frame):
-    """Every force on the ground, from headings and places by hand and velocities by differences, and the sled's against the
-    way it goes: they and their moments add up to nothing, and the joints put in what friction takes."""
+    """Every force on the ground, from headings and places by hand and velocities by differences, and the sled's against
+    the way it goes: they and their moments add up to nothing, and the joints put in what friction takes."""
     lengths, sled = (1.0, 1.4, 0.8), TowedSled(pull=0.7, distance=0.3)
     body = Chain(lengths, length=0.4, frame=frame)
     alpha, alphadot, h = np.array([0.9, -0.4]), np.array([0.8, 0.5]), 1e-6
@@ -404,5 +516,5 @@ def test_a_sled_takes_no_viscous_medium():
         with pytest.raises(
             ValueError, match="a towed sled takes a medium without viscous drag, dry as itself, got Power"
         ):
-            folded([TowedSled(pull=0.1)], Power(power), Chain())
-    assert "sled" in folded([TowedSled(pull=0.1)], Power(0.0), Chain()).contacts
+            assemble(Power(power), Chain(), [TowedSled(pull=0.1)])
+    assert assemble(Power(0.0), Chain(), [TowedSled(pull=0.1)]).elements == 4

@@ -7,10 +7,11 @@ import re
 
 import numpy as np
 import pytest
+from artists import curve, drawn
 from registry import EFFECTS
 
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.output.explain import explain
 from geomech.study.bench import Study
@@ -25,8 +26,9 @@ from rft import (
     body_velocity,
     time_steps,
 )
-from rft.contact import Model
+from rft.contact import assemble
 from rft.effects import KINDS, engine, side_by_side
+from rft.link import square
 from rft.premise import ALL, not_so
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -147,8 +149,8 @@ UNEVEN, OFF_CENTRE = Chain((1, 1.4, 0.8)), Ellipse(semi_axes=(1.0, 0.6), tilt=0.
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effects_vanish_on_chains_too(name):
-    """At the declared order over six decades, pivots inside links and links at rest included. Of a transient, which feels
-    all of what reverses and links that come to rest as they do, the order is that of its docstring."""
+    """At the declared order over six decades, pivots inside links and links at rest included. Of a transient, which
+    feels all of what reverses and links that come to rest as they do, the order is that of its docstring."""
     make, order = EFFECTS[name]
     alpha, alphadot = OFF_CENTRE.cycle(32 if name == "transient" else 16)
     plain = body_velocity(GLASS, UNEVEN, alpha, alphadot).xi
@@ -206,7 +208,9 @@ def test_engines(name):
     """What needs no time stepping gets none; time stepping agrees with the algebraic engine there."""
     effect = EFFECTS[name][0](0.01)
     needs = {"body-inertia": "dynamic", "transient": "time stepping", "disturbed-ground": "time stepping"}
-    wanted = "time stepping" if name == "depth-profile, slope" else needs.get(name.partition(",")[0], "algebraic")
+    wanted = (
+        "time stepping" if name in ("depth-profile, slope", "slope") else needs.get(name.partition(",")[0], "algebraic")
+    )
     assert engine((effect,)) == wanted
     assert engine((effect, BodyInertia(1, 1, 1, 1))) == "dynamic"
     body, (alpha, alphadot) = Backbone(12), Sine(elements=12).cycle(16)
@@ -309,16 +313,16 @@ def test_grain_inertia_needs_grains():
 
 
 def test_grain_inertia_takes_the_grains_own_pressure():
-    """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose glass, 5.1 in close, one's own where
-    one is given, and 2.5 where nobody says, which is said."""
+    """The quadratic drag is lambda rho v_n^2 over k rho g |z|: with k = 2.5 in loose glass, 5.1 in close, one's own
+    where one is given, and 2.5 where nobody says, which is said."""
     plain = {"frequency": 2.0, "length": 0.3, "depth": 0.05, "strength": 1.5}
     m = np.array([[0.7]])
     zero = 0 * m
 
     def added(effect, medium):
         """Normal load of an element that goes across at 0.7 body lengths per rad, over what the medium itself gives."""
-        (flux,) = effect.apply(Model.of(medium)).contacts["side"].additions
-        return float(flux(zero, m, zero, 0.0)[1, 0, 0, 0])
+        strength = assemble(medium, Chain(), [effect]).at(np.zeros((2, 1)), np.ones((2, 1))).square
+        return float(square(m, zero, strength).n[0, 0])
 
     speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s
     unit = 1.5 * speed**2 / (9.81 * 0.05)
@@ -372,18 +376,17 @@ def test_what_an_effect_breaks_is_refused_by_name(method):
 
 def test_transients_draw(tmp_path):
     from figures import transients
-    from geomech.output import plots
 
     numbers = transients.compute(shares=(0.0, 0.2, 0.65), elements=20, phases=32)
     assert (np.diff(numbers["net"], axis=1) < 0).all()
     assert numbers["net"][1] == pytest.approx([1, 0.902, 0.70], abs=0.01)
-    plots.save(transients.draw(numbers), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 15_000
+    net, velocity = drawn(transients, numbers, tmp_path).axes
+    np.testing.assert_allclose(curve(net, r"$A/\lambda$ = 0.4"), [numbers["shares"], numbers["net"][2]])
+    np.testing.assert_allclose(curve(velocity, "travel 0.65 $A$"), [numbers["t"], numbers["velocity"][2]])
 
 
 def test_the_cost_of_effects_draws(tmp_path):
     from figures import effects_cost
-    from geomech.output import plots
 
     numbers = effects_cost.compute(phases=16, repeats=1, cycles=2)
     assert numbers["none"]["engine"] == numbers["these four"]["engine"] == "algebraic"
@@ -392,8 +395,10 @@ def test_the_cost_of_effects_draws(tmp_path):
     assert numbers["transient"]["cycles"] > 1
     assert numbers["none"]["ratio"] == 1.0
     assert set(numbers) == set(effects_cost.SETS)
-    plots.save(effects_cost.draw(numbers), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 8_000
+    (ax,) = drawn(effects_cost, numbers, tmp_path).axes
+    names = [x.get_text() for x in ax.get_yticklabels()]
+    bars = {names[round(bar.get_y() + bar.get_height() / 2)]: bar.get_width() for bar in ax.patches}
+    assert bars == {name: one["ratio"] for name, one in numbers.items()}
 
 
 def test_a_body_that_comes_to_the_surface_is_refused():

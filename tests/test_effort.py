@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech import metric
-from geomech.connection import Connection
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import metric
+from geomech.geometry.connection import Connection
 from geomech.output import netcdf
 from geomech.scene.frames import framed
 from geomech.study import cost, effort

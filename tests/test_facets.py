@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.spatial import Cylinder, Screw, Spatial, Sphere, below, shapes, wrench
-from rft.spatial.extruded import Extruded
-from rft.spatial.submerged import submerged
-from rft.vertical import CLeg, Polygon, RoundRod, StressMap
-from rft.walking.elements import Elements
+from rft.ground import Ground
+from rft.meshes import Cylinder, Screw, Spatial, Sphere, below, shapes, wrench
+from rft.meshes.extruded import Extruded
+from rft.meshes.submerged import submerged
+from rft.plates import CLeg, Polygon, RoundRod, StressMap
+from rft.walking.elements import Elements, Outlines
 from rft.walking.facets import Facets, Grains, Poses, Surface
-from rft.walking.ground import Ground, Outlines
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 SPATIAL = Spatial(3e5, surface_friction=0.6)
@@ -45,8 +45,9 @@ def test_a_stress_map_of_three_dimensions_is_the_planar_one_in_every_vertical_pl
     (b, g), turn = RNG.uniform(-np.pi, np.pi, (2, 300)), RNG.uniform(0, 2 * np.pi, 300)
     n, v = np.array([np.sin(b), -np.cos(b)]), np.array([np.cos(g), -np.sin(g)])
     raised = lambda a: np.array([a[0] * np.cos(turn), a[0] * np.sin(turn), a[1]])
-    found, wanted = Extruded(stress).traction(raised(n), raised(v)), raised(stress.traction(n, v))
-    kept = raised(dataclasses.replace(stress, tension="keep").traction(n, v))
+    planar = lambda stress: 1e6 * raised(np.array([[-1.0], [1.0]]) * stress.alpha(n, v))
+    found, wanted = Extruded(stress).traction(raised(n), raised(v)), planar(stress)
+    kept = planar(dataclasses.replace(stress, tension="keep"))
     clear = np.abs((kept * raised(n)).sum(0) * (n * v).sum(0)) > 0.026 * np.linalg.norm(kept, axis=0)  # of the cut
     clear |= tension == "keep"
     assert clear.sum() > 200
@@ -63,7 +64,7 @@ def poses(count):
 
 
 def test_loads_are_those_of_each_mesh_alone():
-    """Of two geoms on one body and one on another, against the sums of `rft.spatial.wrench` about the bodies' origins."""
+    """Of two geoms on one body and one on another, against the sums of `rft.meshes.wrench` about the bodies' origins."""
     meshes = [Sphere(0.02).mesh(80), Screw(0.03, 0.02, 0.05, 0.1).mesh(600), Cylinder(0.02, 0.05).mesh(200)]
     turn, place = Rotation.from_euler("xyz", [0.3, -1.1, 0.7]).as_matrix(), np.array([0.02, -0.01, 0.015])
     at = poses(2)
@@ -94,9 +95,11 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
     )
     facets = Facets([Surface.of_outline(0, outline)])
     found = facets.loads(Grains(Extruded(SAND), 1.0, 2000.0, 1e-7), at)[0][0]
-    ground = Ground(SAND, *np.array([1.0, 2000.0, 1e-7])[:, None])
-    flat, pose = Elements(Outlines.of([outline]), None, np.zeros((2, 1, 1)), SAND.tension), [place[0], place[2], angle]
-    *force, moment = np.ravel(flat.sums(ground, [0], np.array([[pose]]), motion[None, None], *np.zeros((2, 1, 1)))[:3])
+    ground = Ground(*np.array([1.0, 2000.0, 1e-7])[:, None], np.sin(SAND.grazing))
+    flat, one = Elements(Outlines.of([outline]), None, np.zeros((2, 1, 1)), SAND), np.zeros(1, int)
+    pose, twist = np.array([place[0], place[2], angle]), motion
+    at = (x[:, None, None] for x in (pose, twist))
+    *force, moment = np.ravel(flat.sums(ground, one, *at, *np.zeros((2, 1, 1)))[:3])
     np.testing.assert_allclose(found[[0, 2]], force, rtol=3e-3, atol=2e-4 * np.abs(force).max())
     assert found[4] == pytest.approx(moment, abs=6e-5 * np.abs(force).max())
     np.testing.assert_allclose(found[[1, 3, 5]], 0.0, atol=1e-9)

@@ -1,13 +1,18 @@
 """Each published figure: its sourced numbers, and that it draws."""
 
 import dataclasses
+import importlib
+import inspect
 import math
+import pathlib
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from artists import curve, curves, drawn
 
+import figures
 from figures import (
     fig05c_force_law,
     fig11c_connection,
@@ -16,21 +21,15 @@ from figures import (
     frames_area,
     kinks,
     optimal_gaits,
+    style,
 )
+from geomech.output import plots
 from geomech.scene import load
 from geomech.study.bench import Study
-from rft import Granular
+from rft import CATALOGUE, Granular
 
 
-def drawn(module, numbers, tmp_path):
-    from geomech.output import plots
-
-    file = tmp_path / "figure.png"
-    plots.save(module.draw(numbers), file)
-    return file.stat().st_size > 10_000
-
-
-def test_fig05c(tmp_path):
+def test_fig05c():
     numbers = fig05c_force_law.compute()
     # Eq. 3 at psi = 90 degrees with C = 1.8, gamma0 = 13.8 degrees.
     assert numbers["loose"][1, -1] == pytest.approx(1 + 1.8 * math.cos(math.radians(13.8)), rel=1e-12)
@@ -39,13 +38,34 @@ def test_fig05c(tmp_path):
     fit = numbers["fit"]  # C = 1.49, gamma0 = 12.6 degrees, k = 2.49, 0.056 N: the fit that came with the data
     assert (fit["C"], math.degrees(fit["gamma0"]), fit["k"]) == pytest.approx((1.49, 12.6, 2.49), rel=0.005)
     assert fit["rms_N"] == pytest.approx(0.056, abs=0.001)
-    assert drawn(fig05c_force_law, numbers, tmp_path)
+
+
+def test_fig05c_draws_across_solid_and_along_dashed(tmp_path):
+    numbers = fig05c_force_law.compute(angles=7)
+    ax = drawn(fig05c_force_law, numbers, tmp_path).axes[0]
+    psi = np.linspace(0, np.pi / 2, 7)
+    for k, name in enumerate(("glass-0.3mm-loose", "glass-0.3mm-close", "viscous-2")):
+        along, across = CATALOGUE[name].medium.traction(np.cos(psi), np.sin(psi))
+        for line, values, dashes in ((ax.lines[2 * k], across, "-"), (ax.lines[2 * k + 1], along, "--")):
+            np.testing.assert_allclose(line.get_xydata(), np.transpose([np.degrees(psi), values]), atol=1e-12)
+            assert line.get_linestyle() == dashes
+    scale = (
+        numbers["fit"]["k"] * 2 * (0.588 * 1030) * 9.81 * 0.008 * 0.030 * 0.080
+    )  # N, Eq. 2 and the header of the data
+    across, along = ax.lines[6:8]
+    np.testing.assert_allclose(across.get_ydata(), numbers["bed"]["perpendicular"] / scale)
+    np.testing.assert_allclose(along.get_ydata(), numbers["bed"]["parallel"] / scale)
+    assert across.get_markerfacecolor() != "white" == along.get_markerfacecolor()
 
 
 def test_fig11c(tmp_path):
     closed = fig11c_connection.compute("three-link-viscous", grid=21, extent=1.0)["connection"]
     np.testing.assert_allclose(closed.A[:, :, 10, 10], [[0, 0], [-1 / 18, -1 / 18], [7 / 27, -7 / 27]], atol=1e-14)
-    assert drawn(fig11c_connection, fig11c_connection.compute(), tmp_path)
+    numbers = fig11c_connection.compute()
+    ax = drawn(fig11c_connection, numbers, tmp_path).axes[0]
+    loop = numbers["gait"].shape(np.linspace(0, 2 * np.pi, 2000))
+    assert all(np.hypot(*(loop - x).T).min() < 1e-2 for x in ax.lines[0].get_xydata())
+    assert ax.collections[0].N > 100  # arrows
 
 
 def test_the_misfit_of_the_plane_in_loose_glass(tmp_path):
@@ -69,19 +89,20 @@ def test_fig11d(tmp_path):
     np.testing.assert_allclose(whole[:, ::-1, ::-1], whole * np.array([1, -1, -1])[:, None, None], atol=1e-6)
     assert np.abs(whole).max((1, 2)).min() > 0.01
     assert numbers["ccf"].values.shape == (3, 31, 31)
-    assert drawn(fig11d_ccf, numbers, tmp_path)
+    ax = drawn(fig11d_ccf, numbers, tmp_path).axes[0]
+    for gait, loop in zip(numbers["gaits"], curves(ax)):
+        np.testing.assert_allclose(loop, gait.shape(np.linspace(0, 2 * np.pi, len(loop))), atol=1e-12)
 
 
 def test_fig11e(tmp_path):
     amplitudes = {"circle": [0.5, 1.0, 1.75], "butterfly": [0.5, 1.0]}
     numbers = fig11e_displacement.compute(amplitudes=amplitudes)
-    from geomech.output import plots
-
     tables = numbers["tables"]
     np.testing.assert_allclose(plots.net(tables["circle"]["direct"]), [0.0121, 0.0638, 0.1378], rtol=0.01)
     # The butterfly is the better gait (Fig. 11(e)): at its published size it outdoes every circle.
     assert plots.net(tables["butterfly"]["direct"])[1] > 1.5 * 0.1378
-    assert drawn(fig11e_displacement, numbers, tmp_path)
+    for ax, (name, table) in zip(drawn(fig11e_displacement, numbers, tmp_path).axes, tables.items()):
+        np.testing.assert_allclose(curve(ax, "force balance"), [amplitudes[name], np.array(table["direct"])[:, 0]])
 
 
 def test_frames_area(tmp_path):
@@ -94,7 +115,12 @@ def test_frames_area(tmp_path):
         apart = {frame: np.abs(frames_area.missed(gait[frame], "area") - of_path)[-1] for frame in frames_area.FRAMES}
         assert apart["minimum-perturbation"] < 0.25 * min(apart["mean"], apart["link-2"])
         assert of_path[-1] > 0.01
-    assert drawn(frames_area, numbers, tmp_path)
+    above, _, below, _ = drawn(frames_area, numbers, tmp_path).axes
+    circle = numbers["circle"]
+    far = np.hypot(*circle["link-2"]["area"][:, :2].T)
+    np.testing.assert_allclose(curve(above, "area, link-2 frame"), [circle["amplitude"], far])
+    np.testing.assert_allclose(below.lines[1].get_ydata(), frames_area.missed(circle["link-2"], "area"))
+    np.testing.assert_allclose(below.lines[3].get_ydata(), frames_area.missed(circle["mean"], "path"))
 
 
 def test_kinks(tmp_path):
@@ -103,8 +129,47 @@ def test_kinks(tmp_path):
     near = np.abs(numbers["axes"][0] - 1.5).argmin()
     assert numbers["stuck"][near, near] > 0.1
     assert numbers["stuck"].mean() < 0.1
-    assert np.sqrt((numbers["left"][15] ** 2).mean()) < 0.2 * np.sqrt((numbers["left"][1] ** 2).mean())
-    assert drawn(kinks, numbers, tmp_path)
+    assert np.sqrt((numbers["residual"][15] ** 2).mean()) < 0.2 * np.sqrt((numbers["residual"][1] ** 2).mean())
+    maps = [ax.collections[0].get_array() for ax in drawn(kinks, numbers, tmp_path).axes[:3]]
+    for values, wanted in zip(maps, (numbers["stuck"], numbers["residual"][1], numbers["residual"][15])):
+        np.testing.assert_array_equal(np.reshape(values, wanted.shape), wanted.T)
+
+
+def test_every_script_computes_and_draws():
+    scripts = {p.stem for p in pathlib.Path(figures.__file__).parent.glob("*.py")} - {"__init__", "style"}
+    assert len(scripts) == 28
+    for name in scripts:
+        module = importlib.import_module(f"figures.{name}")
+        assert (
+            module.__doc__ and module.compute.__doc__ and list(inspect.signature(module.draw).parameters) == ["numbers"]
+        )
+
+
+def test_a_script_writes_the_file_it_is_asked_for(tmp_path, monkeypatch, capsys):
+    """By default one of its own name; a name that is no picture's is refused before anything is computed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["fig05c_force_law.py"])
+    asked = []
+    compute = lambda: asked.append(1) or fig05c_force_law.compute(3)
+    for argv in ([], ["mine.pdf"]):
+        monkeypatch.setattr(sys, "argv", ["fig05c_force_law.py", *argv])
+        figures.main("fig05c", compute, fig05c_force_law.draw, lambda numbers: f"{len(numbers['psi'])} angles")
+    assert capsys.readouterr().out == "3 angles\nfig05c.png\n3 angles\nmine.pdf\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fig05c.png", "mine.pdf"]
+    monkeypatch.setattr(sys, "argv", ["fig05c_force_law.py", "mine.txt"])
+    with pytest.raises(SystemExit) as stopped:
+        figures.main("fig05c", compute, fig05c_force_law.draw)
+    assert stopped.value.code == 2 and len(asked) == 2
+    assert capsys.readouterr().err == "cannot draw mine.txt: end the name in .png, .pdf, .svg\n"
+
+
+def test_a_table_has_its_cells_under_their_heads():
+    rows = [("round", "+0.81", "up"), ("half, flat down", "-10.54", "")]
+    assert style.table(("rod", "lift", "measured"), rows).splitlines() == [
+        "rod                 lift   measured",
+        "round              +0.81         up",
+        "half, flat down   -10.54",
+    ]
 
 
 def test_figures_load_nothing_when_imported():
@@ -121,12 +186,17 @@ def test_figures_load_nothing_when_imported():
 
 def test_optimal_gaits(tmp_path):
     """Sand's strokes reach further and bring more than the fluid's, and the cheap ones are shorter than the long."""
-    numbers = optimal_gaits.compute(harmonics=2, grid=17, phases=64)
+    numbers = optimal_gaits.compute(harmonics=2, starts=1, grid=17, phases=64)
     fluid, sand = numbers.values()
     for aim in optimal_gaits.AIMS:
         assert optimal_gaits.reach(sand[aim].gait) > 1.05 * optimal_gaits.reach(fluid[aim].gait)
         assert sand[aim].value > 1.1 * fluid[aim].value
     for found in numbers.values():
         assert found["efficiency"].best.length < found["displacement"].best.length
-    assert "0.1" in optimal_gaits.table(numbers)
-    assert drawn(optimal_gaits, numbers, tmp_path)
+    row = optimal_gaits.table(numbers).splitlines()[3].split()
+    best = sand["displacement"].best
+    assert row[-4:-2] == [f"{np.hypot(*best.displacement[:2]):.4f}", f"{best.length:.4f}"]
+    ax = drawn(optimal_gaits, numbers, tmp_path).axes[1]
+    loop = curve(ax, f"displacement: {np.hypot(*best.displacement[:2]):.3f} BL, path {best.length:.2f}")
+    np.testing.assert_allclose(loop[:, 0], best.gait.shape(0.0))
+    assert np.abs(loop).max() == pytest.approx(optimal_gaits.reach(best.gait), rel=1e-3)

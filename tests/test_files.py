@@ -9,13 +9,13 @@ import time
 
 import pytest
 
-from geomech import files
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
+from geomech.io import files
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from geomech import files
+from geomech.io import files
 with getattr(files, sys.argv[1])(sys.argv[2]) as path:
     (path / "a.txt" if sys.argv[1] == "whole_folder" else path).write_text("half")
     if sys.argv[3] == "wait":
@@ -185,7 +185,7 @@ def test_a_stop_at_any_moment_leaves_nothing(writer, call, heard, tmp_path):
 
 LIMITED = """
 import resource, sys
-from geomech import files
+from geomech.io import files
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
     with getattr(files, sys.argv[1])(sys.argv[2]) as path:

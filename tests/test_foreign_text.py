@@ -10,14 +10,16 @@ from scipy.io import netcdf_file
 from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
-from geomech import errors, files, progress, tables
 from geomech import scene as scenes
+from geomech.core import errors
+from geomech.io import files, tables
+from geomech.io.tables.mat import ABOUT
 from geomech.output import display, mat, netcdf
 from geomech.output.explain import explain
+from geomech.run import progress
 from geomech.scene import Numerics, Scene
 from geomech.study import sweep
 from geomech.study.bench import Study
-from geomech.tables.mat import ABOUT
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
 TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"  # in a string of TOML, which holds none as it is

@@ -7,16 +7,16 @@ import pytest
 import sympy as sp
 from registry import GAITS, MEDIA
 
-from geomech import connection, coordinates, curvature, reconstruct, symbolic
-from geomech.field import Field
+from geomech import symbolic
 from geomech.gaits import Circle, Ellipse, Fourier
+from geomech.geometry import connection, coordinates, curvature, reconstruct
+from geomech.geometry.field import Field
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, Serpenoid, Viscous, body_velocity, se2
-from rft.symbolic import viscous_chain
 
-A_MIDDLE, ALPHA = viscous_chain((1, 1, 1), 2, link=2)
+A_MIDDLE, ALPHA = symbolic.viscous_chain((1, 1, 1), 2, "link-2")
 MIDDLE = symbolic.velocity(A_MIDDLE, ALPHA)
 
 
@@ -106,7 +106,7 @@ def test_values_off_the_grid_are_refused():
 
 def test_ccf_at_the_straight_pose_for_any_ratio():
     r = sp.symbols("r", positive=True)
-    A, alpha = viscous_chain(ratio=r)
+    A, alpha = symbolic.viscous_chain(ratio=r)
     straight = symbolic.ccf(A, alpha).subs(dict.fromkeys(alpha, 0))
     assert sp.simplify(straight[0] + 5 * (r - 1) / 243) == 0
     assert sp.simplify(straight[1]) == 0

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from registry import BODIES, CLOSED, DRY, MEDIA
 
-from geomech import coordinates
 from geomech.gaits import Butterfly, Circle, Fourier
+from geomech.geometry import coordinates
 from geomech.tiers.direct import direct
-from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, newton, se2
-from rft.contact import Model
+from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, se2
+from rft.balance.newton import Descent, carried
+from rft.balance.solver import QUICK, Accuracy, solve
+from rft.contact import assemble
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
@@ -104,7 +106,10 @@ def test_large_ratios_approach_the_kinematic_limit():
     motion = body.motion(alpha.T, alphadot.T)
     limit = []
     for b in range(20):
-        J = np.stack([motion.carried(e[:, None] * np.ones(20))[1:, :, b].ravel() for e in np.eye(3)], 1)
+        J = np.stack(
+            [np.stack(np.broadcast_arrays(*carried(motion, *e)[1:], motion.c)[:2])[..., b].ravel() for e in np.eye(3)],
+            1,
+        )
         weight = np.sqrt(np.concatenate([motion.half[:, 0], motion.half[:, 0] / 3]))
         limit.append(np.linalg.lstsq(weight[:, None] * J, -weight * motion.v[1:, :, b].ravel(), rcond=None)[0])
     ratios = np.array([1e3, 1e4, 1e5, 1e6])
@@ -158,7 +163,8 @@ def test_stuck_samples_approach_the_limit_monotonically(medium):
 
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "coulomb", "sharp"])
 def test_the_status_is_that_of_the_limit(medium):
-    """Stuck or sliding is decided at 1e-6 as it is ten thousand times nearer to the limit, but for links about to slip."""
+    """Stuck or sliding is decided at 1e-6 as it is ten thousand times nearer to the limit, but for links about to
+    slip."""
     rng = np.random.default_rng(12)
     alpha, alphadot = rng.uniform(-2.8, 2.8, (4000, 2)), rng.normal(size=(4000, 2))
     near, limit = (body_velocity(MEDIA[medium], Chain(), alpha, alphadot, regularisation=e) for e in (1e-6, 1e-10))
@@ -261,18 +267,20 @@ def test_the_frame_does_not_matter():
 def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch):
     """Body velocities (k, 3), in the mean frame per |alphadot|, that Newton's method finds from random starts."""
     rng, body = np.random.default_rng(6), dataclasses.replace(body, frame="mean")
-    monkeypatch.setattr("rft.newton.QUICK", newton.QUICK._replace(budget=1))
-    monkeypatch.setattr("rft.newton.WALKS", ())
-    monkeypatch.setattr("rft.newton.SLOW", ())
+    monkeypatch.setattr("rft.balance.solver.QUICK", QUICK._replace(budget=1))
+    monkeypatch.setattr("rft.balance.solver.WALKS", ())
+    monkeypatch.setattr("rft.balance.solver.SLOW", ())
     alpha, alphadot = (np.array(x)[:, None] * np.ones(starts) for x in (alpha, alphadot))
     alphadot /= np.linalg.norm(alphadot[:, 0])
     found = np.zeros((0, 3))
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
-        monkeypatch.setattr("rft.newton.WARM", newton.Descent(widest, 0.1, 1e-4, np.inf, 100))
-        balance = newton.Balance.of(Model.of(medium), body, regularisation, 1e-10)
+        monkeypatch.setattr("rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100))
+        assembly = assemble(medium, body)
+        problem = assembly.at(alpha, alphadot)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
-        solved = balance.solve(body.motion(alpha, alphadot).take, np.ones(starts), 1, guess=guess)
-        for xi in solved.xi[:, solved.residual <= balance.limit].T:
+        accuracy = Accuracy(regularisation, 1e-10)
+        solved = solve(problem.take, np.ones(starts), accuracy, assembly.law, assembly.points, "numpy", 1, guess)
+        for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])
     return found

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from registry import BODIES, GAITS
 
-from geomech import connection, harmonics
 from geomech.gaits import Butterfly, Circle, Fourier, Sine
-from geomech.images import around, images, to_solve
+from geomech.geometry import connection, harmonics
+from geomech.geometry.images import around, images, to_solve
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
-from rft.media.base import TermLaw, is_central
+from rft.laws.base import TermLaw, is_central
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 REVERSIBLE = {

@@ -11,11 +11,12 @@ from registry import OUTLINES, STRESSES
 from test_fuzz import VALUES, mutated
 
 import geomech.scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.output import plots
 from geomech.scene.intruder import IntruderScene, load_medium
 from geomech.study.bench import Study
-from rft.vertical import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
+from geomech.study.intrusion import estimate
+from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
 
 FLAT = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), IntruderScene)]  # others are meshes
 MADE = """[medium]
@@ -140,10 +141,11 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     code, out, err = geomech("intrude", name, "--json", "-o", "out.csv", *plot)
     assert (code, err) == (0, "")
     found = json.loads(out)
-    place = ["angle"] if "leg" in name else ["x", "z"]
+    place, error = ["angle"] if "leg" in name else ["x", "z"], found.pop("estimate")
+    assert error == {"force": error["force"], "moment": error["moment"], "from_elements": scene.used(2 * scene.count)}
     assert list(found) == ["t", *place, "force_x", "force_z", "moment"]
     _, pose, twist = scene.motion.course(scene.outline)
-    wanted = loads(scene.medium, scene.outline, pose, twist)
+    wanted = loads(scene.medium, scene.outline, pose, twist, backend="numpy")
     np.testing.assert_allclose(np.stack([found["force_x"], found["force_z"]], -1), wanted.force, rtol=1e-14)
     np.testing.assert_array_equal(found["moment"], wanted.moment)
     with open(tmp_path / "out.csv", newline="") as file:
@@ -154,8 +156,38 @@ def test_intrude_gives_what_the_python_door_gives(name, geomech, tmp_path):
     assert not plot or (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
     code, out, err = geomech("intrude", name)
     assert (code, err) == (0, "") and "work     -" in out and "power at most" in out
+    assert f"error    force {error['force']:.1g} N, moment {error['moment']:.1g} N m at most, from up to 2" in out
     assert name in geomech("scenes")[1]
     assert geomech("scenes", "--show", name)[1] == scene.text
+
+
+@pytest.mark.parametrize(
+    ("tension", "elements"), [("keep", 50), ("keep", 200), ("cut", 50), ("cut", 100), ("cut", 400)]
+)
+@pytest.mark.parametrize("name", ["c-leg", "reversed-c-leg", "half-cylinder", "round-rod"])
+def test_the_error_of_the_elements_is_told(name, tension, elements):
+    """From twice as many: of a reversed c-leg with tension cut of first order, else of second."""
+    scene = scenes.load(name)
+    scene = scene.changed(medium=dataclasses.replace(scene.medium, tension=tension), elements=elements)
+    found, exact = scene.run(), scene.run(3200)
+    told = estimate(scene, found)
+    force = np.linalg.norm(found.force - exact.force, axis=1).max()
+    assert (
+        (0.9 if tension == "keep" else 0.8) * force
+        <= told.force
+        <= (4.0 if tension == "keep" else 15.0) * force + 1e-12
+    )
+    assert (0.6 if tension == "keep" else 0.3) * np.abs(found.moment - exact.moment).max() <= told.moment
+    assert told.count == scene.used((2 if tension == "keep" else 3) * scene.count)
+    if (name, tension, elements) == ("reversed-c-leg", "cut", 100):
+        assert 0.01 < force / np.linalg.norm(exact.force, axis=1).max() < 0.03
+
+
+def test_the_error_is_not_known_where_a_body_has_no_more_elements(geomech, tmp_path):
+    (tmp_path / "s.toml").write_text(MADE.replace("elements = 40", "elements = 2499"))
+    told = json.loads(geomech("intrude", "s.toml", "--json")[1])["estimate"]
+    assert told == {"force": None, "moment": None, "from_elements": 2500}
+    assert "error    not known: finer elements are more than it takes" in geomech("intrude", "s.toml")[1]
 
 
 def test_constants_of_the_intruder_scenes():

@@ -9,13 +9,14 @@ import tomllib
 
 import pytest
 
-from geomech import cli, kinds
-from geomech.errors import SceneError
+from geomech import cli
+from geomech.core.errors import SceneError
 from geomech.scene import (
     builtin_names,
     from_tables,
     intruder_keys,
     intruder_names,
+    kinds,
     load,
     parse,
     solid,
@@ -24,18 +25,18 @@ from geomech.scene import (
 )
 from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
 from geomech.scene.read import TABLES
-from rft import CATALOGUE, spatial, vertical
-from rft.vertical import VERTICAL
-from rft.vertical.effects import KINDS as GROUND_EFFECTS
+from rft import CATALOGUE, meshes, plates
+from rft.ground import KINDS as GROUND_EFFECTS
+from rft.plates import VERTICAL
 from rft.walking import ROBOTS, Fineness, Tripod
 
 EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
 OF_INTRUDERS = {
-    "outline": vertical.SHAPES,
-    "motion": vertical.MOTIONS,
+    "outline": plates.SHAPES,
+    "motion": plates.MOTIONS,
     "mesh": solid.KINDS,
-    "motion-of-mesh": spatial.MOTIONS,
-    "medium-of-mesh": {"": spatial.Spatial},
+    "motion-of-mesh": meshes.MOTIONS,
+    "medium-of-mesh": {"": meshes.Spatial},
     "ground": GROUND_EFFECTS,
     "robot": ROBOTS,
     "clock": {"": Tripod},
@@ -333,7 +334,7 @@ def test_keys_of_intruders_are_told(capsys):
                 )
                 assert key.type != "value" and key.unit, f"{part.title} {key.name}: say it as name (unit): meaning"
     assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
-    assert re.search(r"\n  B-11 +number +N/cm\^3 +none +of a sine of alpha_z", whole)
+    assert re.search(r"\n  B-11 +number +N/cm\^3 +none +coefficient of a sine of alpha_z", whole)
     assert re.search(r"\n  elements +whole number +- +100 ", run(capsys, "keys", "numerics")[1])
     assert re.search(r"\n  triangles +whole number +- +5000 ", run(capsys, "keys", "numerics")[1])
     of_mesh = run(capsys, "keys", "motion")[1].partition('[motion] kind = "drag" of a mesh\n')[2]
@@ -426,10 +427,11 @@ def test_keys_of_robots_are_told(capsys):
     robots = run(capsys, "keys", "robot")[1]
     assert "[robot.screw]" in robots
     assert (
-        re.search(r"\n  mass +number +kg +required +of all that the wheel carries", robots) and "[robot.legs]" in robots
+        re.search(r"\n  mass +number +kg +required +mass of all that the wheel carries", robots)
+        and "[robot.legs]" in robots
     )
     assert re.search(r"\n  hips +list of numbers +m +required +x of each", robots)
-    assert re.search(r"\n  sweep +number +rad +3.14\d* +by which.*sweep_deg", run(capsys, "keys", "gait")[1])
+    assert re.search(r"\n  sweep +number +rad +3.14\d* +angle by which.*sweep_deg", run(capsys, "keys", "gait")[1])
 
 
 def test_systems_and_sizes_given_once_are_valid(valid):

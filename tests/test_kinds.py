@@ -1,5 +1,6 @@
 """Laws, bodies, gaits, effects and systems of one's own: by a file, by `register`, by an installed package."""
 
+import hashlib
 import importlib.metadata
 import inspect
 import json
@@ -13,22 +14,20 @@ import numpy as np
 import pytest
 from registry import EFFECTS
 
-from geomech import cli, kinds
-from geomech.errors import SceneError
+from geomech import cli
+from geomech.core.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
-from geomech.kinds import FAMILIES, load_file, register
 from geomech.output.explain import explain
-from geomech.scene import Numerics, Scene, load, parse, toml
+from geomech.scene import Numerics, Scene, kinds, load, parse, toml
 from geomech.scene.keys import schema, text
+from geomech.scene.kinds import FAMILIES, load_file, register
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.study.sweep import question
 from geomech.systems import Plain, Premise, Solver, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
-from rft.contact import SIDE
 from rft.effects import Effect
-from rft.media.base import TermLaw, is_rate_independent
+from rft.laws.base import TermLaw, is_rate_independent
 
 PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
@@ -178,7 +177,7 @@ def test_tractions_that_cannot_be_asked_are_refused_with_one_line():
             self.traction = lambda v_t, v_n, eps=0.0: f(v_t, v_n)
 
     for law, said in (
-        (NoRounding(), r"NoRounding.traction must take \(v_t, v_n, eps=0.0\)"),
+        (NoRounding(), r"NoRounding.traction must take \(v_t, v_n, rounding=0.0\)"),
         (Wrong(lambda t, n: t), "must take|must return|fails"),
         (
             Wrong(lambda t, n: (t, np.ones(5))),
@@ -232,11 +231,8 @@ class Slick(Effect):
     limit = "by = 1"
     cost = "one multiplication"
 
-    def apply(self, model):
-        return model.changed(SIDE, factors=(self,))
-
-    def __call__(self, v_t, v_n, spin):
-        return self.by, None
+    def apply(self, problem, site=None, past=None):
+        return problem._replace(sides=problem.sides.multiplied(self.by, self.by, 1.0))
 
 
 @dataclass(frozen=True)
@@ -355,15 +351,20 @@ def test_names_of_no_python_file_are_refused(tmp_path):
         load_file(tmp_path / "own.py")
 
 
-def test_a_sweep_knows_the_code_it_was_computed_with(tmp_path):
-    (tmp_path / "thick.py").write_text(LAW)
-    load_file(tmp_path / "thick.py")
-    asked = [question(parse(SCENE), {"gait.amplitude": [1.0]})]
-    (tmp_path / "thick.py").write_text(LAW.replace("2.5", "2.6"))
-    load_file(tmp_path / "thick.py")
-    asked.append(question(parse(SCENE), {"gait.amplitude": [1.0]}))
-    assert asked[0] != asked[1]
-    assert {k for k in asked[0] if asked[0][k] != asked[1][k]} == {"own code"}
+def test_digests_of_own_code_cover_its_sources(tmp_path, monkeypatch):
+    """Of a file that is edited and loaded again, and of a module beside it from which it takes something."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    found = []
+    for law, factor in ((LAW, 1), (LAW.replace("2.5", "2.6"), 1), (LAW, 2), (LAW, 1)):
+        (tmp_path / "thick.py").write_text(f"from thick_factor import FACTOR, times\n{law}")
+        (tmp_path / "thick_factor.py").write_text(f"FACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n")
+        monkeypatch.delitem(sys.modules, "thick_factor", raising=False)
+        monkeypatch.setattr(kinds, "_code", {})
+        importlib.invalidate_caches()
+        load_file(tmp_path / "thick.py")
+        found.append(kinds.code())
+    assert all({name.partition("_plugin")[0] for name in one} == {"geomech", "thick_factor"} for one in found)
+    assert found[0] == found[3] and len({tuple(one.items()) for one in found}) == 3
 
 
 @pytest.fixture
@@ -393,7 +394,7 @@ def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
     scene = parse(SCENE)
     assert type(scene.system.medium).__module__ == "sands_laws"
     assert parse(toml(scene)) == scene
-    assert kinds.code() == {"the package sands 1.2": "sands_laws:Thick"}
+    assert kinds.code() == {"sands_laws": hashlib.sha256(LAW.encode()).hexdigest()}
 
 
 def test_entry_points_of_all_families_are_read(package):

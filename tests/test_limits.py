@@ -5,10 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from loads import element_load
 from registry import GAITS
 
-from geomech import connection, family, harmonics
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
+from geomech.geometry import connection, family, harmonics
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import (
@@ -28,9 +29,8 @@ from rft import (
     Viscous,
     body_velocity,
 )
-from rft.loads import element_load
 
-pytestmark = pytest.mark.filterwarnings("ignore::geomech.errors.UnitWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
 
 
 def still(alpha, alphadot):

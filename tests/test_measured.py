@@ -16,21 +16,23 @@ from scipy.io import loadmat
 import geomech
 import rft
 from figures import measured_gait
-from geomech import cli, connection, gaits, measured, tables
-from geomech.connection import Connection
-from geomech.curvature import ccf
-from geomech.errors import SceneError, UnitWarning
+from geomech import cli, gaits, measured
+from geomech.core.errors import SceneError, UnitWarning
+from geomech.geometry import connection
+from geomech.geometry.connection import Connection
+from geomech.geometry.curvature import ccf
+from geomech.geometry.plane import looked_up
+from geomech.geometry.reconstruct import displacement
+from geomech.geometry.tube import Loop, Tube, series, waves
+from geomech.io import tables
+from geomech.io.tables.mat import ERROR
 from geomech.measured import cycles, phase, regression, smooth, synthetic, unknowns
 from geomech.output import mat, netcdf
 from geomech.output import measured as told
 from geomech.output.explain import explain
-from geomech.plane import looked_up
-from geomech.reconstruct import displacement
 from geomech.scene import Scene, load
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
-from geomech.tables.mat import ERROR
-from geomech.tube import Loop, Tube, series, waves
 from rft import se2
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))

@@ -11,10 +11,13 @@ from registry import DRY, MEDIA
 from geomech.gaits import Circle
 from geomech.study.undulation import endless_efficiency
 from rft import CATALOGUE, Chain, Coulomb, Granular, Serpenoid, Surface, Viscous, body_velocity, time_steps
-from rft.contact import Model
-from rft.media.base import TermLaw, require_drag
-from rft.media.catalogue import SURFACE_ALONG, SURFACE_ALONG_RANGE
-from rft.newton import Balance
+from rft.balance.arrays import solve
+from rft.balance.newton import Limits
+from rft.balance.solver import QUICK
+from rft.contact import assemble
+from rft.laws.base import TermLaw, require_drag
+from rft.laws.catalogue import SURFACE_ALONG, SURFACE_ALONG_RANGE
+from rft.laws.records import record
 
 DIRECTIONS = np.linspace(-np.pi, np.pi, 41)
 
@@ -51,7 +54,7 @@ def test_drag_is_odd_and_takes_power(name):
 def test_derivatives_are_the_slopes_of_traction(name):
     rng = np.random.default_rng(3)
     v, eps, h = rng.normal(size=(2, 50)), 0.3, 1e-6
-    (tt, tn), (nt, nn) = MEDIA[name].derivatives(*v, eps)
+    tt, tn, nt, nn = MEDIA[name].slopes(*v, eps)
     for k, (dt, dn) in enumerate(((tt, nt), (tn, nn))):
         step = h * np.eye(2)[k][:, None]
         up, down = (np.array(MEDIA[name].traction(*(v + sign * step), eps)) for sign in (1, -1))
@@ -107,8 +110,8 @@ def speed_ratio(along):
 
 
 def test_surface_drag_carries_the_snakes_it_was_measured_for():
-    """.74 and .78 at the ends of the assumed range of the drag along, where their animals have .81 (.74 to .89) and a body
-    without slip .829. The drag of the fit in newtons, in the open and in the balance of a body of eight waves."""
+    """.74 and .78 at the ends of the assumed range of the drag along, where their animals have .81 (.74 to .89) and a
+    body without slip .829. The drag of the fit in newtons, in the open and in the balance of a body of eight waves."""
     medium, headings = (
         CATALOGUE["glass-0.3mm-surface"].medium,
         np.radians(48.4) * np.sin(np.linspace(0, 2 * np.pi, 401)),
@@ -205,10 +208,12 @@ def test_media_that_drag_pass(name):
 
 def test_residuals_are_magnitudes():
     """Whatever the sign of the law: the solver below the check has no negative residual."""
-    solved = Balance.of(Model.of(Law((1.0, -1.0, -3.0))), Chain(), 1e-6, 1e-10)
     alpha, alphadot = np.array([[0.4], [-0.7]]), np.array([[1.0], [0.2]])
-    assert (solved.solve(Chain().motion(alpha, alphadot).take, np.ones(1), 1).residual >= 0).all()
-    assert solved.model.unit == 1.0
+    problem = assemble(Law((1.0, 1.0, 3.0)), Chain()).at(alpha, alphadot)
+    problem = problem._replace(law=record(Law((1.0, -1.0, -3.0))))
+    _, residual, _, _ = solve(problem, QUICK, Limits(1e-6, 1e-10), None)
+    assert (residual >= 0).all()
+    assert problem.unit == 1.0
 
 
 def test_a_law_without_axial_drag():

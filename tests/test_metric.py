@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geomech import connection, metric
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import connection, metric
 from geomech.systems import Swimmer
 from rft import Chain, Granular, Viscous
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from test_cli import geomech
 
-from geomech import connection, coordinates, curvature
 from geomech import scene as scenes
-from geomech.errors import SceneError
-from geomech.field import Field
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
-from geomech.minimum_perturbation import Basis, minimum_perturbation
+from geomech.geometry import connection, coordinates, curvature
+from geomech.geometry.field import Field
+from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area

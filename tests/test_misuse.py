@@ -14,13 +14,13 @@ from registry import MEDIA
 from test_cli import geomech
 
 import geomech as geomech_package
-from geomech import connection, curvature
 from geomech import scene as scenes
-from geomech.errors import SceneError, UnitWarning, VelocityWarning
+from geomech.core.errors import SceneError, UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
+from geomech.geometry import connection, curvature
+from geomech.geometry.stretch import stretch
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
-from geomech.stretch import stretch
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.systems import NoSlipSnake, Swimmer

@@ -11,9 +11,9 @@ import pytest
 from matplotlib import image
 
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.study import walking
-from rft.spatial import Spatial
+from rft.meshes import Spatial
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")

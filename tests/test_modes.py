@@ -8,10 +8,10 @@ from scipy.io import netcdf_file
 from test_cli import geomech
 
 import rft
-from geomech import connection, curvature
 from geomech import scene as scenes
-from geomech.coordinates import change_velocity
 from geomech.gaits import Circle, Fourier, Wave
+from geomech.geometry import connection, curvature
+from geomech.geometry.coordinates import change_velocity
 from geomech.output import mat, netcdf
 from geomech.scene import Scene
 from geomech.study import sweep

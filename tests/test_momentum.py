@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from registry import SYSTEMS
 
-from geomech import coordinates, metric
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import coordinates, metric
 from geomech.scene import Scene
 from geomech.study import motion as moving
 from geomech.study.bench import Study

@@ -10,10 +10,10 @@ from matplotlib.collections import QuadMesh
 from PIL import Image
 from registry import BODIES, SYSTEMS
 
-from geomech import reconstruct
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
+from geomech.geometry import reconstruct
 from geomech.output import animate, plots, trajectories
 from geomech.scene import Numerics, Scene
 from geomech.study import motion as moving

@@ -5,13 +5,14 @@ import math
 
 import numpy as np
 import pytest
+from artists import curve
 
 from geomech import scene as scenes
 from geomech.scene import WalkerScene
 from geomech.study.walking import walked
-from rft.spatial import Spatial, wrench
-from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel
-from rft.vertical.effects import Aeration, GrainInertia
+from rft.ground import Aeration, GrainInertia
+from rft.meshes import Spatial, wrench
+from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
 from rft.walking.facets import Grains, Surface
 from rft.walking.planar import GRAVITY
@@ -273,5 +274,7 @@ def test_the_figure_compares_steps_and_engines(monkeypatch):
     assert implicit.max() < 0.2 < held[0]
     numbers["speeds"]["SandBot"] = (1.0, 2.0), np.array([0.1, 0.2]), np.array([0.1, 0.202])
     ways, speeds = walking_mujoco.draw(numbers).axes
+    np.testing.assert_allclose(curve(ways, "implicit"), [[12], implicit])
+    np.testing.assert_allclose(curve(speeds, "MuJoCo"), [[1.0, 2.0], [0.1, 0.202]])
     assert (ways.get_ylabel(), speeds.get_title()) == ("error of the way", "SandBot: within 1.0 %")
     assert {name.lower() for name in walking_mujoco.FREQUENCIES} <= {*scenes.walker_names()}

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
+from geomech.geometry.reconstruct import displacement, slopes
 from geomech.optimise import checked, optimise
 from geomech.optimise import loops as series
 from geomech.optimise.aims import Aim
@@ -17,7 +18,6 @@ from geomech.optimise.keeping import Keeping
 from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
 from geomech.output import netcdf, optima
-from geomech.reconstruct import displacement, slopes
 from geomech.scene import Scene, parse
 from geomech.study.bench import Study
 from geomech.systems import Plain, Swimmer, Table
@@ -168,7 +168,10 @@ def test_more_harmonics_bring_more_and_converge():
     assert values[3] - values[2] < 0.1 * (values[2] - values[0])
 
 
-@pytest.fixture(scope="module", params=[("displacement", 2.5), ("displacement", 3.0), ("efficiency", 2.5)], ids=str)
+BY_HAND = [pytest.param(x, marks=pytest.mark.soak) for x in (("displacement", 2.5), ("efficiency", 2.5))]
+
+
+@pytest.fixture(scope="module", params=[("displacement", 3.0), *BY_HAND], ids=str)
 def sand(request):
     aim, within = request.param
     return optimise(geomech.load("three-link-glass"), aim, within=within)

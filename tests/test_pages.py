@@ -12,8 +12,8 @@ import typer
 from geomech import cli
 from geomech.commands import names
 from geomech.scene import parse
-from rft.media import CATALOGUE
-from rft.vertical import VERTICAL
+from rft.laws import CATALOGUE
+from rft.plates import VERTICAL
 
 ROOT = pathlib.Path(__file__).parents[1]
 README, CONTRIBUTING = ROOT / "README.md", ROOT / "CONTRIBUTING.md"

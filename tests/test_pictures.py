@@ -2,38 +2,23 @@
 
 import numpy as np
 import pytest
+from artists import mesh, only
 from matplotlib.collections import QuadMesh
 from matplotlib.quiver import Quiver
 
-from figures import fig05c_force_law, fig10_neuromechanics
 from geomech import scene as scenes
-from geomech.connection import Connection
-from geomech.field import Field
 from geomech.gaits import Ellipse
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import Field
 from geomech.output import plots, sweeps
 from geomech.output.plots.precision import KNOBS as PRECISION
 from geomech.output.plots.precision import PANELS
 from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
 from geomech.tiers import TIERS
-from rft import CATALOGUE
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
 SHAPES = np.meshgrid(*AXES, indexing="ij")
-
-
-def only(ax, kind):
-    (found,) = (x for x in ax.collections if isinstance(x, kind))
-    return found
-
-
-def mesh(ax):
-    """(alpha_1, alpha_2, values) at the corners or centres of the one mesh, as drawn."""
-    drawn = only(ax, QuadMesh)
-    x, y = np.moveaxis(drawn.get_coordinates(), -1, 0)
-    if x.size > drawn.get_array().size:  # cells about the points
-        x, y = ((c[1:, 1:] + c[:-1, :-1]) / 2 for c in (x, y))
-    return x, y, np.reshape(drawn.get_array(), x.shape)
 
 
 def label_of(ax):
@@ -339,43 +324,6 @@ def test_parameters_have_names_and_units():
     assert sweeps.labels(scene, names) == named
     both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
     assert sweeps.labels(scene, both) == ["end-caps: radius (BL)", "disturbed-ground: radius (BL)"]
-
-
-def test_fig05c_draws_across_solid_and_along_dashed():
-    numbers = fig05c_force_law.compute(angles=7)
-    ax = fig05c_force_law.draw(numbers).axes[0]
-    psi = np.linspace(0, np.pi / 2, 7)
-    for k, name in enumerate(("glass-0.3mm-loose", "glass-0.3mm-close", "viscous-2")):
-        along, across = CATALOGUE[name].medium.traction(np.cos(psi), np.sin(psi))
-        for line, values, dashes in ((ax.lines[2 * k], across, "-"), (ax.lines[2 * k + 1], along, "--")):
-            np.testing.assert_allclose(line.get_xydata(), np.transpose([np.degrees(psi), values]), atol=1e-12)
-            assert line.get_linestyle() == dashes
-    scale = (
-        numbers["fit"]["k"] * 2 * (0.588 * 1030) * 9.81 * 0.008 * 0.030 * 0.080
-    )  # N, Eq. 2 and the header of the data
-    across, along = ax.lines[6:8]
-    np.testing.assert_allclose(across.get_ydata(), numbers["bed"]["perpendicular"] / scale)
-    np.testing.assert_allclose(along.get_ydata(), numbers["bed"]["parallel"] / scale)
-    assert across.get_markerfacecolor() != "white" == along.get_markerfacecolor()
-
-
-def test_fig10_traces_the_place_it_names():
-    """70 % of the way from head to tail, the caption's 0.71 pi of pi as the module reads it."""
-    numbers = fig10_neuromechanics.compute((1.0,), elements=20, phases=32)
-    figure = fig10_neuromechanics.draw(numbers)
-    one, ax = numbers["one"], figure.axes[1]
-    k = np.abs(one["s"] - 0.3).argmin()
-    assert one["s"][k] == pytest.approx(0.3)
-    for line, key in zip(ax.lines, ("bend", "moment")):
-        trace = np.append(one[key][:, k], one[key][0, k])
-        np.testing.assert_allclose(line.get_ydata(), trace / np.abs(trace).max())
-        assert line.get_label().startswith("curvature" if key == "bend" else key)
-    assert ax.get_ylabel().endswith("s = 0.3")
-    onset, offset = (line.get_xdata()[0] for line in ax.lines[2:4])
-    np.testing.assert_allclose([onset, offset], np.mod([one["onset"][k], one["offset"][k]], 2 * np.pi))
-    across = [line.get_xydata() for line in figure.axes[0].lines]
-    np.testing.assert_allclose(across[1], np.stack([one["s"], one["onset"]], -1))
-    np.testing.assert_allclose(across[4], np.stack([one["s"], one["offset"]], -1))
 
 
 def test_panels_are_x_y_and_theta():

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from test_cli import geomech
 
-from geomech import Numerics, Scene, Study, connection
+from geomech import Numerics, Scene, Study
 from geomech.commands.asked import _held
 from geomech.gaits import Circle, Fourier, Wave
+from geomech.geometry import connection
+from geomech.geometry.plane import Plane, Seen, looked_up, plane
+from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
-from geomech.plane import Plane, Seen, looked_up, plane
 from geomech.scene.frames import framed
 from geomech.study.choose import cheapest
 from geomech.systems import Plain, Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.path import around, fits
-from geomech.two_form import spanned, spanned_by, two_form
 from rft import CATALOGUE, Chain, Viscous, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium

@@ -7,9 +7,10 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from geomech import progress, terminal
 from geomech import scene as scenes
-from geomech.progress import EVERY, Course
+from geomech import terminal
+from geomech.run import progress
+from geomech.run.progress import EVERY, Course
 from geomech.study.bench import Study
 from geomech.systems import Swimmer
 

@@ -8,7 +8,7 @@ import pytest
 
 import rft
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.study.bench import Study
 from rft import Chain, Granular, Viscous
 
@@ -97,7 +97,10 @@ BAD = [
     (GOOD.replace("tilt_deg = 45", "tilt_deg = inf"), r"\[gait\] tilt must be a number"),
     (GOOD.replace("grid = 21", "grid = 3"), r"\[numerics\] grid must be a whole number from 4"),
     (GOOD.replace("grid = 21", 'loads = "simpson"'), r"\[numerics\] loads must be"),
-    (GOOD.replace("grid = 21", "regularisation = 0"), "regularisation must be a number from 1e-12 to 1, got 0"),
+    (
+        GOOD.replace("grid = 21", "regularisation = 0"),
+        "regularisation must be a number from 1e-12 to 1 body lengths per rad, got 0",
+    ),
 ]
 
 

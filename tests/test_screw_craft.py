@@ -3,16 +3,18 @@
 import dataclasses
 import json
 import tomllib
+import types
 
 import numpy as np
 import pytest
+from artists import curve, curves, drawn
 from scipy.spatial.transform import Rotation
 
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.output import walk_sweeps
 from geomech.study.sweep import changed
-from rft.vertical import StressMap
+from rft.plates import StressMap
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise
 from rft.walking.craft import PER_SQUARE
 
@@ -147,7 +149,6 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     """Of few points and turns."""
     pytest.importorskip("mujoco")
     from figures import screws
-    from geomech.output import plots
     from rft.walking import mujoco_walk
 
     monkeypatch.setattr(mujoco_walk, "MOST_STRIDES", 1)
@@ -156,5 +157,13 @@ def test_the_figure_of_screws_is_drawn(tmp_path, monkeypatch):
     numbers = screws.compute(3, (0.06,), (0.06,), dataclasses.replace(COARSE, duration=1.0))
     assert numbers["found"] == pytest.approx(numbers["advance"][1.0], rel=0.2)  # in the first two turns
     assert "by MuJoCo" in screws.table(numbers)
-    plots.save(screws.draw(numbers), str(tmp_path / "s.png"))
-    assert (tmp_path / "s.png").stat().st_size > 20_000
+    (vx, vy), rate, time = (0.03, -0.01), 0.4, 4.0
+    steady = types.SimpleNamespace(velocity=np.array([vx, vy]), yaw_rate=rate)
+    numbers["paths"]["alike", 1.0] = time, np.array([0.0, 0.1, 0.2]), np.array([0.0, 0.02, 0.01]), steady
+    thrust, advance, _, path = drawn(screws, numbers, tmp_path).axes
+    np.testing.assert_allclose(curve(thrust, "at the surface"), [numbers["slip"], numbers["pulled"][0.0].thrust])
+    np.testing.assert_allclose(curve(advance, "1 kg, MuJoCo"), 1e3 * np.array([[0.06], numbers["found"]]))
+    np.testing.assert_allclose(curve(path, "alike, 1 kg, 4 s"), 1e2 * np.array([[0.0, 0.1, 0.2], [0.0, 0.02, 0.01]]))
+    sin, cos = np.sin(rate * time), np.cos(rate * time)  # a circle: the integral of the velocity as it turns
+    end = [(vx * sin - vy * (1 - cos)) / rate, (vx * (1 - cos) + vy * sin) / rate]
+    np.testing.assert_allclose(curves(path)[1][-1], 1e2 * np.array(end))

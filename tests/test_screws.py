@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.spatial import Screw, Spatial, wrench
+from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
 from rft.walking.screws import cruise, freely, turning
 

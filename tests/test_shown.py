@@ -14,8 +14,8 @@ import xarray
 from registry import SYSTEMS
 
 import rft
-from geomech import connection, curvature
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import connection, curvature
 from geomech.output import netcdf, plots, sweeps
 from geomech.scene import Numerics, Scene, load
 from geomech.study import sweep
@@ -23,7 +23,7 @@ from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
 from geomech.systems import NoSlipSnake, Plain, Swimmer
-from rft.media import CATALOGUE
+from rft.laws import CATALOGUE
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
 UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)

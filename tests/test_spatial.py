@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rft.spatial import Mesh, Screw, Spatial, Sphere, bearing, law, read, shapes, wrench
-from rft.spatial.mesh import below, quartered
-from rft.spatial.smooth import smooth
-from rft.vertical import VERTICAL
-from rft.vertical.effects import Aeration, GrainInertia, Slope, pressure, strength
+from rft.ground import Aeration, GrainInertia, Slope, ground_of
+from rft.meshes import Mesh, Screw, Spatial, Sphere, bearing, law, read, shapes, wrench
+from rft.meshes.mesh import below, quartered
+from rft.meshes.smooth import smooth
+from rft.plates import VERTICAL
 
 RNG = np.random.default_rng(7)
 MEDIUM = Spatial(xi_n=3e5, surface_friction=0.3)
@@ -412,7 +412,8 @@ def test_faces_bear_no_power_with_effects_but_where_the_law_drives():
     n, v = directions(100_000), directions(100_000) * RNG.choice([0.01, 1.0, 5.0], (100_000, 1))
     plain = (MEDIUM.stress(n, v) * v).sum(-1)
     across = np.maximum((n * v).sum(-1), 0.0)
-    power = strength(effects, 0.0) * plain - pressure(effects, across) * across
+    ground = ground_of(effects)
+    power = ground.strength * plain - ground.flux * across**3
     assert (power > 0).mean() < 1e-3 and not (power > 0)[plain <= 0].any()
 
 

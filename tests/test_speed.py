@@ -11,7 +11,7 @@ from registry import GAITS
 from test_cli import geomech
 
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle
 from geomech.output import report
 from geomech.study import sweep, undulation

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_cli import geomech
 
-from geomech import connection, harmonics
 from geomech.gaits import Fourier
+from geomech.geometry import connection, harmonics
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.systems import Swimmer

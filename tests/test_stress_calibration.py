@@ -7,12 +7,13 @@ import mpmath
 import numpy as np
 import pytest
 
-from geomech import cli, rows, scene
+from geomech import cli, scene
+from geomech.io import rows
 from geomech.scene import penetration
 from geomech.study import stress_calibration
-from rft.vertical import VERTICAL, StressMap, calibrate
-from rft.vertical.calibrate import COEFFICIENTS, GENERIC, SLIPS, SPREAD, fit_stress, fit_zeta
-from rft.vertical.survey import survey
+from rft.plates import VERTICAL, StressMap, calibrate
+from rft.plates.calibrate import COEFFICIENTS, GENERIC, SLIPS, SPREAD, fit_stress, fit_zeta
+from rft.plates.survey import survey
 
 RAD = np.pi / 180
 FAR = StressMap(0.3, 0.02, 0.25, 0.2, 0.15, -0.01, 0.3, 0.08, -0.03)  # a set that is not near the generic one

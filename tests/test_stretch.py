@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from geomech import connection, curvature, metric
-from geomech.field import Field
 from geomech.gaits import Circle
+from geomech.geometry import connection, curvature, metric
+from geomech.geometry.field import Field
+from geomech.geometry.stretch import stretch
 from geomech.output import plots
-from geomech.stretch import stretch
 
 
 def constant(M, points=9, extent=1.5):

@@ -1,7 +1,9 @@
 """The import rules: rft knows nothing of geomech; of rft the pure geometry knows planar motions alone."""
 
 import ast
+import graphlib
 import pathlib
+import tomllib
 
 import mutants
 
@@ -14,9 +16,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 # of stress is written by its coefficients. Workers tell the
 # solver to take one thread, and by which back end.
 KNOW_MECHANICS = {
-    "__init__.py", "commands/scenes.py", "commands/stress.py", "kinds.py", "scene/intruder.py", "scene/intruding.py",
+    "__init__.py", "commands/scenes.py", "commands/stress.py", "scene/kinds.py", "scene/intruder.py", "scene/intruding.py",
     "scene/solid.py", "scene/walker.py", "scene/write.py", "study/batch.py", "study/calibration.py",
-    "study/stress_calibration.py", "study/walking.py", "workers/solving.py",
+    "run/backend.py", "study/stress_calibration.py", "study/walking.py",
 }  # fmt: skip
 
 
@@ -40,34 +42,60 @@ def test_pure_geometry_knows_planar_motions_alone():
     users = {
         p.relative_to(folder).as_posix()
         for p in folder.rglob("*.py")
-        if any(x.partition(".")[0] == "rft" and not x.startswith("rft.se2") for x in imports(p))
+        if any(x.partition(".")[0] == "rft" and not x.startswith(("rft.checks", "rft.se2")) for x in imports(p))
     }
     assert {x for x in users if not x.startswith("systems/")} == KNOW_MECHANICS
 
 
-def depends_on(path, modules):
-    """Modules that a file imports as it is loaded, itself not inside a function."""
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in modules)
-        elif isinstance(node, ast.ImportFrom):
-            names = {f"{node.module}.{alias.name}" for alias in node.names}
-            yield from names & modules or {node.module} & modules
+def modules():
+    """Files of all modules by their dotted names."""
+    names = lambda p: ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    return {names(p): p for top in ("rft", "geomech", "figures") for p in (ROOT / top).rglob("*.py")}
+
+
+def arrows(path, known):
+    """Modules that a file imports, inside functions too, but for type checkers alone."""
+
+    def visit(node):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            return
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+        if isinstance(node, ast.ImportFrom):
+            names = [f"{node.module}.{name}" for name in names]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+            names = [x.value for x in node.args if isinstance(x, ast.Constant)]
+        for name in names:
+            yield next((m for m in (name, name.rpartition(".")[0]) if m in known), None)
+        for child in ast.iter_child_nodes(node):
+            yield from visit(child)
+
+    return {*visit(ast.parse(path.read_text()))} - {None}
+
+
+FILES = modules()
+ARROWS = {name: arrows(path, FILES) - {name} for name, path in FILES.items()}
 
 
 def test_imports_make_no_circle():
     """Counting what is imported by name; that a package loads before its modules is Python's affair."""
-    files = {}
-    for top in ("rft", "geomech", "figures"):
-        for p in (ROOT / top).rglob("*.py"):
-            parts = p.relative_to(ROOT).with_suffix("").parts
-            files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = p
-    left = {name: set(depends_on(p, set(files))) - {name} for name, p in files.items()}
-    assert sum(map(len, left.values())) > 300
-    while free := [name for name, needs in left.items() if not needs & set(left)]:
-        for name in free:
-            del left[name]
-    assert left == {}
+    assert sum(map(len, ARROWS.values())) > 800
+    graphlib.TopologicalSorter(ARROWS).prepare()
+
+
+LAYERS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["layers"]["order"]
+
+
+def layer(module):
+    """The row of the longest name that a module's begins with."""
+    held = lambda prefix: f"{module}.".startswith(f"{prefix}.")
+    return max((len(prefix), k) for k, row in enumerate(LAYERS) for prefix in row if held(prefix))[1]
+
+
+def test_modules_import_from_their_own_layer_or_a_lower_one():
+    upward = [f"{a} imports {b}" for a, some in ARROWS.items() for b in some if layer(b) > layer(a)]
+    assert upward == []
+    folders = {name for name in FILES if name.count(".") == 1 and FILES[name].name == "__init__.py"}
+    assert {name for name in folders if layer(name) == len(LAYERS) - 1} == {"geomech.commands"}
 
 
 def test_a_scene_is_a_small_class():

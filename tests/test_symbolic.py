@@ -10,10 +10,10 @@ from geomech import scene as scenes
 from geomech.gaits import Circle
 from geomech.scene import Scene
 from geomech.study.bench import Study
+from geomech.symbolic import connections
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer
 from geomech.tiers.base import Numerics
 from rft import Backbone, Chain, Coulomb, SkinFriction, Viscous, se2
-from rft import symbolic as formulas
 
 UNEVEN = Chain((1.0, 2.0, 1.5), 0.3, "link-1")
 EXACT = {
@@ -66,10 +66,10 @@ def test_what_floats_is_as_by_hand():
 
 
 def test_the_snake_and_the_cart_are_as_by_hand():
-    A, (a, b) = formulas.no_slip_snake(frame="link-2")
+    A, (a, b) = connections.no_slip_snake(frame="link-2")
     ccf = symbolic.simplified(symbolic.ccf(A, (a, b)), (a, b))
     assert ccf[0] == 1 / (12 * sp.sin(a / 2 - b / 2) ** 2)
-    A, alpha = formulas.differential_drive()
+    A, alpha = connections.differential_drive()
     r, w = sorted(A.free_symbols, key=str)
     assert symbolic.ccf(A, alpha) == sp.Matrix([0, -(r**2) / w, 0])
     assert DifferentialDrive(0.3, 1.5).symbolic()[0] == A.subs({r: sp.Rational(3, 10), w: sp.Rational(3, 2)})
@@ -78,7 +78,7 @@ def test_the_snake_and_the_cart_are_as_by_hand():
 def test_symbols_stay():
     """A viscous chain of any ratio about the straight shape: as its numbers are for two of them."""
     ratio = sp.Symbol("r", positive=True)
-    A, alpha = formulas.viscous_chain((1, 2), ratio, link=1)
+    A, alpha = connections.viscous_chain((1, 2), ratio, "link-1")
     short = symbolic.simplified(A, alpha)
     assert short.free_symbols == {ratio, *alpha}
     for value in (1.5, 4.0):
@@ -109,10 +109,10 @@ def test_one_function_has_one_formula():
 
 
 def test_numbers_are_taken_as_they_are_written():
-    assert [formulas.exact(x) for x in (1 / 3, 0.1, 1e-9, 2, 0.123456789)] == [
+    assert [connections.exact(x) for x in (1 / 3, 0.1, 1e-9, 2, 0.123456789)] == [
         sp.Rational(1, 3), sp.Rational(1, 10), sp.Rational(1, 10**9), 2, sp.Rational(123456789, 10**9),
     ]  # fmt: skip
-    assert formulas.exact(sp.Symbol("x")) == sp.Symbol("x")
+    assert connections.exact(sp.Symbol("x")) == sp.Symbol("x")
 
 
 def test_the_area_is_that_of_the_formula():

@@ -8,11 +8,12 @@ import sympy as sp
 import xarray
 from registry import GAITS, SYSTEMS
 
-from geomech import connection, coordinates, symbolic
 from geomech import scene as scenes
-from geomech.connection import crossed
-from geomech.errors import SceneError
+from geomech import symbolic
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
+from geomech.geometry import connection, coordinates
+from geomech.geometry.connection import crossed
 from geomech.output import netcdf
 from geomech.output.explain import explain
 from geomech.scene import Scene
@@ -22,6 +23,7 @@ from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
 from geomech.systems.swimmer import Solver
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
+from rft.balance.newton import carried
 
 AWAY = Ellipse(semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7))  # from alpha_1 = alpha_2
 
@@ -57,7 +59,7 @@ def test_no_wheel_slips_in_any_frame(frame):
     xi = snake.velocity(alpha, alphadot)
     body = Chain((0.8, 1.3, 1.0), 0.4, frame)
     motion = body.motion(alpha.T, alphadot.T)
-    across = motion.v[1] + motion.carried((xi / [0.4, 0.4, 1.0]).T)[1]
+    across = motion.v_n + carried(motion, *(xi / [0.4, 0.4, 1.0]).T)[1]
     assert np.abs(across).max() < 1e-10 * np.abs(xi).max()
     h, hdot = Chain((0.8, 1.3, 1.0), 0.4, "link-2").frame_pose(frame, alpha, alphadot)
     middle = NoSlipSnake((0.8, 1.3, 1.0), 0.4, "link-2").velocity(alpha, alphadot)
@@ -90,7 +92,8 @@ def test_the_built_in_snake_goes_where_its_closed_form_does():
 
 @pytest.mark.parametrize("lengths", [(1, 1, 1), (1, 1.5, 0.7)])
 def test_singular_shapes_are_left_out_of_fields(lengths):
-    """The mask holds the zeros of the determinant and nothing farther off; elsewhere A and CCF are those of formulas."""
+    """The mask holds the zeros of the determinant and nothing farther off; elsewhere A and CCF are those of
+    formulas."""
     system = NoSlipSnake(lengths, frame="link-2")
     study = Study(Scene(system, AWAY).with_numerics(grid=41, extent=2.0))
     fitted, ccf, error = study.fitted, study.curvature.values, study.curvature_error.values

@@ -15,11 +15,13 @@ from registry import SYSTEMS
 from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
-from geomech import cli, connection, tables
+from geomech import cli
 from geomech import scene as scenes
-from geomech.connection import Connection
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
+from geomech.geometry import connection
+from geomech.geometry.connection import Connection
+from geomech.io import tables
 from geomech.output import mat, netcdf, plots
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
@@ -27,7 +29,7 @@ from geomech.study import accuracy, choose, estimate
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.table import LENGTHS
-from rft.media import CATALOGUE
+from rft.laws import CATALOGUE
 
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
 UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
@@ -636,7 +638,7 @@ def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path
     for options in ({"do_compression": True}, {"format": "4"}):
         savemat(tmp_path / "a.mat", found, **options)
         np.testing.assert_array_equal(tables.load(tmp_path / "a.mat").connection.A, c.A)
-    monkeypatch.setattr("geomech.tables.matlab.LARGEST", 100_000)
+    monkeypatch.setattr("geomech.io.tables.matlab.LARGEST", 100_000)
     savemat(tmp_path / "a.mat", {**found, "more": np.zeros(10**6)}, do_compression=True)
     with pytest.raises(SceneError, match="is damaged, cut short, or no MATLAB file"):
         tables.load(tmp_path / "a.mat")

@@ -1,17 +1,19 @@
-"""Tangents against differences, every column: of every law under every rule, every effect, and the mass. A wrong one costs
-Newton's method its speed or its answer, and nothing else would say so."""
+"""Tangents against differences, every column: of every law under every rule, every effect, and the mass. A wrong one
+costs Newton's method its speed or its answer, and nothing else would say so."""
 
 import numpy as np
 import pytest
+from loads import as_array, element_load
 from registry import BODIES, DRY, EFFECTS, MEDIA
 from test_balance import Mud
 from test_loads import CubicDrag
 
 from rft import Granular
-from rft.bodies.base import Kinematics
-from rft.contact import rows
-from rft.effects.base import Process, Site, folded
-from rft.loads import element_load
+from rft.balance.arrays import loads, row
+from rft.balance.newton import Net, carried, plus, with_momentum
+from rft.contact import assemble
+from rft.effects.base import Site, by_steps
+from rft.momentum import inertia, on_elements
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -19,13 +21,14 @@ GLASS = Granular(C=1.8, gamma0=0.24)
 
 
 def assert_is_slope(load, v, rtol=2e-6):
-    """load: v (3, n, B) -> (3, 4, n, B), columns 1 to 3 the derivatives of column 0; each row by its own largest slope."""
+    """load: v (3, n, B) -> (3, 4, n, B), columns 1 to 3 the derivatives of column 0; each row by its own largest
+    slope."""
     h = 1e-6
     tangent = load(v)[:, 1:]
     steps = h * np.eye(3)[:, :, None, None]
     slopes = np.stack([(load(v + step)[:, 0] - load(v - step)[:, 0]) / (2 * h) for step in steps], 1)
-    for row, (got, wanted) in enumerate(zip(tangent, slopes)):
-        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), (row, np.abs(got - wanted).max((1, 2)))
+    for k, (got, wanted) in enumerate(zip(tangent, slopes)):
+        assert np.abs(got - wanted).max() <= rtol * np.abs(wanted).max(), (k, np.abs(got - wanted).max((1, 2)))
     assert (np.abs(slopes).max((2, 3)) > 0).any(1).all()  # every row has something to tell
 
 
@@ -38,20 +41,29 @@ def test_laws(law, how):
 
 
 def at_one_step(effects, body, medium, samples, rng):
-    """(model, motions) of effects within a gait whose ground, place and past are not those of its start."""
-    model = folded([e for e in effects if not isinstance(e, Process)], medium, body)
-    processes = [e for e in effects if isinstance(e, Process)]
-    motions = model.motions(body.motion(*rng.uniform(-1, 1, (2, body.joints, samples))))
+    """The balance with effects within a gait whose ground, place and past are not those of its start."""
+    assembly = assemble(medium, body, effects)
+    stepwise = by_steps(assembly.effects)
+    always = assembly._replace(effects=tuple(e for e in assembly.effects if e not in stepwise))
+    problem = always.at(*rng.uniform(-1, 1, (2, body.joints, samples)))
     pose = np.stack([*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)])
-    site = Site(0.2, pose, motions, {name: 0.4 * m.v for name, m in motions.items()})
-    states = [p.begin(site) for p in processes]
-    for step in (0.12, -0.12, 0.0):
-        there = site._replace(pose=pose + np.array([0, step, 0])[:, None])
-        v = {name: rng.normal(size=m.v.shape) for name, m in motions.items()}
-        states = [p.after(state, there, v) for p, state in zip(processes, states)]
-    for process, state in zip(processes, states):
-        model = process.at(state, site).apply(model)
-    return model, motions
+    site = Site(5, 0.2, pose, tuple(0.4 * problem.sides.elements.v))
+    pasts = [e.begin(problem, site) for e in stepwise]
+    for count, step in enumerate((0.12, -0.12, 0.0)):
+        there = site._replace(count=count + 1, pose=pose + np.array([0, step, 0])[:, None])
+        v = tuple(rng.normal(size=problem.sides.elements.v.shape))
+        pasts = [e.after(problem, there, past, v) for e, past in zip(stepwise, pasts)]
+    for effect, past in zip(stepwise, pasts):
+        problem = effect.apply(problem, site, past)
+    return problem
+
+
+def loads_on(problem, v, eps):
+    """Loads of all elements, those of the sides first, (3, 4, n, B), at true velocities."""
+    n, scale = len(problem.sides.station), problem.speed
+    halves = tuple(v[:, :n] / scale), tuple(v[:, n:] / scale)
+    found = loads(problem, halves, eps / scale)
+    return np.concatenate([as_array(load, part[0]) for (_, load), part in zip(found, halves)], 2)
 
 
 @pytest.mark.parametrize("medium", [GLASS, Mud()], ids=["glass", "mud"])
@@ -63,34 +75,39 @@ def test_effects(name, medium):
         effects = [e for k, e in enumerate(effects) if type(e) not in {type(x) for x in effects[:k]}]
     if not isinstance(medium, Granular):
         effects = [e for e in effects if e.kind not in ("end-caps", "towed-sled")]
-    model, motions = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
-    n = len(Kinematics.stacked(list(motions.values())).half)
+    problem = at_one_step(effects, BODIES["uneven"], medium, samples, rng)
+    n = len(problem.sides.station) + len(problem.points.station)
     v, eps = rng.normal(size=(3, n, samples)), rng.uniform(0.05, 0.2, samples)
     v[0] = np.sign(v[0]) * (0.01 + np.abs(v[0]))  # skin friction steps where an element slides neither way
-    load = lambda v: model.load(v, rows(motions), eps)
+    load = lambda v: loads_on(problem, v, eps)
     assert_is_slope(load, v)
     # Samples in another order have their own memories and places.
     other = rng.permutation(samples)[:7]
-    picked = model.take(other).load(v[..., other], rows(motions), eps[other])
+    picked = loads_on(problem.take(other), v[..., other], eps[other])
     np.testing.assert_allclose(picked, load(v)[..., other], rtol=1e-13, atol=1e-13)
-    twice = (
-        model.take(np.arange(samples)[::-1]).take(samples - 1 - other).load(v[..., other], rows(motions), eps[other])
-    )
-    np.testing.assert_array_equal(twice, picked)
+    twice = problem.take(np.arange(samples)[::-1]).take(samples - 1 - other)
+    np.testing.assert_array_equal(loads_on(twice, v[..., other], eps[other]), picked)
 
 
 @pytest.mark.parametrize("name", ["body-inertia", "body-inertia, frequency"])
 def test_mass(name):
-    """Its tangent; what its elements bear adds up to it; a few samples have their own."""
+    """What it adds to the balance: its tangent; what elements bear adds up to it; a few samples have their own."""
     rng, samples = np.random.default_rng(4), 12
     mass = EFFECTS[name][0](0.5).having(mass=rng.uniform(0.5, 3.0, samples))
-    model, motions = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
-    (term,), motion = model.terms, motions["side"]
+    problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
     index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
-    assert_is_slope(lambda x: term(x[:, 0])[:, :, None], xi[:, None])
-    np.testing.assert_allclose(term.take(index)(xi[:, index]), term(xi)[..., index], rtol=1e-14)
-    borne = term.on_elements(xi, motion, motion.v + motion.carried(xi))
-    np.testing.assert_allclose(borne.sum(1), term(xi)[:, 0], rtol=1e-12, atol=1e-13)
+
+    def term(problem, xi):
+        """(3, 4, B): rate of change of momentum, and its slopes in the true velocity."""
+        m = row(inertia(problem.sides.elements, problem.momenta))
+        nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
+        return np.stack([np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1)
+
+    assert_is_slope(lambda x: term(problem, x[:, 0])[:, :, None], xi[:, None])
+    np.testing.assert_allclose(term(problem.take(index), xi[:, index]), term(problem, xi)[..., index], rtol=1e-14)
+    e = problem.sides.elements
+    borne = on_elements(e, problem.momenta, plus((e.v_t, e.v_n, e.v_w), carried(e, *xi)))
+    np.testing.assert_allclose(borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13)
 
 
 def test_every_dry_law_is_homogeneous():
@@ -111,5 +128,6 @@ def test_loads_take_velocities_as_they_are(how):
     v, eps = rng.normal(size=(3, 2, 30)), np.full(30, 0.1)
     load = element_load(mud, how)
     c_t, c_n = mud.viscous
-    viscous = np.array([c_t, c_n, c_n / 3])[:, None, None] * v
+    square = 5 / 16 if how == "midpoint:4" else 1 / 3  # mean of s^2
+    viscous = np.array([c_t, c_n, square * c_n])[:, None, None] * v
     np.testing.assert_allclose(load(*(2 * v), 2 * eps)[:, 0] - load(*v, eps)[:, 0], viscous, rtol=1e-9, atol=1e-12)

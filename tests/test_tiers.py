@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from registry import GAITS, MEDIA
 
-from geomech import connection, family, harmonics
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Fourier
+from geomech.geometry import connection, family, harmonics
 from geomech.output import plots
 from geomech.scene import Numerics, Scene
 from geomech.study import estimate

@@ -5,15 +5,15 @@ import pytest
 import xarray
 
 import geomech
-from geomech import connection, curvature
-from geomech.connection import Connection
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier
+from geomech.geometry import connection, curvature
+from geomech.geometry.connection import Connection
+from geomech.geometry.two_form import spanned, two_form
 from geomech.output import netcdf
 from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
-from geomech.two_form import spanned, two_form
 from rft import Chain, Viscous
 
 SYSTEM = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))

@@ -9,13 +9,13 @@ import pytest
 from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 
 import rft
-from geomech import connection, curvature, family, harmonics, kinds, reconstruct
 from geomech import scene as scenes
-from geomech.errors import SceneError
-from geomech.field import Field
+from geomech.core.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
+from geomech.geometry import connection, curvature, family, harmonics, reconstruct
+from geomech.geometry.field import Field
 from geomech.output.explain import explain
-from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene
+from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
@@ -23,9 +23,8 @@ from geomech.systems import Solver, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
-from rft import Chain, Coulomb, Granular, Viscous, body_velocity, se2, spatial
-from rft.vertical import SHAPES, Drag, Path, Penetrate, Rotate
-from rft.vertical import effects as ground
+from rft import Chain, Coulomb, Granular, Viscous, body_velocity, ground, meshes, se2
+from rft.plates import SHAPES, Drag, Path, Penetrate, Rotate
 from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
@@ -36,13 +35,14 @@ WRONG = {
     "date": np.datetime64("2020"),
 }  # fmt: skip
 RHEX = Rhex(0.2, 0.15, 0.03, 0.06, OUTLINES["c-leg"], (-0.05, 0.05))
-SCREWS = Screws(0.2, 0.15, 0.12, 0.03, spatial.Screw(0.03, 0.01, 0.02, 0.1, 0.003), 0.1)
+SCREWS = Screws(0.2, 0.15, 0.12, 0.03, meshes.Screw(0.03, 0.01, 0.02, 0.1, 0.003), 0.1)
 PARTS = {
     "Granular": Granular(1.8, 0.24), "Surface": rft.Surface(0.2, 0.06, 9.0), "Viscous": Viscous(),
     "Table": rft.Table((0, 0.4, 0.8, 1.5), (1, 1, 0.7, 0), (0, 1, 2, 3)), "Chain": Chain(), "Backbone": rft.Backbone(8),
     "Serpenoid": rft.Serpenoid(8), "ConstantCurvature": rft.ConstantCurvature(8), "SkinFriction": rft.SkinFriction(),
     "EndCaps": rft.EndCaps(0.06), "DepthProfile": rft.DepthProfile(), "GrainInertia": rft.GrainInertia(1.0, 0.1, 0.1),
     "BodyInertia": rft.BodyInertia(1.0, 1.0, 1.0, 1.0), "Transient": rft.Transient(0.1), "TowedSled": rft.TowedSled(0.1),
+    "Incline": rft.Slope(0.2),
     "DisturbedGround": rft.DisturbedGround(0.05, 0.1), "Numerics": Numerics(), "Solver": Solver(),
     "Swimmer": Swimmer(Coulomb(), Chain()), "Scene": Scene(Swimmer(Coulomb(), Chain()), Circle()),
     "table, system": SYSTEMS["table"],
@@ -53,11 +53,11 @@ PARTS = {
     "Path": Path((0, 1, 2), (0, 1, 2), (0, 1, 0)),
     "IntruderScene": IntruderScene(STRESSES["generic"], OUTLINES["plate"], Drag(0.1)),
     "Aeration": ground.Aeration(0.01, 0.03), "GrainPressure": ground.GrainInertia(), "Slope": ground.Slope(0.1),
-    "DisturbedPlaces": ground.DisturbedGround((0.0,), 0.02, 0.5), "Spatial": spatial.Spatial(3e5),
-    "Sphere": spatial.Sphere(0.02), "Cylinder": spatial.Cylinder(0.02, 0.1), "Screw": spatial.Screw(0.03, 0.01, 0.02, 0.1),
-    "Leg": spatial.Leg(0.04, 0.02, 0.003), "SpatialDrag": spatial.Drag(0.1), "SpatialPenetrate": spatial.Penetrate(0.1),
-    "SpatialRotate": spatial.Rotate(0.1), "SpatialPath": spatial.Path(*[(0, 1, 2)] * 4),
-    "MeshScene": MeshScene(spatial.Spatial(3e5), spatial.Sphere(0.02), spatial.Drag(0.1), triangles=20),
+    "DisturbedPlaces": ground.DisturbedGround((0.0,), 0.02, 0.5), "Spatial": meshes.Spatial(3e5),
+    "Sphere": meshes.Sphere(0.02), "Cylinder": meshes.Cylinder(0.02, 0.1), "Screw": meshes.Screw(0.03, 0.01, 0.02, 0.1),
+    "Leg": meshes.Leg(0.04, 0.02, 0.003), "SpatialDrag": meshes.Drag(0.1), "SpatialPenetrate": meshes.Penetrate(0.1),
+    "SpatialRotate": meshes.Rotate(0.1), "SpatialPath": meshes.Path(*[(0, 1, 2)] * 4),
+    "MeshScene": MeshScene(meshes.Spatial(3e5), meshes.Sphere(0.02), meshes.Drag(0.1), triangles=20),
     "Tripod": Tripod(2.0), "Rhex": RHEX, "Roller": Roller(1.0, OUTLINES["wheel"]), "Screws": SCREWS, "Fineness": Fineness(),
     "Walker": Walker(RHEX, Tripod(2.0), STRESSES["generic"]),
     "WalkerScene": WalkerScene(STRESSES["generic"], RHEX, Tripod(2.0)),
@@ -239,7 +239,7 @@ def test_the_place_is_named():
             lambda: scenes.load("three-link-glass").with_numerics(grid="a"),
             "three-link-glass: grid must be a whole number",
         ),
-        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e+15, got 'x'"),
+        (lambda: Chain(length="x"), "length must be a number from 1e-15 to 1e+15 m, got 'x'"),
         (lambda: Chain(lengths=[[1]]), "lengths must be a list of numbers, got [[1]]"),
         (lambda: body_velocity("sand", Chain(), STILL, STILL), "medium must be a force law"),
         (lambda: Swimmer(lambda v: v, Chain()), "medium must be a force law"),

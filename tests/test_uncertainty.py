@@ -9,7 +9,7 @@ import xarray
 from test_cli import geomech
 
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Ellipse
 from geomech.output import report, sweeps
 from geomech.scene import Scene

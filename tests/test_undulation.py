@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from artists import curve, curves, drawn
 from scipy.optimize import brentq
 
 import rft
 from figures import fig09c_efficiency, fig10_neuromechanics
 from geomech import scene as scenes
 from geomech.gaits import Circle, Sine, Wave
-from geomech.output import plots
-from geomech.reconstruct import displacement
+from geomech.geometry.reconstruct import displacement
 from geomech.scene import Scene
 from geomech.study import undulation
 from geomech.study.bench import Study
@@ -110,7 +110,7 @@ def drawn_out(body, alpha):
 @pytest.mark.parametrize("medium", [GLASS, Viscous(2.0)])
 def test_internal_moments_by_quadrature(medium):
     """The medium's moment on the tail's side of a joint, from `traction` at many points and velocities by differences;
-    that on the head's side is the opposite. No part of `rft.loads`, of the body's motion or of `rft.work_done` is used."""
+    that on the head's side is the opposite. No part of `rft.link`, of the body's motion or of `rft.work_done` is used."""
     rng, pieces, h = np.random.default_rng(2), 4000, 1e-6
     body = Chain((2.0, 1.0, 3.0, 1.0, 2.0))
     for _ in range(3):
@@ -159,7 +159,7 @@ def test_endless_sine_in_loose_glass():
     towards the published 0.5."""
     a = np.linspace(0.1, 0.4, 31)
     plain = np.array([undulation.endless_sine(GLASS, x) for x in a])
-    place, _ = undulation.best(a, plain * Sine().wavelength(a))
+    place, _ = undulation.optimum(a, plain * Sine().wavelength(a))
     assert place == pytest.approx(0.2, abs=0.02)
     assert np.interp(0.2, a, plain) == pytest.approx(0.7, abs=0.01)
     head = undulation.endless_sine(GLASS, 0.2, SANDFISH.system.effects[0])
@@ -180,7 +180,7 @@ def test_endless_waves_slide_or_go_sideways(name, kinematics):
     """The forces of a wave integrated over x, its points held to their kinematics in the swimmer's frame, vanish."""
     medium, a = CATALOGUE[name].medium, np.linspace(0.15, 0.35, 41)
     found = np.array([undulation.endless_sine(medium, x, elements=500, kinematics=kinematics) for x in a])
-    assert undulation.best(a, found * Sine().wavelength(a)) == pytest.approx(ENDLESS[name, kinematics], abs=2e-4)
+    assert undulation.optimum(a, found * Sine().wavelength(a)) == pytest.approx(ENDLESS[name, kinematics], abs=2e-4)
     assert (np.diff(found) > 0).all()  # over the wavelength there is no optimum
     slope = 2 * np.pi * a[7] * np.cos(2 * np.pi * (np.arange(4000) + 0.5) / 4000)
     root = np.sqrt(1 + slope**2)
@@ -251,8 +251,10 @@ def test_fig09c(numbers, tmp_path):
     # "both swimmers also minimized their energy use": the best wave is near the cheapest.
     for found in (loose, snake):
         assert found["best"]["progress"][0] == pytest.approx(found["best"]["cost_of_transport"][0], abs=0.06)
-    plots.save(fig09c_efficiency.draw(numbers), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 20_000
+    axes = drawn(fig09c_efficiency, numbers, tmp_path).axes
+    slip, cycle = axes[5], axes[9]  # both on the right, the third row and the last
+    np.testing.assert_allclose(curve(slip, "sandfish close"), [close["amplitude"], np.degrees(close["slip"])])
+    np.testing.assert_allclose(curve(cycle, r"$\xi_\theta$ (rad/rad)")[1, :-1], close["cycle"][:, 2])
 
 
 # With three times the elements: where transport is cheapest, A / lambda and cost; slip at A / lambda = 0.22, rad.
@@ -270,7 +272,7 @@ def test_cost_and_slip(numbers, name):
     found = numbers[name]
     assert found["best"]["cost_of_transport"] == (pytest.approx(place, abs=0.006), pytest.approx(cost, rel=0.015))
     assert np.interp(0.22, found["amplitude"], found["slip"]) == pytest.approx(slip, rel=0.02)
-    fine = [undulation.performance(fig09c_efficiency.refined(scenes.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
+    fine = [undulation.performance(undulation.refined(scenes.load(name), k), [place, 0.22]) for k in (1, 2, 3)]
     costs, slips = (np.array([f[key][k] for f in fine]) for key, k in (("cost_of_transport", 0), ("slip", 1)))
     assert costs[-1] == pytest.approx(cost, rel=1e-3)
     assert slips[-1] == pytest.approx(slip, rel=1e-3)
@@ -306,13 +308,32 @@ def test_slip_counts_every_link_by_its_length():
     assert abs(found - angle.mean()) > 0.1
 
 
+def test_an_optimum_is_that_of_a_parabola_through_logarithms():
+    """Exact for a bell and for its inverse; None at either edge of the range."""
+    x = np.array([0.0, 0.1, 0.25, 0.45, 0.5])
+    bell = 3.0 * np.exp(-7.0 * (x - 0.3) ** 2)
+    assert undulation.optimum(x, bell) == (pytest.approx(0.3), pytest.approx(3.0))
+    assert undulation.optimum(x, 1 / bell, -1) == (pytest.approx(0.3), pytest.approx(1 / 3))
+    assert undulation.optimum(x, bell, -1) is None  # the first
+    assert undulation.optimum(x, np.exp(x)) is None  # the last
+
+
+def test_a_refined_scene_has_finer_elements_in_body_and_wave():
+    snake = scenes.load("shovel-nosed-snake")
+    fine = undulation.refined(snake, 3)
+    assert fine.gait == dataclasses.replace(snake.gait, elements=3 * snake.gait.elements)
+    assert fine.system.body.joints == fine.gait.joints and fine.system.effects == snake.system.effects
+    with pytest.raises(ValueError, match="refined is that of a sine wave, got a butterfly"):
+        undulation.refined(scenes.load("butterfly-glass"), 3)
+
+
 def test_efficiency_and_slip_have_no_optimum():
     """They go on improving; what the snake's own elements show at large amplitudes is their coarseness."""
     amplitudes = [0.3, 0.4, 0.5]
     for name, finer in (("sandfish-loose", 1), ("sandfish-close", 1), ("shovel-nosed-snake", 3)):
-        found = undulation.performance(fig09c_efficiency.refined(scenes.load(name), finer), amplitudes)
-        assert fig09c_efficiency.optimum(amplitudes, found["efficiency"], 1) is None
-        assert fig09c_efficiency.optimum(amplitudes, found["slip"], -1) is None
+        found = undulation.performance(undulation.refined(scenes.load(name), finer), amplitudes)
+        assert undulation.optimum(amplitudes, found["efficiency"]) is None
+        assert undulation.optimum(amplitudes, found["slip"], -1) is None
     coarse = undulation.performance(scenes.load("shovel-nosed-snake"), amplitudes)
     assert coarse["efficiency"][2] < coarse["efficiency"][1] < found["efficiency"][1]
 
@@ -416,11 +437,32 @@ def test_fig10(tmp_path):
     assert (np.diff(numbers["lag"][2, middle]) < 0).all()
     # 70 % of the way to the tail the right side starts before the body is bent most to the left, by 0.1 of a cycle.
     assert at(0.3, numbers["lag"])[2] - np.pi / 2 == pytest.approx(0.588, abs=0.01)
-    rows = fig10_neuromechanics.table(numbers).splitlines()[2:]
+    rows = fig10_neuromechanics.table(numbers).splitlines()[1:]
     assert [row.split()[0] for row in rows] == ["0.50", "0.75", "1.00", "1.25", "1.50", "1.80"]
     assert rows[2].split()[1] == f"{numbers['speed'][2]:.2f}"
-    plots.save(fig10_neuromechanics.draw(numbers), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 30_000
+    *_, lags, speeds = drawn(fig10_neuromechanics, numbers, tmp_path).axes
+    np.testing.assert_allclose(curve(lags, "1.8"), [numbers["s"], numbers["lag"][-1]])
+    np.testing.assert_allclose(curve(speeds, "first harmonic"), [numbers["waves"], numbers["fundamental_speed"]])
+    np.testing.assert_allclose(curves(speeds)[1][:, 1], numbers["head"]["speed"])
+
+
+def test_fig10_traces_the_place_it_names():
+    """70 % of the way from head to tail, the caption's 0.71 pi of pi as the module reads it."""
+    numbers = fig10_neuromechanics.compute((1.0,), elements=20, phases=32)
+    figure = fig10_neuromechanics.draw(numbers)
+    one, ax = numbers["one"], figure.axes[1]
+    k = np.abs(one["s"] - 0.3).argmin()
+    assert one["s"][k] == pytest.approx(0.3)
+    for line, key in zip(ax.lines, ("bend", "moment")):
+        trace = np.append(one[key][:, k], one[key][0, k])
+        np.testing.assert_allclose(line.get_ydata(), trace / np.abs(trace).max())
+        assert line.get_label().startswith("curvature" if key == "bend" else key)
+    assert ax.get_ylabel().endswith("s = 0.3")
+    onset, offset = (line.get_xdata()[0] for line in ax.lines[2:4])
+    np.testing.assert_allclose([onset, offset], np.mod([one["onset"][k], one["offset"][k]], 2 * np.pi))
+    across = [line.get_xydata() for line in figure.axes[0].lines]
+    np.testing.assert_allclose(across[1], np.stack([one["s"], one["onset"]], -1))
+    np.testing.assert_allclose(across[4], np.stack([one["s"], one["offset"]], -1))
 
 
 def test_the_speed_ratio_dips_before_it_falls():

@@ -1,6 +1,7 @@
 """The vertical plane: the stress map against its definition and its check values, loads against closed forms, adaptive
 quadrature, mirror images and far finer computations."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from registry import OUTLINES, STRESSES
 from scipy.integrate import quad
 
-from rft.vertical import (
+from rft.ground import Aeration, DisturbedGround, GrainInertia, Ground, Slope
+from rft.plates import (
     SHAPES,
     VERTICAL,
     CLeg,
@@ -19,17 +21,19 @@ from rft.vertical import (
     Penetrate,
     Plate,
     PlateDrags,
+    PlateStress,
     Polygon,
     Rotate,
     RoundRod,
     SquareRod,
     StressMap,
     Wheel,
+    contact,
     loads,
-    parts,
     survey,
 )
-from rft.vertical.loads import ORDER
+from rft.plates.loads import ORDER
+from rft.vectors import formula
 
 RAD = np.pi / 180
 M0 = StressMap()
@@ -273,6 +277,48 @@ def test_leading_axes_are_a_batch():
     np.testing.assert_allclose(every.force[5, 2], loads(M0, outline, pose[5], twist[2]).force, rtol=1e-13)
 
 
+GROUNDS = [], [
+    GrainInertia(2.0, 700.0), Slope(-0.2, 0.6), DisturbedGround((0.0, 0.03, -0.4), 0.02, 0.6),
+    DisturbedGround((-0.1,), 0.05, 0.4), Aeration(0.01, 0.03),
+]  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class Own(PlateStress):
+    """A map of one's own: alpha_x and alpha_z grow with how steeply a plate moves."""
+
+    steep: float = 0.7
+    grazing: float = 0.02
+    tension: str = "cut"
+
+    @formula
+    def alpha_ahead(self, n, v):
+        return 0.3 * v[0] - self.steep * n[0] * n[1] * v[0], 0.2 - self.steep * v[1]
+
+
+@dataclasses.dataclass(frozen=True)
+class Plain(Own):
+    """The same without a formula."""
+
+    def alpha_ahead(self, n, v):
+        return 0.3 * np.asarray(v[0]) - self.steep * n[0] * n[1] * v[0], 0.2 - self.steep * v[1]
+
+
+@pytest.mark.parametrize("effects", GROUNDS, ids=["plain", "all effects"])
+@pytest.mark.parametrize("shape", OUTLINES)
+def test_compiled_loads_are_those_by_numpy(shape, effects):
+    """Of every map, and of one's own, for elements that fill up eight or not."""
+    pytest.importorskip("numba")
+    pose, twist = random_motions(70, 3)
+    for stress, elements in itertools.product([*STRESSES.values(), Own()], (5, 24)):
+        outline = OUTLINES[shape].outline(elements)
+        slow, fast = (loads(stress, outline, pose, twist, effects, backend) for backend in ("numpy", "numba"))
+        for one, other in zip(slow, fast):
+            np.testing.assert_allclose(other, one, rtol=0, atol=1e-13 * np.abs(one).max())
+    plain, own = loads(Plain(), outline, pose, twist, effects), loads(Own(), outline, pose, twist, effects, "numpy")
+    np.testing.assert_array_equal(plain.force, own.force)
+
+
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_the_order_in_the_number_of_elements(shape):
     """rms over poses whose centre of rotation is not within the body: 2, and 1 where tension is cut, with the jump and
@@ -301,9 +347,10 @@ def test_a_face_at_grazing_incidence_is_rounded_over_the_angle():
 
 def _under(stress, rod, gamma):
     """Upward force on the faces that look down."""
-    here = parts(rod, (0, -0.3, 0), (np.cos(gamma), -np.sin(gamma), 0), 1, stress.grazing)
-    force = here.area * here.depth * stress.traction(here.n, here.v)[1]
-    return float(force[np.asarray(here.n[1]) < -0.5].sum())
+    at = contact.Motion(0.0, -0.3, 1.0, 0.0, np.cos(gamma), -np.sin(gamma), 0.0)
+    ground = Ground(sine=np.sin(stress.grazing))
+    force = contact.load(contact.record(stress), ground, contact.elements(rod), at, 1.0, True, False)
+    return float(force.z[rod.normals[:, 1] < -0.5].sum())
 
 
 def test_outlines_are_closed_face_outwards_and_have_their_size():

@@ -7,23 +7,26 @@ import types
 
 import numpy as np
 import pytest
+from artists import curve, drawn
 from scipy.io import netcdf_file
 
 from figures.walking_sensitivity import Sheet
 from geomech import scene as scenes
-from geomech.errors import SceneError
+from geomech.core.errors import SceneError
 from geomech.output import walks
 from geomech.output.explain import explain
 from geomech.scene import WalkerScene
 from geomech.study import walking
-from rft.vertical import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
-from rft.vertical.effects import Aeration, GrainInertia, Slope, folded
+from rft.balance.backend import preferring
+from rft.ground import Aeration, GrainInertia, Slope
+from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
 from rft.walking.limit import Found, Limit, _late, _Search, limit_cycle
-from rft.walking.march import step
+from rft.walking.march import march, step
 from rft.walking.planar import GRAVITY, State
 from rft.walking.planar_walk import _speed, _strides, again, walk
 from rft.walking.robot import parts
+from rft.walking.sdirk import EFFORT, Effort
 from rft.walking.stride import Walk, cycles_to_settle, from_rest, still_to_come
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -36,6 +39,12 @@ def xplorer(curvature=1.0, frequency=2.0, **changes):
     legs = dataclasses.replace(XPLORER.robot.legs, relative_curvature=curvature)
     robot = dataclasses.replace(XPLORER.robot, legs=legs, **changes)
     return Walker(robot, Tripod(frequency), XPLORER.medium)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_steps():
+    """What is compiled once says so on standard error, where tests of commands look for one line."""
+    walk([xplorer()], QUICK, 1)
 
 
 @pytest.mark.parametrize("gait", [Tripod(2.0), Tripod(1.3, 0.4, 1.1, 0.3), Tripod(0.7, 0.7, 2.0, -0.2)])
@@ -68,7 +77,7 @@ def test_forces_are_the_sum_over_legs_and_belly(tension, robot):
     twist = twist if robot is ROBOT else -twist
     angle, rate = robots.turned(np.array([phase]), phase)
     a, motors, ground = robots.forces(pose[None, None], twist[None, None], angle, rate)
-    ground_now, wrench, motor, into = folded(walker.stress, effects), np.zeros(3), 0.0, 0.0
+    wrench, motor, into = np.zeros(3), 0.0, 0.0
     places = [(x, robot.hip_height, at) for x in robot.hips for at in (0.0, 0.5)]
     parts = [(robot.leg(8), x, z, at) for x, z, at in places] + [(robot.belly(8), 0.0, 0.0, None)]
     for outline, x, z, at in parts:
@@ -80,7 +89,7 @@ def test_forces_are_the_sum_over_legs_and_belly(tension, robot):
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         r = cos * x + sin * z, cos * z - sin * x
         v = twist[0] + twist[2] * r[1], twist[1] - twist[2] * r[0]
-        found = loads(ground_now, outline, [r[0], pose[1] + r[1], pose[2] + phi], [*v, twist[2] + turn])
+        found = loads(walker.stress, outline, [r[0], pose[1] + r[1], pose[2] + phi], [*v, twist[2] + turn], effects)
         wrench += [*found.force, found.moment + r[1] * found.force[0] - r[0] * found.force[1]]
         motor -= found.moment * turn
         into -= found.force @ v + found.moment * (twist[2] + turn)
@@ -404,7 +413,7 @@ def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
     walk = types.SimpleNamespace(**means(0.0), drift=0.001, off=0.0)
     how = types.SimpleNamespace(
         walk=lambda *args, **more: [walk],
-        again=lambda w, numerics, *rest: [types.SimpleNamespace(**means(other(numerics)))],
+        again=lambda w, numerics, *rest, **more: [types.SimpleNamespace(**means(other(numerics)))],
     )
     monkeypatch.setattr(walking, "engine", lambda name: how)
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
@@ -497,7 +506,7 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
 
 WRONG = {
     "kind = \"rhex\"": ("kind = \"rex\"", "did you mean 'rhex'"),
-    "frequency = 2.0 ": ("frequency = 0 ", "frequency must be a number from 0.001 to 200 turns a second (Hz), got 0"),
+    "frequency = 2.0 ": ("frequency = 0 ", "frequency must be a number from 0.001 to 200 Hz, got 0"),
     "mass = 0.15 ": ("mass = -1 ", "mass must be a number"),
     "length = 0.13 ": ("length = 130 ", "length must be a number from 1e-06 to 10 m"),
     "hips = [-0.05, 0.0, 0.05]": ("hips = []", "a robot without legs"),
@@ -564,7 +573,6 @@ def test_an_eccentric_wheel_is_a_leg():
 
 def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     from figures import fig12_walking, walking_sensitivity, walking_steps, wheel
-    from geomech.output import plots
 
     coarse = Fineness(steps=8, elements=4, duration=1.0)
     for module in (fig12_walking, walking_sensitivity, walking_steps):
@@ -578,10 +586,12 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
         walking_steps: walking_steps.compute({"implicit": (16, 32), "explicit": (64,)}, 48, (3.0,)),
         wheel: wheel.compute(slips=4),
     }
-    for module, numbers in made.items():
-        plots.save(module.draw(numbers), tmp_path / "figure.png")
-        assert (tmp_path / "figure.png").stat().st_size > 10_000
-    assert "1" in fig12_walking.table(made[fig12_walking])
+    axes = {module: drawn(module, numbers, tmp_path).axes for module, numbers in made.items()}
+    walk, _, flow = made[fig12_walking].values()
+    np.testing.assert_allclose(axes[fig12_walking][0].lines[0].get_ydata(), walk.walk.twist[walk.walk.t <= 3.0, 0])
+    row = fig12_walking.table(made[fig12_walking]).splitlines()[-1]
+    status = flow["status"][0, 0].replace("walking", "").split()
+    assert row.split() == ["at", "0.637", "Hz", f"{flow['speed'][0, 0]:.3f}", *status]
     sandbot = scenes.load("sandbot")
     other = lambda name: walking_sensitivity.CHOICES.get(name, (1.0, 1.4))[1]
     wide = [walking_sensitivity.varied(sandbot, name, other(name)) for name in walking_sensitivity.NAMES]
@@ -594,8 +604,35 @@ def test_figures_of_walking_are_drawn(tmp_path, monkeypatch):
     assert wide[0].robot.axle == pytest.approx(1.4 * sandbot.robot.axle)
     (_, _, left), (_, _, chattering) = made[walking_steps][3.0].values()
     assert left[-1] < 0.02 and (chattering > 0).all()
+    left_of_energy = axes[walking_steps][1]
+    np.testing.assert_allclose(curve(left_of_energy, "explicit"), [[64], chattering])
     smooth, lugs = made[wheel]["found"].values()
+    np.testing.assert_allclose(curve(axes[wheel][3], "30 rad/s"), [made[wheel]["slip"], 1e3 * lugs[30.0].sinkage])
     assert smooth[60.0].pull[2] < smooth[0.0].pull[2] < lugs[0.0].pull[2] < lugs[60.0].pull[2]
+
+
+@pytest.mark.parametrize("effort", [EFFORT, Effort(np.array([[1.0, 3.0, 1.0]]).T, 3.0, 0.25)], ids=["all", "cut short"])
+@pytest.mark.parametrize("tension", ["keep", "cut"])
+def test_compiled_steps_are_those_by_numpy(tension, effort, monkeypatch):
+    """Robots side by side on legs and a belly, of which one comes to an end, and a wheel."""
+    pytest.importorskip("numba")
+    monkeypatch.setattr("rft.walking.march.EFFORT", effort)
+    medium, air = dataclasses.replace(SAND, tension=tension), (Aeration(0.01, 0.03), GrainInertia(2.0, 700.0))
+    legged = [Walker(xplorer(c, 2.0).robot, Tripod(f), medium, air) for c, f in ((1.0, 2.0), (-0.4, 3.1), (0.2, 20.0))]
+    lugs, unsolved, stopped = Wheel(0.05, 0.02, 5, 0.01, 0.006), [], []
+    for walkers in (legged, [Walker(Roller(0.08, lugs), Tripod(0.7), medium)]):
+        strides = _strides(walkers, QUICK)
+        at = strides.robots, np.arange(len(walkers)), strides.robots.placed(), strides.phases, strides.of
+        ends, found = (strides.top, strides.out_of_reach * [1.0, 1.0, 0.1][: len(walkers)]), {}
+        for backend in ("numpy", "numba"):
+            with preferring(backend):
+                found[backend] = march(*at, ends)
+        (slow, tries), (fast, others) = found.values()
+        np.testing.assert_array_equal(tries, others)
+        np.testing.assert_allclose(fast.packed(), slow.packed(), rtol=1e-7, atol=1e-9)
+        unsolved.append(slow.unsolved[-1].sum())
+        stopped.append((slow.pose[-1] == slow.pose[-2]).all(-1).tolist())
+    assert any(unsolved) == (effort is not EFFORT) and stopped == [[False, False, True], [False]]
 
 
 def test_steps_that_are_not_solved_are_told(monkeypatch):
@@ -603,10 +640,8 @@ def test_steps_that_are_not_solved_are_told(monkeypatch):
     robot, scene = xplorer(1.0, 2.0), dataclasses.replace(XPLORER, numerics=QUICK)
     (right,) = walk([robot], QUICK, 1)
     assert (right.unsolved, right.off) == (0, 0.0) and 0 < right.residual <= 1e-3 * QUICK.rounding
-    monkeypatch.setattr("rft.walking.march.WIDTHS", np.ones(1))
-    monkeypatch.setattr("rft.walking.march.HALVINGS", 1)
-    for tries in (2, 4):
-        monkeypatch.setattr("rft.walking.march.ITERATIONS", tries)
+    for tries in (2.0, 4.0):
+        monkeypatch.setattr("rft.walking.march.EFFORT", Effort(np.ones((1, 1)), tries, 0.5))
         (found,) = walk([robot], QUICK, 1)
         assert found.unsolved > 0 and found.residual > 0.01
         assert 1e-4 < abs(found.speed - right.speed) < found.off < right.speed / 5

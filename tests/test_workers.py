@@ -1,5 +1,6 @@
 """Work shared by processes and clusters: the same digits whoever computes, nothing lost when a worker is ended."""
 
+import contextlib
 import dataclasses
 import itertools
 import os
@@ -13,20 +14,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts import always_dies, dies, doubled, fails, fails_oddly, notes, waits, who
+from tasks import always_dies, dies, doubled, fails, fails_oddly, notes, waits, who
 from test_cli import geomech
 
-from geomech import connection, kinds, metric, terminal, workers
 from geomech import scene as scenes
-from geomech.errors import Note, SceneError, UnitWarning
+from geomech import terminal
+from geomech.core.errors import Note, SceneError, UnitWarning
+from geomech.geometry import connection, metric
 from geomech.optimise import checked, search
+from geomech.run import executors, jobs
+from geomech.run.jobs import Runner, runner, running
+from geomech.run.workers import using
+from geomech.scene import kinds
 from geomech.study import accuracy, sweep
 from geomech.study.bench import Study
-from geomech.workers import processes
-from rft import backend
-from rft import workers as threaded
-from rft.workers import cores
-from rft.workers import workers as threads
+from rft import threads as threaded
+from rft.balance import backend
+from rft.threads import cores
+from rft.threads import workers as threads
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
@@ -34,22 +39,18 @@ GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 @pytest.fixture(scope="module")
 def two():
     """Two processes, for all tests that leave them alive."""
-    with workers.using(2):
-        yield workers._crew.get()
+    with using(2):
+        yield runner().executor
 
 
 @pytest.fixture
 def given_away(monkeypatch):
     """All work goes to others, however small."""
-    monkeypatch.setattr(workers, "WORTH", 0.0)
+    monkeypatch.setattr(jobs, "WORTH", 0.0)
 
 
-def each(crew, f, common, items, parts=100, **known):
-    token = workers._crew.set(crew)
-    try:
-        return list(workers.each(f, common, items, parts, **{"seconds": 1e9, **known}))
-    finally:
-        workers._crew.reset(token)
+def each(executor, task, common, items, total=100, seconds=1e9):
+    return list(Runner(executor=executor).map(task, common, items, total, seconds))
 
 
 def test_results_come_in_order(two):
@@ -58,23 +59,13 @@ def test_results_come_in_order(two):
 
 
 def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(two):
-    found = each(two, who, None, range(20), back_end="numpy")
+    found = each(two, who, None, range(20))
     assert {x[1:4] for x in found} == {(1, "numpy", None)}
     pids = {x[0] for x in found}
     assert len(pids) == 2 and os.getpid() not in pids
-    assert {x[:4] for x in each(None, who, None, range(2), back_end="numba")} == {(os.getpid(), 1, "numba", None)}
-    assert threads(None, 100) == cores() and backend._settled.get() == ""  # and it is over
-
-
-def test_what_is_settled_leaves_no_trace_in_what_auto_takes(monkeypatch):
-    """Else the digits of what follows in this process would hang on how much of the work others did."""
-    monkeypatch.setattr(backend.AUTO, "worked", 0.0)
-    with backend.settled("numpy"), backend.counted("auto"):
-        sum(range(100_000))
-    assert backend.AUTO.worked == 0.0
-    with backend.counted("auto"):
-        sum(range(100_000))
-    assert backend.AUTO.worked > 0.0
+    with backend.preferring("numba"):
+        assert {x[:4] for x in each(None, who, None, range(2))} == {(os.getpid(), 1, "numba", None)}
+    assert threads(None, 100) == cores() and backend.preferred() == "numpy"  # and it is over
 
 
 def test_what_is_small_is_done_here(two):
@@ -85,18 +76,19 @@ def test_what_is_small_is_done_here(two):
 
 
 def test_what_turns_out_to_take_long_is_given_away(two, monkeypatch):
-    monkeypatch.setattr(workers, "WORTH", 1e-9)
+    monkeypatch.setattr(jobs, "WORTH", 1e-9)
     found = each(two, who, None, range(6), 6, seconds=None)
     assert [x[-1] for x in found] == [*range(6)]
     assert [x[0] == os.getpid() for x in found] == [True, True, False, False, False, False]
 
 
 def test_an_ended_worker_loses_nothing(tmp_path):
-    with workers.using(2):
-        assert each(workers._crew.get(), dies, str(tmp_path), range(8)) == [*range(8)]
-        with pytest.raises(RuntimeError, match="ended 3 times at the same part .signal 9.: out of memory"):
-            each(workers._crew.get(), always_dies, None, [0])
-        assert each(workers._crew.get(), doubled, 2, range(4)) == [0, 2, 4, 6]
+    with using(2):
+        executor = runner().executor
+        assert each(executor, dies, str(tmp_path), range(8)) == [*range(8)]
+        with pytest.raises(RuntimeError, match="ended 3 times at the same part: out of memory"):
+            each(executor, always_dies, None, [0])
+        assert each(executor, doubled, 2, range(4)) == [0, 2, 4, 6]
 
 
 def test_errors_and_notes_come_back_and_what_is_printed_is_no_answer(two):
@@ -127,9 +119,9 @@ def test_a_request_that_is_given_up_ends_its_workers(tmp_path):
 
     start, stopper = time.monotonic(), threading.Thread(target=stop)
     stopper.start()
-    with pytest.raises(terminal.Stopped), terminal.stoppable(), workers.using(2):
-        list(workers.each(waits, str(tmp_path), range(4), 4, seconds=1e9))
-    assert time.monotonic() - start < 50  # of the minute that a part takes
+    with pytest.raises(terminal.Stopped), terminal.stoppable(), using(2):
+        each(runner().executor, waits, str(tmp_path), range(4))
+    assert time.monotonic() - start < 50  # of the minute that a task takes
     for mark in tmp_path.iterdir():
         with pytest.raises(ProcessLookupError):
             os.kill(int(mark.name), 0)
@@ -140,10 +132,11 @@ def test_workers_end_with_whoever_started_them(tmp_path):
     code = f"""if True:
         import sys
         sys.path[:0] = {[str(Path(__file__).parent)]!r}
-        from parts import waits
-        from geomech import workers
-        with workers.using(2):
-            list(workers.each(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
+        from tasks import waits
+        import geomech
+        from geomech.run.jobs import runner
+        with geomech.workers.using(2):
+            list(runner().map(waits, {str(tmp_path)!r}, range(4), 4, seconds=1e9))
     """
     with subprocess.Popen([sys.executable, "-c", code]) as process:
         while len(list(tmp_path.iterdir())) < 2:
@@ -179,13 +172,14 @@ def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, 
 def both(two, ask, shared=True):
     """What a request gives here, and by processes, which have done some of it if it is to be shared."""
     here, sent = ask(), []
-    crew = type("Crew", (), {"remote": False, "has": two.has})()
-    crew.each = lambda order, items: two.each(order, (sent.append(x) or x for x in items))
-    token = workers._crew.set(crew)
-    try:
+
+    class Counted(executors.Processes):
+        def submit(self, task, *arguments):
+            sent.append(task)
+            return two.submit(task, *arguments)
+
+    with running(Runner(executor=Counted(2))):
         there = ask()
-    finally:
-        workers._crew.reset(token)
     assert (len(sent) > 1) == shared
     return here, there
 
@@ -277,14 +271,12 @@ def test_numbers_of_workers_that_make_no_sense_are_refused(word, tmp_path):
 
 
 def test_processes_are_not_started_before_they_are_asked():
-    with workers.using(3):
-        crew = workers._crew.get()
-        assert isinstance(crew, processes.Processes) and [w.process for w in crew.workers] == [None] * 3
+    with using(3):
+        assert isinstance(runner().executor, executors.Processes) and runner().executor.pool is None
 
 
-def test_a_signal_at_any_moment_leaves_no_lock_held(monkeypatch):
-    """One that arrives while parts are given out: threads that would wait for ever for a lock end with the crew."""
-    from geomech.workers import processes
+def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
+    """One that arrives while tasks are given out, or results taken: all ends at once, and others can be begun."""
 
     class Rung(Exception):
         pass
@@ -292,20 +284,19 @@ def test_a_signal_at_any_moment_leaves_no_lock_held(monkeypatch):
     def ring(number, frame):
         raise Rung
 
-    monkeypatch.setattr(processes.Processes, "_done", lambda crew, order, item: item)
-    monkeypatch.setattr(processes, "opened", lambda outcome, told: outcome)
+    monkeypatch.setattr(executors, "SIGNALS", [signal.SIGALRM])
     before = signal.signal(signal.SIGALRM, ring)
     try:
-        for k in range(150):
-            crew = processes.Processes(2)
-            assert list(crew.each(None, range(3)))  # threads are there
-            try:
-                signal.setitimer(signal.ITIMER_REAL, 1e-4 * (1 + k % 40))
-                for _ in crew.each(None, itertools.count()):
-                    pass
-            except Rung:
-                crew.close()
-            assert not any(thread.is_alive() for thread in crew.threads)
+        for k in range(12):
+            with contextlib.suppress(Rung), using(2):
+                executor = runner().executor
+                assert each(executor, doubled, 2, range(3)) == [0, 2, 4]
+                pool = executor.pool
+                signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 7 * k % 50))
+                each(executor, doubled, 2, itertools.count(), 10**9)
+            begun = time.monotonic()
+            pool._executor_manager_thread and pool._executor_manager_thread.join(5.0)
+            assert executor.pool is None and time.monotonic() - begun < 5.0
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 import geomech
 import rft
-from geomech import connection, curvature, family, harmonics, reconstruct, symbolic
+from geomech import connection, curvature, reconstruct, symbolic
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
+from geomech.geometry import family, harmonics
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
 from geomech.study import accuracy, cost, undulation
@@ -112,7 +113,7 @@ def mechanics() -> list[Any]:
     own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Cart().run(*Circle().cycle(8)).net
     media = (
         rft.CATALOGUE["coulomb"].medium.traction(1.0, 0.5),
-        rft.Viscous(2.0).derivatives(1.0, 2.0),
+        rft.Viscous(2.0).slopes(1.0, 2.0, 0.0),
         geomech.media.LAWS,
     )
     return [

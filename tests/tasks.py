@@ -6,10 +6,10 @@ import time
 import warnings
 from pathlib import Path
 
-from geomech import workers
-from geomech.errors import SceneError, UnitWarning
-from rft import backend
-from rft.workers import workers as threads
+from geomech.core.errors import SceneError, UnitWarning
+from geomech.run.jobs import runner
+from rft.balance import backend
+from rft.threads import workers as threads
 
 
 def doubled(by, x):
@@ -18,7 +18,7 @@ def doubled(by, x):
 
 def who(_, x):
     """What a worker is, and what it may take."""
-    return os.getpid(), threads(None, 100), backend._settled.get(), workers._crew.get(), x
+    return os.getpid(), threads(None, 100), backend._preferred.get(), runner().executor, x
 
 
 def dies(folder, x):
