@@ -431,11 +431,11 @@ def test_pictures_show_the_stress_on_the_mesh():
     step = np.linalg.norm(found.force, axis=-1).argmax()
     faces, above = scene.faces(found, step)
     solid = next(ax for ax in fig.axes if ax.name == "3d")
-    assert len(solid.collections[0].get_facecolor()) <= len(faces.of) + len(above)
+    assert len(solid.collections[0].get_facecolor()) <= len(faces.triangle) + len(above)
     p = [x[step] for x in found.passage]
     wanted = bearing(scene.medium, scene.mesh, p[2], p[1], p[3], p[4], scene.effects)
     np.testing.assert_array_equal(faces.force, wanted.force)
-    assert above[..., 2].min() >= -1e-12 and faces.corners[..., 2].max() <= 1e-12 and len(above) and len(faces.of)
+    assert above[..., 2].min() >= -1e-12 and faces.corners[..., 2].max() <= 1e-12 and len(above) and len(faces.triangle)
     areas = lambda t: np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=-1).sum() / 2
     assert areas(faces.corners) + areas(above) == pytest.approx(scene.mesh.areas.sum())
     lines = [line for ax in fig.axes for line in ax.lines if len(line.get_xdata()) == len(found.t)]
@@ -450,7 +450,7 @@ def test_a_body_in_the_air_is_drawn_without_stress(tmp_path):
     fig = plots.intrusion_figure(scene, found)
     plots.save(fig, tmp_path / "a.png")
     faces, above = scene.faces(found, 0)
-    assert len(faces.of) == 0 and len(above) == scene.count
+    assert len(faces.triangle) == 0 and len(above) == scene.count
 
 
 def test_figure_of_meshes(tmp_path):

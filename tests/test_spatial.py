@@ -314,12 +314,12 @@ SIDES = np.array([
         (CUBE, SIDES[:0], "1 to"),
         (CUBE, SIDES.astype(float), "whole numbers"),
         ("mesh", SIDES, "real numbers"),
-        (CUBE, SIDES, "bends must be unit normals"),
+        (CUBE, SIDES, "smooth_normals must be unit normals"),
     ],
 )
 def test_bad_meshes_are_refused(vertices, faces, said):
     with pytest.raises(ValueError, match=said) as told:
-        Mesh(vertices, faces, bends=np.zeros((3, 3)) if said.startswith("bends") else None)
+        Mesh(vertices, faces, smooth_normals=np.zeros((3, 3)) if said.startswith("smooth_normals") else None)
     assert "\n" not in str(told.value)
 
 
@@ -433,16 +433,18 @@ def test_smooth_meshes_have_the_normals_of_their_surface():
     side = np.abs(mesh.normals[:, 1]) < 0.5
     outwards = mesh.middles[side] * [1, 0, 1]
     outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
-    assert np.abs(mesh.facing[side] - outwards).max() < 1e-4 < 0.02 < np.abs(mesh.normals[side] - outwards).max()
-    np.testing.assert_allclose(mesh.facing[~side], mesh.normals[~side], atol=1e-15)
+    assert (
+        np.abs(mesh.middle_normals[side] - outwards).max() < 1e-4 < 0.02 < np.abs(mesh.normals[side] - outwards).max()
+    )
+    np.testing.assert_allclose(mesh.middle_normals[~side], mesh.normals[~side], atol=1e-15)
     for ball, off in ((Sphere(0.02).mesh(300), 1e-15), (smooth(shapes.sphere(0.02, 2)), 4e-3)):
         radial = ball.middles / np.linalg.norm(ball.middles, axis=-1, keepdims=True)
-        assert np.abs(ball.facing - radial).max() < off < np.abs(ball.normals - radial).max()
+        assert np.abs(ball.middle_normals - radial).max() < off < np.abs(ball.normals - radial).max()
     finer = quartered(mesh)
-    middle = finer.facing[3 * len(mesh.faces) :]  # of the triangle in the middle of each
-    assert np.abs(middle - mesh.facing).max() < 5e-3
+    middle = finer.middle_normals[3 * len(mesh.faces) :]  # of the triangle in the middle of each
+    assert np.abs(middle - mesh.middle_normals).max() < 5e-3
     both = smooth(Mesh(mesh.vertices, mesh.faces[side], closed=False)).two_sided
-    np.testing.assert_allclose(both.facing[side.sum() :], -both.facing[: side.sum()], atol=1e-15)
+    np.testing.assert_allclose(both.middle_normals[side.sum() :], -both.middle_normals[: side.sum()], atol=1e-15)
 
 
 def test_a_round_body_that_turns_about_its_axis_bears_nothing_across():

@@ -148,7 +148,7 @@ def test_a_survey_finds_what_drives_a_motion_on():
     face = np.sign(np.sin(beta + gamma).round(12))
     pulled = (-np.sin(beta) * a_x - np.cos(beta) * a_z) * face > 0
     assert bad.pulling == pytest.approx(pulled.mean(), abs=1e-12)
-    assert f"drives motion on over {100 * (power > 0).mean():.1f} % of the plane, most at beta = " in bad.told()
+    assert f"drives motion on over {100 * (power > 0).mean():.1f} % of the plane, most at beta = " in bad.description()
 
 
 # Lift over drag at one depth: DESIGN section 9, with and without the cut.
@@ -212,8 +212,8 @@ def test_a_turning_plate_against_adaptive_quadrature():
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_the_mirrored_scene_has_the_mirrored_force(shape):
     outline = OUTLINES[shape].outline(60)
-    bends = None if outline.bends is None else outline.bends[::-1, ::-1] * [-1, 1]
-    mirrored = Outline(outline.points[::-1] * [-1, 1], outline.width, bends)
+    normals = None if outline.smooth_normals is None else outline.smooth_normals[::-1, ::-1] * [-1, 1]
+    mirrored = Outline(outline.points[::-1] * [-1, 1], outline.width, normals)
     pose, twist = random_motions(200, 3)
     for stress in (M0, STRESSES["jumping"]):
         there, here = (
@@ -348,7 +348,7 @@ def test_a_face_at_grazing_incidence_is_rounded_over_the_angle():
 def _under(stress, rod, gamma):
     """Upward force on the faces that look down."""
     at = contact.Motion(0.0, -0.3, 1.0, 0.0, np.cos(gamma), -np.sin(gamma), 0.0)
-    ground = Ground(sine=np.sin(stress.grazing))
+    ground = Ground(grazing_sine=np.sin(stress.grazing))
     force = contact.load(contact.record(stress), ground, contact.elements(rod), at, 1.0, True, False)
     return float(force.z[rod.normals[:, 1] < -0.5].sum())
 

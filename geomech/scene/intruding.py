@@ -11,7 +11,7 @@ import numpy as np
 from geomech.core.errors import SceneError, choose, named, short
 from geomech.scene.parts import build_kind
 from geomech.systems.said import said
-from rft.ground import KINDS, GroundEffect, checked, weight
+from rft.ground import KINDS, GroundEffect, checked_effects, weight
 from rft.premise import not_so
 
 TABLES = ("medium", "intruder", "motion", "numerics", "effects")
@@ -35,7 +35,7 @@ class Intruding:
                 raise ValueError(f"{what} must be {such}, got {short(getattr(self, what))}")
         if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
             raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
-        object.__setattr__(self, "effects", checked(self.effects))
+        object.__setattr__(self, "effects", checked_effects(self.effects))
 
     @property
     def count(self) -> int:
@@ -98,7 +98,7 @@ def checked_tables(tables: Mapping, name: str) -> dict:
         raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
     made = tuple(build_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
     with named(f"{name}: [[effects]]"):
-        return {"numerics": dict(tables.get("numerics", {})), "effects": checked(made)}
+        return {"numerics": dict(tables.get("numerics", {})), "effects": checked_effects(made)}
 
 
 def of_effects(effects) -> list[str]:

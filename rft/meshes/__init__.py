@@ -1,4 +1,4 @@
-"""Forces of grains on bodies of any form in three dimensions: law, triangle meshes, their motion."""
+"""Forces of grains on bodies of any form in three dimensions: the law, triangle meshes, and their motions."""
 
 from rft.meshes.intrusion import Faces, Wrench, bearing, wrench
 from rft.meshes.law import Spatial

@@ -1,4 +1,4 @@
-"""The vertical plane (terradynamics): stress maps, outlines, motions, and the force of the grains on what moves."""
+"""The vertical plane (terradynamics): stress maps, outlines, motions, and the force of the grains on moving outlines."""
 
 from rft.plates.catalogue import VERTICAL, VerticalEntry
 from rft.plates.contact import Part

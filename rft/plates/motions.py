@@ -1,4 +1,4 @@
-"""Prescribed motions in the vertical plane, one class a kind: poses and twists in time. SI units; signs are those of
+"""Prescribed motions in the vertical plane, one class a kind: poses and twists in time. SI units; signs as in
 `rft.plates.loads`."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle at one end of the motio
 
 
 class Course(NamedTuple):
-    """A motion: times (T,), poses (T, 3) as (x, z, angle), twists (T, 3) as (v_x, v_z, rate)."""
+    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate)."""
 
     t: np.ndarray
     pose: np.ndarray
@@ -133,8 +133,9 @@ MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
 
 
 def _straight(motion, x: float, z: float, distance: float) -> Course:
-    way = np.array([math.cos(motion.direction), -math.sin(motion.direction), 0.0])
-    way[np.abs(way) < 1e-15] = 0.0  # straight down, or level, to the last digit
+    """Return a motion along a straight line of a length, m, from (x, z)."""
+    along = np.array([math.cos(motion.direction), -math.sin(motion.direction), 0.0])
+    along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     s = np.linspace(0.0, distance, motion.samples)
-    pose = np.array([x, z, motion.attitude]) + s[:, None] * way
-    return Course(s / motion.speed, pose, np.broadcast_to(motion.speed * way, pose.shape))
+    pose = np.array([x, z, motion.attitude]) + s[:, None] * along
+    return Course(s / motion.speed, pose, np.broadcast_to(motion.speed * along, pose.shape))

@@ -104,12 +104,12 @@ class Elements:
     @cached_property
     def table(self) -> tuple[np.ndarray, np.ndarray]:
         """The elements in rows of eight (R, 9, 8), and the first and last row (B, P, 2) of every part."""
-        from rft.plates.compiled import rows
+        from rft.plates.compiled import rows_of_eight
 
         tables, begins, first = [], {}, 0
         for one in self.outlines:
             if id(one) not in begins:
-                tables.append(rows(one.elements))
+                tables.append(rows_of_eight(one.elements))
                 robots, length = tables[-1].shape[:2]
                 begin = first + length * np.broadcast_to(np.arange(robots), len(self.span))
                 begins[id(one)], first = np.stack([begin, begin + length], -1), first + robots * length
@@ -129,10 +129,10 @@ class Elements:
             return out
         part = self.part[element]
         e = Element(*(x[rows[sample] if more else 0, element] for x in own))
-        at, side, sine = Motion(*motions[:, :, sample, part]), self.side[part], ground.sine
+        at, side, sine = Motion(*motions[:, :, sample, part]), self.side[part], ground.grazing_sine
         under = Ground(
             ground.strength[sample], ground.flux[sample], ground.rounding[sample],
-            self.closed[part] * (sine[sample] if np.ndim(sine) else sine), ground.fall, ground.disturbed,
+            self.closed[part] * (sine[sample] if np.ndim(sine) else sine), ground.downhill_loss, ground.disturbed,
         )  # fmt: skip
         force = np.array(load(self.law, under, e, at, side, bool(side.any()), True))
         place = sample * motions.shape[3] + part

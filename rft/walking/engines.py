@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol
 
 from rft.checks import Number, check_numbers, require, shown
-from rft.ground import Ground, GroundEffect, checked, ground_of
+from rft.ground import Ground, GroundEffect, checked_effects, ground_of
 from rft.meshes.law import Spatial
 from rft.plates.stress import PlateStress
 from rft.walking.robot import SMALLEST, Robot, Tripod
@@ -29,7 +29,7 @@ class Walker:
         for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress | Spatial)):
             value, such = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
             require(isinstance(value, kind), f"{name} must be a {such}, got {shown(value)}")
-        object.__setattr__(self, "effects", checked(self.effects))
+        object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
             require(effect.walks, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
 

@@ -43,7 +43,7 @@ class Grains:
     @property
     def ground(self) -> Ground:
         """Under every face."""
-        return Ground(self.strength, self.flux, self.rounding, self.law.sine)
+        return Ground(self.strength, self.flux, self.rounding, self.law.grazing_sine)
 
 
 class Surface(NamedTuple):
@@ -61,7 +61,7 @@ class Surface(NamedTuple):
     def of_mesh(cls, body: int, mesh: Mesh, rotation=None, place=(0.0, 0.0, 0.0)) -> Surface:
         """A mesh whose frame is turned (3, 3) and moved (3,) in that of the body; an open one is a sheet."""
         turn = np.eye(3) if rotation is None else np.asarray(rotation, float).reshape(3, 3)
-        return cls(body, mesh.vertices[mesh.faces] @ turn.T + place, mesh.facing @ turn.T, not mesh.closed)
+        return cls(body, mesh.vertices[mesh.faces] @ turn.T + place, mesh.middle_normals @ turn.T, not mesh.closed)
 
     @classmethod
     def of_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0), side: int = 0) -> Surface:

@@ -84,7 +84,7 @@ class Robots:
     def ground_under(self, which, width=1.0) -> Ground:
         """The ground of these robots, (B,), its rounding times a width, and its grazing angle by the root of that."""
         g = self.ground
-        wide = {"rounding": g.rounding[which] * width, "sine": g.sine * np.sqrt(width)}
+        wide = {"rounding": g.rounding[which] * width, "grazing_sine": g.grazing_sine * np.sqrt(width)}
         return g._replace(strength=g.strength[which], flux=g.flux[which], **wide)
 
     def energy(self, state: State, which=slice(None)) -> np.ndarray:

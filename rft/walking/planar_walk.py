@@ -51,7 +51,7 @@ def _alike(walkers: Sequence[Walker], numerics: Fineness) -> list[list[int]]:
     groups: dict = {}
     for k, w in enumerate(walkers):
         outlines = [o for o in (w.robot.leg(numerics.elements), w.robot.belly(numerics.elements)) if o is not None]
-        shapes = tuple((o.elements, o.closed, o.bends is None) for o in outlines)
+        shapes = tuple((o.elements, o.closed, o.smooth_normals is None) for o in outlines)
         key = repr((type(w.robot), len(w.robot.hips), shapes, replace(w.stress, zeta=1.0), w.gait.kinks))
         groups.setdefault(key, []).append(k)
     return list(groups.values())

@@ -112,7 +112,9 @@ class Robot:
     def leg(self, elements: int) -> Outline:
         """The outline of a leg about its hip."""
         outline = self.legs.outline(elements)
-        return Outline(outline.points - [0.0, self.axle], outline.width, outline.bends) if self.axle else outline
+        return (
+            Outline(outline.points - [0.0, self.axle], outline.width, outline.smooth_normals) if self.axle else outline
+        )
 
     def belly(self, elements: int) -> Outline | None:
         """The outline of the body, if it can touch the ground."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from rft.checks import in_range, real_array, require, shown
 from rft.meshes import Screw, Spatial, wrench
-from rft.meshes.motions import _turned
+from rft.meshes.motions import rotations
 from rft.walking.craft import Screws
 from rft.walking.planar import GRAVITY
 
@@ -79,7 +79,7 @@ def freely(medium: Spatial, screw: Screw, height: float, triangles: int = TRIANG
 
 
 def _turns(angles: int) -> np.ndarray:
-    return _turned(np.outer(2 * np.pi * np.arange(angles) / angles, [1.0, 0.0, 0.0])).as_matrix()
+    return rotations(np.outer(2 * np.pi * np.arange(angles) / angles, [1.0, 0.0, 0.0])).as_matrix()
 
 
 class Cruise(NamedTuple):
@@ -145,7 +145,7 @@ class _Steady:
     def sums(self, q) -> tuple[np.ndarray, np.ndarray]:
         """Of the grains, in the mean over a turn: force and moment about the centre of mass (6,); the motors' torques (2,)."""
         height, roll, pitch, *velocity, yaw_rate = q * self.units
-        body = _turned([0.0, pitch, 0.0]).as_matrix() @ _turned([roll, 0.0, 0.0]).as_matrix()
+        body = rotations([0.0, pitch, 0.0]).as_matrix() @ rotations([roll, 0.0, 0.0]).as_matrix()
         velocity, spin, torques = np.array([*velocity, 0.0]), np.array([0.0, 0.0, yaw_rate]), []
         found = wrench(self.medium, self.hull, body, [0.0, 0.0, height], velocity, spin)
         total = np.concatenate([found.force, found.moment])
