@@ -234,7 +234,9 @@ def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
     alongside = lambda alpha: np.real((alpha[..., 0] + 1j * alpha[..., 1]) ** wave)[..., None, None]
     A = lambda alpha: 0.2 + 0.1 * alongside(alpha) * np.array([[1.0, 0.4], [0.3, -0.7], [0.5, 0.2]])
     velocity = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
-    made = synthetic.made(velocity, gaits.Circle(amplitude=1.0), cycles=30, samples=60, noise=1e-3, pose_noise=1e-3, seed=2)
+    made = synthetic.made(
+        velocity, gaits.Circle(amplitude=1.0), cycles=30, samples=60, noise=1e-3, pose_noise=1e-3, seed=2
+    )
     assert measured.fit_log(log_of(made)).known.A.shape[-1] == 2 * kept + 1
 
 
