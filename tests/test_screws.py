@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
-from rft.walking.screws import cruise, freely, turning
+from rft.walking.screws import cruise, free_turning, turning
 
 SAND = Spatial(3e5, 0.3)
 SCREW = Screw(0.03, 0.018, 0.05, 0.13, 0.006, 0.02)
@@ -135,10 +135,10 @@ def test_thrust_grows_with_slip_and_no_more_is_done_than_the_motor_gives():
 
 
 def test_a_screw_runs_freely_where_it_pulls_nothing():
-    free = freely(SAND, SCREW, -0.005, **COARSE)
+    free = free_turning(SAND, SCREW, -0.005, **COARSE)
     assert abs(free.thrust) < 1e-3 and 0.02 < free.slip < 0.5
     assert turning(SAND, SCREW, -0.005, free.slip + 0.01, **COARSE).thrust > 1e-3
-    assert np.isnan(freely(SAND, SCREW, 0.05, **COARSE).slip)  # out of the ground
+    assert np.isnan(free_turning(SAND, SCREW, 0.05, **COARSE).slip)  # out of the ground
 
 
 def test_limits_of_the_blade():

@@ -30,7 +30,7 @@ def directions(count):
     ],
 )
 def test_alpha_at_plain_angles(angles, expected):
-    assert law.of_angles(*np.radians(angles)) == pytest.approx(expected, abs=5e-4)
+    assert law.alpha_of_angles(*np.radians(angles)) == pytest.approx(expected, abs=5e-4)
 
 
 def test_alpha_is_the_published_sum_of_terms():
@@ -48,12 +48,12 @@ def test_alpha_is_the_published_sum_of_terms():
         f1 * np.sin(beta) * np.sin(psi),
         -f1 * np.cos(beta) - f2 * np.sin(gamma) - f3,
     ], -1)  # fmt: skip
-    assert law.of_angles(beta, gamma, psi) == pytest.approx(expected, abs=1e-14)
+    assert law.alpha_of_angles(beta, gamma, psi) == pytest.approx(expected, abs=1e-14)
 
 
 def test_no_twist_where_the_normal_lies_in_the_plane_of_motion():
     beta, gamma = np.meshgrid(np.linspace(-1.57, 1.57, 41), np.linspace(-1.57, 1.57, 41))
-    assert np.abs(law.of_angles(beta, gamma, 0.0)[..., 1]).max() == 0.0
+    assert np.abs(law.alpha_of_angles(beta, gamma, 0.0)[..., 1]).max() == 0.0
 
 
 @pytest.mark.parametrize("tension", law.TENSION)
@@ -139,8 +139,8 @@ def test_where_the_law_drives_it_says_so():
 
 
 def test_strength_from_density_and_friction():
-    assert Spatial.of_grains(3000.0, 0.4).xi_n == pytest.approx(3000 * 9.81 * (894 * 0.064 - 386 * 0.16 + 89 * 0.4))
-    assert Spatial.of_grains(1500.0, 0.7, tension="keep").tension == "keep"
+    assert Spatial.from_grains(3000.0, 0.4).xi_n == pytest.approx(3000 * 9.81 * (894 * 0.064 - 386 * 0.16 + 89 * 0.4))
+    assert Spatial.from_grains(1500.0, 0.7, tension="keep").tension == "keep"
 
 
 def random_pose():
@@ -374,7 +374,7 @@ def test_motions_that_make_no_sense_are_refused(wrong, said):
         (lambda: Spatial(-1.0), "xi_n"),
         (lambda: Spatial(1e6, tension="pull"), "tension"),
         (lambda: Spatial(1e6, surface_friction=-0.1), "surface_friction"),
-        (lambda: Spatial.of_grains(3000, 30.0), "friction"),
+        (lambda: Spatial.from_grains(3000, 30.0), "friction"),
         (lambda: shapes.sphere(0.0), "radius"),
         (lambda: shapes.sphere(1.0, 9), "fineness"),
         (lambda: shapes.screw(0.01, 0.02, 0.05, 0.1), "core"),
@@ -396,7 +396,7 @@ def test_the_trend_is_that_of_the_map_of_two_dimensions(name):
     beta, gamma = np.meshgrid(line, line, indexing="ij")
     stress = VERTICAL[name].stress
     two = np.stack(stress(beta, gamma)) / stress(0.0, np.pi / 2)[1]
-    three = law.of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
+    three = law.alpha_of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
     for flat, solid, least in zip(two, (-three[..., 0], three[..., 2]), (0.79, 0.9)):
         assert np.corrcoef(flat.ravel(), solid.ravel())[0, 1] > least
     apart = three[..., 2] - two[1]

@@ -393,11 +393,11 @@ def test_legs_of_any_curvature_have_the_same_projected_length_and_a_smooth_famil
 
 def test_a_leg_that_turns_forwards_drives_forwards():
     leg, loose = CLeg(0.038, 0.025).outline(), VERTICAL["poppy-seeds-loose"].stress
-    _, pose, twist = Rotate(hub_height=0.02).course(leg)
+    _, pose, twist = Rotate(hub_height=0.02).trajectory(leg)
     found = loads(loose, leg, pose, twist)
     assert found.force[:, 0].max() > 4 and found.force[:, 1].max() > 8
     assert found.moment.min() < -0.4 and found.moment.max() == 0  # against the rotation
-    other = Rotate(hub_height=0.02, rate=-2 * np.pi, start=np.pi, stop=-np.pi).course(leg)
+    other = Rotate(hub_height=0.02, rate=-2 * np.pi, start=np.pi, stop=-np.pi).trajectory(leg)
     assert loads(loose, leg, other.pose, other.twist).force[:, 0].min() < -2
 
 
@@ -410,17 +410,17 @@ def test_courses_have_the_velocities_of_their_poses():
         Rotate(hub_height=0.02, rate=-3.0, start=1.0, stop=-2.0, speed=0.1), Path(t, np.sin(t), np.cos(2 * t), t**2),
     ]  # fmt: skip
     for motion in motions:
-        t, pose, twist = motion.course(leg)
+        t, pose, twist = motion.trajectory(leg)
         np.testing.assert_allclose(np.gradient(pose, t, axis=0, edge_order=2), twist, atol=1e-9)
-    assert Drag(depth=0.03).course(leg).pose[0].tolist() == [0.0, -0.03, 0.0]
-    np.testing.assert_allclose(motions[3].course(leg).twist[2000], (np.cos(1.0), -2 * np.sin(2.0), 2.0), atol=1e-5)
+    assert Drag(depth=0.03).trajectory(leg).pose[0].tolist() == [0.0, -0.03, 0.0]
+    np.testing.assert_allclose(motions[3].trajectory(leg).twist[2000], (np.cos(1.0), -2 * np.sin(2.0), 2.0), atol=1e-5)
 
 
 def test_penetration_begins_at_the_surface_and_ends_at_its_depth():
     for name in ("half-cylinder", "c-leg", "wheel, lugs"):
         outline = OUTLINES[name].outline(300)
         motion = Penetrate(depth=0.04, attitude=0.7, direction=1.1)
-        pose = motion.course(outline).pose
+        pose = motion.trajectory(outline).pose
         lowest = lambda p: (p[1] + outline.points[:, 1] * np.cos(p[2]) - outline.points[:, 0] * np.sin(p[2])).min()
         assert lowest(pose[0]) == pytest.approx(0.0, abs=1e-15)
         assert lowest(pose[-1]) == pytest.approx(-0.04, abs=1e-15)

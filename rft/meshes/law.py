@@ -85,7 +85,7 @@ class Spatial:
     tension (-): stress on faces on which the fit pulls: "cut" (none), "keep" (as fitted), or "push" (its component across
     the face reversed, as public codes do).
 
-    `Spatial.of_grains` computes xi_n from density and friction. The law jumps where a face begins to lead; rounded over the
+    `Spatial.from_grains` computes xi_n from density and friction. The law jumps where a face begins to lead; rounded over the
     grazing angle, faces along which the body slides bear nothing by roundoff, and forces converge with the mesh. The law
     holds for slow motion in undisturbed ground. As fitted it pulls in 5 % of all directions of faces that lead. It
     dissipates but for two regions of faces that look up. A face within 10 degrees of level that is drawn out forwards, up to
@@ -119,7 +119,7 @@ class Spatial:
         require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {shown(self.tension)}")
 
     @classmethod
-    def of_grains(cls, density: float, friction: float, **more) -> Spatial:
+    def from_grains(cls, density: float, friction: float, **more) -> Spatial:
         """Return the medium of grains with a critical density, kg/m^3, and an internal friction mu, the tangent of the
         angle of repose, 0.05 to 1.5: xi_n = density g (894 mu^3 - 386 mu^2 + 89 mu), the fit of Agarwal et al. (2023)."""
         in_range("density", density, 1, 1e5, unit="kg/m^3")
@@ -169,7 +169,7 @@ class Spatial:
         return across * n + np.minimum(1.0, most / np.where(size > 0, size, 1.0)) * along
 
 
-def of_angles(beta, gamma, psi) -> np.ndarray:
+def alpha_of_angles(beta, gamma, psi) -> np.ndarray:
     """Return alpha (..., 3) along r, theta, z of a plate tilted by beta that moves gamma below the horizontal, with its
     normal at the angle psi from that direction about the vertical; rad."""
     beta, gamma, psi = np.broadcast_arrays(*(np.asarray(x, float) for x in (beta, gamma, psi)))

@@ -27,7 +27,7 @@ Heading = Annotated[float, Number(-10, 10, "rad", "heading of the motion along t
 Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle about the axis, from the attitude, at one end of the motion")]
 
 
-class Passage(NamedTuple):
+class Trajectory(NamedTuple):
     """A motion in time, in the world. t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3). velocity: (T, 3), of
     the origin, m/s. spin: (T, 3), angular velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else
     0."""
@@ -60,7 +60,7 @@ class Drag(Motion):
         check_numbers(self)
         _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         return _straight(self, -self.depth, self.distance)
 
 
@@ -84,7 +84,7 @@ class Penetrate(Motion):
         self.require_downwards()
         _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         lowest = float((mesh.vertices @ _matrix(self.attitude)[2]).min())
         return _straight(self, -lowest, self.depth / math.sin(self.direction))
 
@@ -121,14 +121,14 @@ class Rotate(Motion):
         object.__setattr__(self, "axis", tuple(axis.tolist()))
         _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         rotation = rotations(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
         velocity = np.broadcast_to(self.speed * _unit_vector(self.heading, 0.0), rotation.shape[:2])
         place = velocity * t[:, None] + [0.0, 0.0, self.hub_height]
-        return Passage(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
+        return Trajectory(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ class Path(Motion):
         require(same and all_or_none, "t, x, y, z and rx, ry, rz must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
         require(not late.size, f"t must ascend, but t = {self.t[late[0]] if late.size else 0:g} is not before the next")
-        turns = self._rotations()
-        wide = np.flatnonzero((turns[1:] * turns[:-1].inv()).magnitude() >= WIDEST)
+        rotation = self._rotations()
+        wide = np.flatnonzero((rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST)
         after = f"after t = {self.t[wide[0]] if wide.size else 0:g}"
         require(not wide.size, f"the body turns by {WIDEST:g} rad or more {after}: give poses between")
 
@@ -174,10 +174,10 @@ class Path(Motion):
         """Return the rotations (T,) of the poses."""
         return rotations(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
 
-    def passage(self, mesh: Mesh) -> Passage:
-        t, place, turns = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
+    def trajectory(self, mesh: Mesh) -> Trajectory:
+        t, place, rotation = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
         velocity = np.gradient(place, t, axis=0, edge_order=2)
-        return Passage(t, place, turns.as_matrix(), velocity, _spins(t, turns), np.zeros_like(t))
+        return Trajectory(t, place, rotation.as_matrix(), velocity, _spins(t, rotation), np.zeros_like(t))
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
@@ -190,14 +190,14 @@ def rotations(vectors) -> Rotation:
     return Rotation.from_rotvec(vectors)
 
 
-def _spins(t, turns: Rotation) -> np.ndarray:
+def _spins(t, rotation: Rotation) -> np.ndarray:
     """Return the angular velocities (T, 3), rad/s in the world, of rotations at times t (T,).
 
     At each time it is the slope of the parabola through three rotation vectors: from this rotation to itself and to its
     neighbours."""
     three = np.clip(np.arange(len(t)) - 1, 0, len(t) - 3)[:, None] + np.arange(3)
-    inverse = turns.inv()
-    vectors = np.stack([(turns[k] * inverse).as_rotvec() for k in three.T], 1)
+    inverse = rotation.inv()
+    vectors = np.stack([(rotation[k] * inverse).as_rotvec() for k in three.T], 1)
     spins = 0.0
     for k in range(3):
         i, j = (three[:, m] for m in range(3) if m != k)
@@ -230,11 +230,11 @@ def _unit_vector(heading: float, direction: float) -> np.ndarray:
     return along
 
 
-def _straight(motion, z: float, distance: float) -> Passage:
+def _straight(motion, z: float, distance: float) -> Trajectory:
     """Return a motion along a straight line of a length, m, from (0, 0, z)."""
     along = _unit_vector(motion.heading, motion.direction)
     s = np.linspace(0.0, distance, motion.samples)
     place = np.array([0.0, 0.0, z]) + s[:, None] * along
     rotation = np.broadcast_to(_matrix(motion.attitude), (len(s), 3, 3))
     velocity = np.broadcast_to(motion.speed * along, place.shape)
-    return Passage(s / motion.speed, place, rotation, velocity, np.zeros_like(place), np.zeros_like(s))
+    return Trajectory(s / motion.speed, place, rotation, velocity, np.zeros_like(place), np.zeros_like(s))
