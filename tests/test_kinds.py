@@ -20,8 +20,9 @@ from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
-from geomech.scene.keys import schema, text
+from geomech.scene.keys import text
 from geomech.scene.kinds import FAMILIES, load_file, register
+from geomech.scene.schema import schema
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.systems import Plain, Premise, Solver, Swimmer
