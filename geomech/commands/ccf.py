@@ -20,6 +20,7 @@ from geomech.commands.options import (
     with_workers,
 )
 from geomech.core.errors import SceneError, choose
+from geomech.systems.base import shape_labels
 
 
 @with_workers
@@ -68,11 +69,11 @@ def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | No
     from geomech.output import plots
 
     system, told = study.scene.system, {"gaits": [study.scene.gait]}
-    told |= {"error": study.curvature_error, "labels": system.shape_labels}
+    told |= {"error": study.curvature_error, "labels": shape_labels(system)}
     if stretch:
         from geomech.geometry.stretch import stretch as redrawn
 
-        plane, effort = redrawn(study.metric), "BL" if system.power_degree == 1 else "path length"
+        plane, effort = redrawn(study.metric), "BL" if system.traits.power_degree == 1 else "path length"
         return plots.stretched_figure(study.curvature, plane, **told, effort=effort)
     told |= {"style": style or "map", "metric": study.metric if metric else None}
     if beside is not None:
@@ -87,7 +88,7 @@ def _slices(scene, style: str, asked: tuple, beside: str | None, yes: bool):
     from geomech.study.bench import Study
 
     study, system = Study(scene), scene.system
-    found, told = planes(study, *asked, yes), {"labels": system.shape_labels, "style": style}
+    found, told = planes(study, *asked, yes), {"labels": shape_labels(system), "style": style}
     if beside is not None:
         if len(found) > 1:
             raise SceneError("--beside draws one pair of joints: say which with --pair")

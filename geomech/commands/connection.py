@@ -22,6 +22,7 @@ from geomech.commands.options import (
     with_workers,
 )
 from geomech.core.errors import SceneError, choose
+from geomech.systems.base import shape_labels
 
 
 @with_workers
@@ -74,7 +75,7 @@ def connection(
             if not sign:
                 note(f"{out} has {SIGNS['+']}; --sign - gives the other")
         if plot:
-            told = {"labels": study.scene.system.shape_labels, "style": style or "quiver"}
+            told = {"labels": shape_labels(study.scene.system), "style": style or "quiver"}
             if sliced:
                 plots.save(plots.plane_connection_figure(found, **told), plot)
                 return

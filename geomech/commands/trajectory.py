@@ -10,6 +10,7 @@ import typer
 from geomech import terminal
 from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
+from geomech.systems.base import length_unit
 
 
 def trajectory(
@@ -31,6 +32,6 @@ def trajectory(
         with storing(scene, out, command="trajectory", cycles=cycles):
             found = motion.motion(scene, cycles)
             trajectories.save(out, found, bar)
-    (x, y, theta), unit = found.pose[-1], scene.system.unit
+    (x, y, theta), unit = found.pose[-1], length_unit(scene.system)
     ends = f"after {cycles} cycle{'s' * (cycles > 1)} x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad"
     print(f"{ends}; {len(found.phase)} rows of {len(found.columns)} columns in {out}")

@@ -11,6 +11,7 @@ import typer
 from geomech.commands.asked import scene_with_gait
 from geomech.commands.options import JsonOption, SceneArgument, numbers
 from geomech.core.errors import Note, named
+from geomech.systems.base import length_unit
 
 
 def velocity(
@@ -25,7 +26,7 @@ def velocity(
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
     with named(scene.name):
         out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
-    unit = scene.system.unit
+    unit = length_unit(scene.system)
     if as_json:
         told = {k: v for k, v in out.items() if k != "iterations"}
         print(json.dumps({**told, "units": {"xi": [unit, unit, "rad"]}}))

@@ -25,6 +25,7 @@ from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
 from geomech.study.offer import METHODS, lookups, methods, tiers
 from geomech.study.results import Displacements
+from geomech.systems.base import shape_labels
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import TIERS
 from geomech.tiers.base import in_groups
@@ -161,7 +162,7 @@ class Study(Faced):
         system = self.scene.system
         if system.stored("connection"):
             return system.stored("even part")
-        make = lambda: even_part(system.velocity, self.fitted.axes, system.singularity)
+        make = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
         return self._kept("even part", ("grid", "extent"), (), make)[0]
 
     @property
@@ -196,13 +197,13 @@ class Study(Faced):
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in system.shape_labels])[:, 0]
+        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
         in_groups(shapes, every, system.at_once(n.phases))
 
     def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
         system, n = self.scene.system, self.scene.numerics
-        if system.singularity is not None:
+        if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if reach := tier.reach(gait, a):
                 a = np.outer([x for x in reach[1:] if x], np.arange(1, n.curves + 1) / n.curves).ravel()

@@ -77,7 +77,7 @@ class Area(Path):
 
     def along(self, system, numerics, count, phases) -> int:
         shapes = 2 * phases + (2 + TIPS) * RADII * AROUND  # for the displacement, and once more with its spread
-        return count * shapes * (system.joints if system.linear else self.directions(system, numerics))
+        return count * shapes * (system.joints if system.traits.linear else self.directions(system, numerics))
 
     def _spanned(self, table, system, gait, amplitudes, numerics, tips: int):
         if table is None:

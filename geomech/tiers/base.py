@@ -82,16 +82,16 @@ class Tier:
         system.refuse(self.needs, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise ValueError(f"the {self.name} tier {self.takes_joints}, this body has {system.joints}: {self.instead}")
-        if self.whole and system.singularity is not None:
+        if self.whole and system.traits.singularity is not None:
             near = getattr(system, "near", "")
             why = f"A is known near {near} alone" if near else f"the {system.kind} has singular shapes"
             raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
 
     def takes(self, system: System) -> bool:
         """Whether it says something of this system, and is worth asking."""
-        if system.joints not in self.offered or system.lacks & self.rests_on:
+        if system.joints not in self.offered or system.traits.lacks & self.rests_on:
             return False
-        return not (self.whole and system.singularity is not None)
+        return not (self.whole and system.traits.singularity is not None)
 
     def is_direct(self, system: System) -> bool:
         """Whether it is the direct tier, for want of anything to look up."""
@@ -135,7 +135,7 @@ class Tier:
 
 def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
-    if system.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
+    if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
     return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
 

@@ -54,8 +54,8 @@ class Harmonic(Path):
             return own
         count, degree = self.directions(system, numerics), numerics.interpolation
         grid = self.axes(system, numerics)
-        known = {"highest": self.highest(system, numerics), "reversible": system.reversible}
-        return harmonics.fit(system.velocity, grid, count, degree, progress, system.halved, **known)
+        known = {"highest": self.highest(system, numerics), "traits": system.traits}
+        return harmonics.fit(system.velocity, grid, count, degree, progress, **known)
 
     def size(self, system, numerics) -> int:
         return (self._terms(system, numerics) + 1) * 3 * numerics.grid**system.joints

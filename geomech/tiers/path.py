@@ -15,6 +15,7 @@ from geomech.geometry.field import Field, inside
 from geomech.geometry.images import images, to_solve
 from geomech.geometry.plane import Plane, looked_up
 from geomech.geometry.plane import plane as fit_plane
+from geomech.systems.base import length_unit, shape_labels
 from geomech.tiers.base import Tier
 from geomech.tiers.direct import direct
 
@@ -62,10 +63,10 @@ def plane(system, numerics, pair: tuple[int, int], at, progress: Callable | None
     if own := system.stored("connection"):
         return looked_up(own, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
-    at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
-    count, how = tier.directions(system, numerics), (system.halved, system.singularity)
-    more = {"unit": system.unit, "length": system.length}
-    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how, **more)
+    at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
+    count = tier.directions(system, numerics)
+    known = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **known)
 
 
 def shapes(system, numerics, directions: int = 0) -> int:
@@ -74,9 +75,9 @@ def shapes(system, numerics, directions: int = 0) -> int:
         return 0
     size = numerics.grid**system.joints
     if not directions or size > LARGEST_GRID:
-        return size // (2 if system.halved else 1)
+        return size // (2 if system.traits.halved else 1)
     unit, grid = connection.directions(system.joints, directions), connection.grid(system.joints, numerics.grid)
-    return int(to_solve(images(grid, unit, system.halved, True), size).sum())
+    return int(to_solve(images(grid, unit, replace(system.traits, reversible=True)), size).sum())
 
 
 def zeros(system, numerics, components: tuple[int, ...]) -> Field:
@@ -96,11 +97,11 @@ class Path(Tier):
     depends_on = ("grid", "extent", "directions", "interpolation")
 
     def is_direct(self, system) -> bool:
-        return system.linear
+        return system.traits.linear
 
     def directions(self, system, numerics) -> int:
         """Of alphadot at each shape."""
-        return numerics.directions or (8 if system.joints <= 2 else (4 if system.linear else 16) * system.joints)
+        return numerics.directions or (8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints)
 
     def axes(self, system, numerics) -> tuple[np.ndarray, ...]:
         """Of its field; ValueError if that is too large."""
@@ -114,18 +115,20 @@ class Path(Tier):
 
     def A(self, system, numerics) -> Callable:
         """The connection at shapes (..., d), without a field."""
-        return connection.fitted_at(system.velocity, system.joints, self.directions(system, numerics), system.linear)
+        return connection.fitted_at(
+            system.velocity, system.joints, self.directions(system, numerics), system.traits.linear
+        )
 
     def table(self, system, numerics, *reach, progress=None) -> Any:
         if own := system.stored(self.looks_up):
-            return own if own.length else replace(own, unit=system.unit, length=system.length)
+            return own if own.length else replace(own, unit=length_unit(system), length=system.length)
         return system.fitted(
             axes(system, numerics), self.directions(system, numerics), numerics.interpolation, progress
         )
 
     def solves(self, system, numerics, gait, count, phases) -> int:
         directions = self.directions(system, numerics)
-        return shapes(system, numerics, directions if system.reversible else 0) * directions
+        return shapes(system, numerics, directions if system.traits.reversible else 0) * directions
 
     def size(self, system, numerics) -> int:
         return (system.joints + 3) * 3 * numerics.grid**system.joints
