@@ -229,6 +229,18 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
 
 
+@pytest.mark.parametrize(("wave", "kept"), [(1, 4), (5, 7), (7, 9)])
+def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
+    """A that goes up and down ``wave`` times along the gait; at least four harmonics."""
+    alongside = lambda alpha: np.real((alpha[..., 0] + 1j * alpha[..., 1]) ** wave)[..., None, None]
+    A = lambda alpha: 0.2 + 0.1 * alongside(alpha) * np.array([[1.0, 0.4], [0.3, -0.7], [0.5, 0.2]])
+    velocity = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
+    made = synthetic.made(
+        velocity, gaits.Circle(amplitude=1.0), cycles=30, samples=60, noise=1e-3, pose_noise=1e-3, seed=2
+    )
+    assert measured.fit_log(log_of(made)).known.A.shape[-1] == 2 * kept + 1
+
+
 def test_where_and_when_a_log_begins_does_not_matter(viscous):
     """Nor does the unit of time: A is what alphadot is multiplied by."""
     made = synthetic.made(viscous, GAIT, cycles=20, samples=40, seed=1)

@@ -51,6 +51,14 @@ def test_the_snake_moves_as_its_closed_form(length):
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
 
 
+def test_a_cycle_tells_the_mean_rate_of_each_gait():
+    """|alphadot| over the joints, averaged over the phases, of gaits side by side and of one alone."""
+    alpha, alphadot = AWAY.cycle(16, np.array([0.5, 0.8]))
+    wanted = [np.mean([np.hypot(*rate) for rate in gait]) for gait in alphadot]
+    np.testing.assert_allclose(NoSlipSnake().run(alpha, alphadot).speed, wanted, rtol=1e-14)
+    np.testing.assert_allclose(NoSlipSnake().run(alpha[1], alphadot[1]).speed, wanted[1], rtol=1e-14)
+
+
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
 def test_no_wheel_slips_in_any_frame(frame):
     """Uneven links; and the same motion as the middle link's, told in another frame."""

@@ -552,6 +552,15 @@ def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
         scenes.parse(text, "s.toml")
 
 
+def test_a_metric_of_a_file_is_a_quadratic_form(tmp_path):
+    netcdf.save_connection(tmp_path / "a.nc", study(rft.Viscous(), grid=5))
+    raw = (tmp_path / "a.nc").read_bytes()
+    assert tables.load(tmp_path / "a.nc").metric is not None
+    (tmp_path / "a.nc").write_bytes(altered(raw, metric=put((0, 1, 2, 3), 9.0)))
+    with pytest.raises(SceneError, match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric"):
+        tables.load(tmp_path / "a.nc")
+
+
 @pytest.mark.parametrize("ending", ["nc", "mat"])
 def test_damaged_files_are_refused_in_one_line(ending, made, tmp_path):
     """Cut short anywhere, or with bytes changed: refused in one line, or read as a table that is finite."""
