@@ -20,7 +20,6 @@ from geomech.commands.options import (
     with_workers,
 )
 from geomech.core.errors import SceneError, choose
-from geomech.systems.base import shape_labels
 
 
 @with_workers
@@ -67,6 +66,7 @@ def ccf(
 def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | None, yes: bool):
     """The figure of the CCF of two joints that a field has."""
     from geomech.output import plots
+    from geomech.systems.base import shape_labels
 
     system, told = study.scene.system, {"gaits": [study.scene.gait]}
     told |= {"error": study.curvature_error, "labels": shape_labels(system)}
@@ -86,6 +86,7 @@ def _slices(scene, style: str, asked: tuple, beside: str | None, yes: bool):
     """The figure of `planes_figure` that a scene is asked for."""
     from geomech.output import plots
     from geomech.study.bench import Study
+    from geomech.systems.base import shape_labels
 
     study, system = Study(scene), scene.system
     found, told = planes(study, *asked, yes), {"labels": shape_labels(system), "style": style}

@@ -22,7 +22,6 @@ from geomech.commands.options import (
     with_workers,
 )
 from geomech.core.errors import SceneError, choose
-from geomech.systems.base import shape_labels
 
 
 @with_workers
@@ -45,6 +44,7 @@ def connection(
     from geomech.io.tables import ORDERS, SIGNS
     from geomech.output import mat, netcdf, plots
     from geomech.study.bench import Study
+    from geomech.systems.base import shape_labels
 
     check_netcdf(out, matlab=True)
     for option, word, known in (("--sign", sign, SIGNS), ("--order", order, ORDERS)):

@@ -10,7 +10,6 @@ import typer
 from geomech import terminal
 from geomech.commands.asked import allow, loaded, storing
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
-from geomech.systems.base import length_unit
 
 
 def trajectory(
@@ -22,6 +21,7 @@ def trajectory(
     """Where the body is at every phase of the scene's gait: pose, joint angles and ends of all links, as CSV."""
     from geomech.output import trajectories
     from geomech.study import motion
+    from geomech.systems.base import length_unit
 
     trajectories.check_csv(out)
     scene = loaded(name)

@@ -11,7 +11,6 @@ import typer
 from geomech.commands.asked import scene_with_gait
 from geomech.commands.options import JsonOption, SceneArgument, numbers
 from geomech.core.errors import Note, named
-from geomech.systems.base import length_unit
 
 
 def velocity(
@@ -21,6 +20,8 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
+    from geomech.systems.base import length_unit
+
     scene, asked = scene_with_gait(name), (("--alpha", alpha), ("--alphadot", alphadot))
     for line in scene.system.notes:
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
