@@ -198,7 +198,7 @@ def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypat
         (A, residual, cost), shared = both(two, ask)
         np.testing.assert_array_equal(shared[0], A)
         np.testing.assert_array_equal(shared[1], residual)
-        name = "M" if scene.system.linear else "coefficients"
+        name = "M" if scene.system.traits.linear else "coefficients"
         np.testing.assert_array_equal(getattr(shared[2], name), getattr(cost, name))
 
 

@@ -185,7 +185,7 @@ def direct(
 ) -> list[Job]:  # fmt: skip
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
     (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
-    system, stepping = scene.system, scene.system.steps
+    system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, system.at_once(phases))
@@ -203,7 +203,7 @@ def _refined(scene: Scene, solves: Callable, phases: int) -> float:
     quarter and an eighth of the phases, and a quarter with a finer model where there is one. Pieces of body are doubled on the
     quarter, and halved and quartered at all phases: as much as half and a quarter."""
     full, quarter = solves(phases), solves(phases // 4)
-    again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.steps else 0
+    again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.traits.steps else 0
     again += 2 * quarter + 0.75 * full if scene.system.cut else 0
     return full + again + (quarter if scene.system.finer() else 0)
 
@@ -243,7 +243,7 @@ def of_metric(scene: Scene) -> list[Job]:
     if effort.shared(system):
         (table,) = harmonics(scene)
         return [table, table._replace(what="powers")]
-    rates = system.joints * (system.joints + 1) // 2 if system.linear else harmonic.directions(system, n)
+    rates = system.joints * (system.joints + 1) // 2 if system.traits.linear else harmonic.directions(system, n)
     count, numbers = np.prod([len(a) for a in fitted.axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
     return [Job("balances", scene, None, float(count * rates), memory=BASE + 8 * TABLES * float(count * numbers))]
 
@@ -251,7 +251,7 @@ def of_metric(scene: Scene) -> list[Job]:
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     """Path length and work of ``count`` amplitudes (`effort.effort`): steps of time again at half and a quarter of the
     phases, and a quarter of the phases with twice the pieces."""
-    times = 1.0 + 0.75 * bool(scene.system.steps) + 0.5 * bool(scene.system.cut)
+    times = 1.0 + 0.75 * bool(scene.system.traits.steps) + 0.5 * bool(scene.system.cut)
     jobs = direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
     return [job._replace(count=times * job.count) for job in jobs]
 
