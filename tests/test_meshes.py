@@ -371,7 +371,7 @@ REFUSED = [
     (
         'shape = "sphere"',
         'shape = "sphere"\nfile = "a.stl"',
-        '\'file\' is unknown; use one of radius',
+        "'file' is unknown; use one of radius",
     ),
     ('kind = "mesh"', 'kind = "sphere"', "'shape' is unknown; use one of radius"),
     ("radius = 0.02", "radius = 20", "radius must be a number from 1e-06 to 10 m"),
