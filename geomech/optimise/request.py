@@ -138,7 +138,7 @@ class Request:
         finished = min(FINISHED, self.starts) if self.looks_up else self.starts
         jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
-            jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
+            jobs += cost.harmonics(scene.changed(system=self.system).with_numerics(extent=self.extent))
             beside = 2 * MORE * (self.starts > 1)
             steps = (finished + 2 * beside) * FINISH + POLISH * self.phases / loops.phases
         else:

@@ -84,7 +84,7 @@ def attributes(study: Study) -> dict:
 
 def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
-    unit, lookups = length_unit(study.scene.system), study.lookups
+    unit = length_unit(study.scene.system)
     found = of_connection(study.fitted)
     if (error := study.scene.system.stored("A_error")) is not None:
         found.append(of_error(error, unit))
@@ -102,8 +102,8 @@ def variables(study: Study) -> list[Variable]:
         found += of_metric(
             study.metric, study.scene.system.cost is None
         )  # before the harmonics, whose velocities it may share
-    if "harmonic" in lookups:
-        found += of_harmonics(study.table("harmonic"), unit)
+    if (harmonics := study.harmonics) is not None:
+        found += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:
         units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"

@@ -26,9 +26,10 @@ from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES
 from geomech.study.results import Displacements
 from geomech.systems.base import SHAPE_ALONE, System
-from geomech.tiers import TIERS
+from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, in_groups
-from geomech.tiers.path import axes
+from geomech.tiers.fitted import axes
+from geomech.tiers.harmonic import HARMONIC
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
@@ -79,15 +80,14 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     if system.cost is not None or system.traits.linear:
         return metric.fit(system.cost or system.power, grid, degree, progress)
     norm = partial(_norm_of, system)
-    count = TIERS["harmonic"].directions(system, numerics)
+    count = harmonic.directions(system, numerics)
     return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
 
 
 def shared(system: System) -> bool:
     """Whether a metric takes the very velocities of the harmonic table."""
-    return not (system.traits.linear or system.cost is not None or system.stored("connection")) and TIERS[
-        "harmonic"
-    ].takes(system)
+    of_its_own = system.traits.linear or system.cost is not None or system.stored("connection")
+    return not of_its_own and HARMONIC.is_offered(system)
 
 
 def with_harmonics(
@@ -96,8 +96,8 @@ def with_harmonics(
     """The harmonic table and the metric from the same force balances. ValueError if it has no metric."""
     if reason := why_none(system):
         raise ValueError(reason)
-    seen, tier = _Watched(system), TIERS["harmonic"]
-    found = tier.table(seen, numerics, progress=progress)
+    seen = _Watched(system)
+    found = harmonic.table(seen, numerics).build(progress)
     P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
     P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, found.axes))
