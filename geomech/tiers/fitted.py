@@ -121,4 +121,5 @@ def _solved_shapes(joints: int, points: int, count: int, mirror: bool, reversibl
     if points**joints > LARGEST_GRID:  # which is refused before it is solved
         return points**joints // (2 if mirror else 1)
     grid, unit = connection.grid(joints, points), connection.directions(joints, count)
-    return int(to_solve(images(grid, unit, Traits(mirror=mirror, reversible=reversible)), points**joints).sum())
+    alike = images(grid, unit, Traits(mirror=mirror, reversible=reversible))
+    return int(to_solve(alike, points**joints).sum())
