@@ -203,12 +203,12 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     e = body.motion(zero, zero)
     station = np.cumsum(2 * e.half, 0) - e.half
     none = Contact(Elements(*(x[:0] for x in e)), station[:0], station[:0])
-    ordered = tuple(sorted(effects, key=lambda effect: not effect.adds))
+    ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
     along, across = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
     given = medium, record(medium, rule), along or across, across, power_of(medium) == 0, is_linear(medium)
     plain = Assembly(
-        *given, body, tuple(e for e in ordered if e.adds), station, fraction, np.ones_like(station), none, 0
+        *given, body, tuple(e for e in ordered if e.adds_points), station, fraction, np.ones_like(station), none, 0
     )
     count = len(station) + len(plain.at(zero, zero + 1.0).points.station)
     return plain._replace(effects=ordered, elements=count)
@@ -217,7 +217,7 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
 def pieced(body: Body, effects: Sequence, pieces: int = 40) -> Body:
     """Return the body as finely cut as its effects need. ValueError for no number of pieces."""
     in_range("pieces", pieces, 1, MOST_PIECES, whole=True)
-    return subdivide(body, pieces) if any(e.varies for e in effects) else body
+    return subdivide(body, pieces) if any(e.varies_along for e in effects) else body
 
 
 def force_unit(assembly: Assembly, speed: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from rft.bodies.base import Body, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, require
 from rft.contact import Assembly, Problem, assemble
-from rft.effects.base import PAST, Effect, Site, broken, by_steps
+from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.laws.base import Medium
 from rft.premise import Premise
 from rft.work import Work, done_by
@@ -103,7 +103,7 @@ def time_steps(
     symmetry (there no cycle is like another). advance: takes the steps of a cycle, by default `advanced`; another one
     may store states in between, and resume from them. Other arguments as in `rft.body_velocity`. ValueError for what
     makes no sense."""
-    lost = broken(effects)
+    lost = broken_premises(effects)
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
@@ -217,13 +217,13 @@ class Stepping:
     cycle. whole: (n,), half lengths of the body's own elements, of which those of the assembly may be pieces."""
 
     def __init__(self, assembly: Assembly, alpha, alphadot, accuracy: Accuracy, backend: str, to_limit: bool, whole):
-        self.effects = by_steps(assembly.effects)
+        self.effects = stepwise_effects(assembly.effects)
         self.assembly = assembly._replace(effects=tuple(e for e in assembly.effects if e not in self.effects))
         self.alpha, self.alphadot, self.accuracy, self.backend = alpha, alphadot, accuracy, backend
         self.to_limit, self.whole, self.phases = to_limit, whole, len(alpha)
         self.dt = 2 * np.pi / self.phases
-        self.heavy = bool(broken(self.effects) & Premise.QUASI_STATIC)
-        self.enough = max([1e-6, *(e.settles for e in assembly.effects)])
+        self.heavy = bool(broken_premises(self.effects) & Premise.QUASI_STATIC)
+        self.enough = max([1e-6, *(e.drift_tolerance for e in assembly.effects)])
 
     @cached_property
     def scales(self) -> np.ndarray:
@@ -296,19 +296,21 @@ class Stepping:
         if not self.heavy:
             return s._replace(cycles=limit_cycle.light(s.cycles, displacement))
         s = s._replace(cycles=limit_cycle.heavy(s.cycles, displacement, s.xi, self.enough))
-        return self.kicked(s, problem, site) if self.to_limit and not self.is_periodic(s) else s
+        return self.with_velocity_change(s, problem, site) if self.to_limit and not self.is_periodic(s) else s
 
     def is_periodic(self, s: State) -> bool:
         """Return whether the cycles of all samples repeat."""
         return bool((s.cycles.drift <= self.enough).all())
 
-    def kicked(self, s: State, problem: Problem, site: Site) -> State:
+    def with_velocity_change(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state as if the body had moved faster for the last steps, so that it comes to the limit cycle
         sooner."""
         change = s.cycles.kick
         v = tuple(a + b for a, b in zip(s.v, carried(problem.sides.elements, *change)))
         drag = (self._drag(problem, s.xi + change) - self._drag(problem, s.xi)) / problem.unit
-        pasts = tuple(e.kicked(problem, site, past, change, drag) for e, past in zip(self.effects, s.pasts))
+        pasts = tuple(
+            e.with_velocity_change(problem, site, past, change, drag) for e, past in zip(self.effects, s.pasts)
+        )
         return s._replace(xi=s.xi + change, earlier=s.earlier + change, v=v, pasts=pasts)
 
     def _drag(self, problem: Problem, xi: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from rft.bodies.base import Body, Elements, checked_body, halves, pace
 from rft.bodies.pieces import PIECES
 from rft.checks import real_array, require
 from rft.contact import Problem, assemble
-from rft.effects.base import Effect, broken
+from rft.effects.base import Effect, broken_premises
 from rft.laws.base import Medium
 from rft.momentum import on_elements
 from rft.premise import SHAPE_ALONE
@@ -56,7 +56,7 @@ def work_done(
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
     require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
-    broken(effects)  # refuses what is no effect
+    broken_premises(effects)  # refuses what is no effect
     assembly = assemble(medium, body, effects, loads, pieces)
     assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))

@@ -171,9 +171,9 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
     alpha, alphadot = rng.uniform(-2, 2, (300, 2)), rng.normal(size=(300, 2))
     some = rng.uniform(0.05, 1.0, (3, 300))
     effects = (
-        SkinFriction().having(forward=some[0], backward=some[1]),
-        TowedSled(1.0, 0.3).having(pull=some[2]),
-        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).having(strength=some[0]),
+        SkinFriction().with_parameters(forward=some[0], backward=some[1]),
+        TowedSled(1.0, 0.3).with_parameters(pull=some[2]),
+        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).with_parameters(strength=some[0]),
     )
     plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
     assert apart(plain, fast, alphadot, BODY).max() < 1e-10

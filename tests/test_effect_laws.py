@@ -31,7 +31,7 @@ from rft import (
 from rft.bodies.pieces import Pieces, subdivide
 from rft.contact import assemble
 from rft.effects.base import Site
-from rft.effects.transient import sides
+from rft.effects.transient import part_velocities
 from rft.laws.records import record
 from rft.link import Factor, Incline, Memory, developed, inclined, multiplied, sided, square
 
@@ -193,7 +193,7 @@ def test_parts_of_elements_are_means_of_their_velocities():
     rng = np.random.default_rng(6)
     m, w = rng.normal(size=(2, 60))
     m[0], w[1], w[2] = 0.0, 0.0, -m[2]
-    velocity, left = sides(m, w)
+    velocity, left = part_velocities(m, w)
     u = m + w * ((np.arange(200_000)[:, None] + 0.5) / 100_000 - 1)
     np.testing.assert_allclose(left, (u > 0).mean(0), atol=1e-5)
     for side, share, found in ((u > 0, left, velocity[0]), (u < 0, 1 - left, velocity[1])):
@@ -219,7 +219,7 @@ def straight(effects, body=None, rate=1.0, medium=GLASS):
 def test_ground_remembers_where_the_body_was():
     effect = DisturbedGround(radius=0.05, weakening=1.0)
     fresh = effect.begin(None, Site(0, 0.0, np.zeros((3, 2)), ()))
-    ground = effect.marked(fresh, np.array([[0.3 + 0.2j, 0.0]]))
+    ground = effect.with_track(fresh, np.array([[0.3 + 0.2j, 0.0]]))
     at = lambda *places: effect.disturbance(ground, np.array(places))
     # A whole disturbance on the axis, nothing far off, and nothing in the other sample's ground.
     assert at(0.3 + 0.2j, 0.3 + 0.2j) == pytest.approx([1, 0], abs=0.05)
@@ -227,7 +227,7 @@ def test_ground_remembers_where_the_body_was():
     assert at(0.3 + 0.25j, 0.05) == pytest.approx([0.5, 0.5], abs=0.1)
     # A patch that wraps round onto the same cells is untouched ground, and taking it over forgets the old.
     assert at(0.3 + 0.2j + 4, 0.0) == pytest.approx([0, 1], abs=0.05)
-    ground = effect.marked(ground, np.array([[4.3 + 0.2j, 0.0]]))
+    ground = effect.with_track(ground, np.array([[4.3 + 0.2j, 0.0]]))
     assert at(0.3 + 0.2j, 0.0) == pytest.approx([0, 1], abs=0.05)
     assert all((x == 0).all() for x in fresh.value)  # a step leaves the state it came from as it was
     assert sum(x is not y for x, y in zip(fresh.value, ground.value)) < 10  # and copies what it marks alone
@@ -259,7 +259,7 @@ def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
     effect, problem = DisturbedGround(radius=0.03, weakening=1.0), straight(())
     site = Site(1, 0.1, np.zeros((3, 1)), ())
     track = np.linspace(-0.5, -0.25, 40)[:, None, None] + 0.06j  # along the tail half of the tail's link, to its left
-    ground = effect.marked(effect.begin(problem, site), track)
+    ground = effect.with_track(effect.begin(problem, site), track)
     left, right = shares(effect, problem, site, ground)[..., 0]
     assert left[0] == pytest.approx(0.5, abs=0.08)
     assert [left[1], *right] == [1, 1, 1]

@@ -180,7 +180,7 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     """Of an effect with a parameter for each gait, of which some phases are solved; begun from what is known of all phases."""
     frequencies, body = np.array([0.5, 3.0]), Chain((1, 2, 1))
     effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
-    both = Swimmer(GLASS, body, (effect.having(frequency=frequencies),))
+    both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
     alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
     assert both.images(alpha, alphadot).count == 16
     run = both.run(alpha, alphadot)

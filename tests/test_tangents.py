@@ -12,7 +12,7 @@ from rft import Granular
 from rft.balance.arrays import loads, row
 from rft.balance.newton import Net, carried, plus, with_momentum
 from rft.contact import assemble
-from rft.effects.base import Site, by_steps
+from rft.effects.base import Site, stepwise_effects
 from rft.momentum import inertia, on_elements
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
@@ -43,7 +43,7 @@ def test_laws(law, how):
 def at_one_step(effects, body, medium, samples, rng):
     """The balance with effects within a gait whose ground, place and past are not those of its start."""
     assembly = assemble(medium, body, effects)
-    stepwise = by_steps(assembly.effects)
+    stepwise = stepwise_effects(assembly.effects)
     always = assembly._replace(effects=tuple(e for e in assembly.effects if e not in stepwise))
     problem = always.at(*rng.uniform(-1, 1, (2, body.joints, samples)))
     pose = np.stack([*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)])
@@ -93,7 +93,7 @@ def test_effects(name, medium):
 def test_mass(name):
     """What it adds to the balance: its tangent; what elements bear adds up to it; a few samples have their own."""
     rng, samples = np.random.default_rng(4), 12
-    mass = EFFECTS[name][0](0.5).having(mass=rng.uniform(0.5, 3.0, samples))
+    mass = EFFECTS[name][0](0.5).with_parameters(mass=rng.uniform(0.5, 3.0, samples))
     problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
     index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
 

@@ -13,9 +13,9 @@ from geomech.core.errors import check_angle, choose, real_array, short
 from geomech.geometry.connection import Connection, evaluate, fit
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
-from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
+from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, negated
 
-__all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
+__all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "negated"]
 
 VALUES_TOGETHER = 1 << 22  # of gaits run side by side, angles and velocities: some 500 MB with what is made of them
 
@@ -256,7 +256,7 @@ class Plain:
 
     def blame(self, premises: Premise) -> str:
         """Who lacks one of these premises, to follow "no connection with"; empty if nobody does."""
-        return f"the {self.kind}, which is {not_so(self.lacks)}" if self.lacks & premises else ""
+        return f"the {self.kind}, which is {negated(self.lacks)}" if self.lacks & premises else ""
 
     def refuse(self, what: str, premises: Premise, instead: str) -> None:
         """ValueError if there is no such result because a premise of it does not hold."""

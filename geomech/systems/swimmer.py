@@ -50,7 +50,7 @@ class Swimmer(Said, Plain):
         require_law(self.medium)
         checked_body(self.body)
         refuse_mutable(self.medium, self.body)
-        rft.effects.broken(self.effects)
+        rft.effects.broken_premises(self.effects)
         object.__setattr__(self, "effects", tuple(self.effects))  # a list has no hash, by which tables are kept
         if not isinstance(self.solver, Solver):
             raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
@@ -90,7 +90,7 @@ class Swimmer(Said, Plain):
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
     power_degree = property(lambda self: None if self.lacks & RATES else power_of(self.medium) + 1.0)
-    held = property(lambda self: sum(e.held for e in self.effects))
+    held = property(lambda self: sum(e.memory_size for e in self.effects))
     frequency = property(lambda self: next((e.frequency for e in self.effects if hasattr(e, "frequency")), None))
 
     @property
@@ -112,7 +112,7 @@ class Swimmer(Said, Plain):
     @property
     def lacks(self) -> Premise:
         """What the effects break, and the medium where its drag is not of one power of the speed."""
-        return rft.effects.broken(self.effects) | (
+        return rft.effects.broken_premises(self.effects) | (
             NONE if is_rate_independent(self.medium) else Premise.RATE_INDEPENDENT
         )
 
@@ -140,13 +140,13 @@ class Swimmer(Said, Plain):
     def settling(self) -> float:
         place_matters = self.lacks & Premise.SE2_SYMMETRIC
         runs_on = self.steps and self.solver.cycles is None and not place_matters
-        return max(e.settles for e in self.effects) if runs_on else 0.0
+        return max(e.drift_tolerance for e in self.effects) if runs_on else 0.0
 
     @property
     def cut(self) -> int:
         """Pieces to a body length that effects which vary along elements see: as asked for, or whole elements where these
         are shorter; 0 without such effects."""
-        if not any(e.varies for e in self.effects):
+        if not any(e.varies_along for e in self.effects):
             return 0
         return max(self.solver.pieces, int(np.ceil(0.5 / halves(self.body).max() - 1e-9)))
 

@@ -13,9 +13,9 @@ from rft.bodies.base import Body, pace
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, real_array
 from rft.contact import assemble
-from rft.effects.base import Effect, broken, engine
+from rft.effects.base import Effect, broken_premises, engine
 from rft.laws.base import Medium
-from rft.premise import not_so
+from rft.premise import negated
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
@@ -80,7 +80,7 @@ def body_velocity(
     one costs 12 more, and the answer is the same. Raises ValueError for shapes or values that make no sense, and for a
     medium that pushes."""
     if engine(effects) != "algebraic":
-        lost = not_so(broken(effects))
+        lost = negated(broken_premises(effects))
         raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.time_steps")
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
