@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.balance.newton import Frame
-from rft.bodies.base import Body, Elements, checked_body, pace
+from rft.bodies.base import Body, Elements, checked_body, joint_speed
 from rft.bodies.pieces import subdivide
 from rft.checks import in_range
-from rft.laws.base import is_linear, power_of, remembered, require_drag
+from rft.laws.base import cached_if_immutable, is_linear, require_drag, speed_exponent
 from rft.laws.records import record
 from rft.link import Factor, Incline, Memory
 from rft.momentum import Momenta
@@ -173,7 +173,7 @@ class Assembly(NamedTuple):
         """Return the balance without effects."""
         e = self.body.motion(alpha, alphadot)
         x, y = e.r_t * e.s + e.r_n * e.c, e.r_n * e.s - e.r_t * e.c
-        speed, mean = pace(self.body, alphadot)[None], self.fraction.T
+        speed, mean = joint_speed(self.body, alphadot)[None], self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_unit(self, speed), speed)
         sides = Contact(e, self.station, self.ones)
         return Problem(*self[:6], sides, self.none, NO_POINTS, ZERO, NO_MEMORY, None, frame)
@@ -193,7 +193,7 @@ def assemble(medium, body: Body, effects: Sequence = (), rule: str = "exact", pi
     return _assembled(medium, body, tuple(effects), rule, pieces)
 
 
-@remembered
+@cached_if_immutable
 def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     require_drag(medium)
     body = pieced(checked_body(body), effects, pieces)
@@ -206,7 +206,7 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
     ordered = tuple(sorted(effects, key=lambda effect: not effect.adds_points))
     fraction = e.half / e.half.sum()
     along, across = (abs(float(medium.traction(*v)[i])) for i, v in enumerate(((1.0, 0.0), (0.0, 1.0))))
-    given = medium, record(medium, rule), along or across, across, power_of(medium) == 0, is_linear(medium)
+    given = medium, record(medium, rule), along or across, across, speed_exponent(medium) == 0, is_linear(medium)
     plain = Assembly(
         *given, body, tuple(e for e in ordered if e.adds_points), station, fraction, np.ones_like(station), none, 0
     )

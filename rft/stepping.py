@@ -22,7 +22,7 @@ from rft.balance.arrays import moved, net_of, velocities
 from rft.balance.backend import check
 from rft.balance.newton import carried
 from rft.balance.solver import Accuracy, Solved, solve
-from rft.bodies.base import Body, halves, pace
+from rft.bodies.base import Body, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, require
 from rft.contact import Assembly, Problem, assemble
@@ -116,7 +116,9 @@ def time_steps(
     if cycles is None and lost & Premise.SE2_SYMMETRIC:
         cycles = 1
     shapes = (np.moveaxis(x.reshape(-1, phases, joints), 0, -1) for x in (alpha, alphadot))  # (N, joints, B)
-    stepping = Stepping(assembly, *shapes, Accuracy(regularisation, tolerance), backend, cycles is None, halves(body))
+    stepping = Stepping(
+        assembly, *shapes, Accuracy(regularisation, tolerance), backend, cycles is None, half_lengths(body)
+    )
     found = _cycles(stepping, cycles, with_work, with_path, advance or advanced)
     return _shaped(found, batch, body.length)
 
@@ -228,7 +230,7 @@ class Stepping:
     @cached_property
     def scales(self) -> np.ndarray:
         """Sizes of velocities at all phases, (N, B)."""
-        speed = np.stack([pace(self.assembly.body, rates) for rates in self.alphadot])
+        speed = np.stack([joint_speed(self.assembly.body, rates) for rates in self.alphadot])
         usual = np.sqrt((speed**2).mean(0))
         usual = np.where(usual > 0, usual, 1.0)
         if self.heavy:  # a heavy body moves while its joints pause

@@ -11,7 +11,7 @@ from rft.balance import checked_input
 from rft.balance.arrays import loads as loads_on
 from rft.balance.arrays import moved, velocities
 from rft.balance.newton import times, to_frame
-from rft.bodies.base import Body, Elements, checked_body, halves, pace
+from rft.bodies.base import Body, Elements, checked_body, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import real_array, require
 from rft.contact import Problem, assemble
@@ -61,10 +61,10 @@ def work_done(
     assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    problem, speed = assembly.at(alpha, alphadot), pace(body, alphadot)
+    problem, speed = assembly.at(alpha, alphadot), joint_speed(body, alphadot)
     scale = np.where(speed > 0, speed, 1.0)  # a body at rest: any will do
     problem = assembly.rescaled(problem, scale)
-    done = done_by(problem, halves(body), xi, regularisation * scale)
+    done = done_by(problem, half_lengths(body), xi, regularisation * scale)
     return Work(done.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in done[1:]))
 
 
@@ -102,5 +102,5 @@ def _moments(sides: Elements, borne: np.ndarray, stations: np.ndarray, whole: np
     order = np.argsort(stations, kind="stable")
     so_far = np.cumsum(borne[:, order], 1)
     x, y, turn = so_far[:, np.searchsorted(stations[order], ends[last]) - 1]
-    point = (sides.place + sides.half * (sides.c + 1j * sides.s))[last]
+    point = (sides.centres + sides.half * (sides.c + 1j * sides.s))[last]
     return (point.real * y - point.imag * x - turn).T

@@ -314,7 +314,7 @@ class Turtle:
         turn = np.stack([0 * alphadot[0], alphadot[0], -alphadot[1]])
         half, shoulder = np.array([[0.3], [0.1], [0.1]]), np.array([[0.0], [0.3], [0.3]])
         arm = half * along * (shoulder > 0)
-        return Elements.of(along, shoulder + arm, 1j * turn * arm, turn, half)
+        return Elements.from_complex(along, shoulder + arm, 1j * turn * arm, turn, half)
 
 
 @pytest.mark.usefixtures("compiled_code")

@@ -413,7 +413,7 @@ def test_places_run_from_the_tail_to_the_head():
     problem = straight((EndCaps(radius=0.05, tail=4.0, head=0.0),), Chain((1, 3)))
     np.testing.assert_allclose(problem.sides.station[:, 0], [1 / 8, 5 / 8], atol=1e-15)
     np.testing.assert_allclose(problem.points.station[:, 0], [0, 1], atol=1e-15)
-    np.testing.assert_allclose(problem.points.elements.place[:, 0], [-0.5, 0.5], atol=1e-15)
+    np.testing.assert_allclose(problem.points.elements.centres[:, 0], [-0.5, 0.5], atol=1e-15)
     tail, head = problem.points.elements.weight[:, 0]
     assert tail > head == 0
 

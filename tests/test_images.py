@@ -12,7 +12,7 @@ from geomech.geometry.images import around, images, to_solve
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
-from rft.laws.base import TermLaw, is_central
+from rft.laws.base import TermLaw, is_odd
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 REVERSIBLE = {
@@ -34,7 +34,7 @@ def test_what_else_tells_head_from_tail():
     assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).reversible
     assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).reversible
     assert not Swimmer(Scales(), chain).reversible
-    assert is_central(GLASS)
+    assert is_odd(GLASS)
     assert not is_reversible(Chain((1, 2, 1 + 1e-9)))
 
 

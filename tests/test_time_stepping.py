@@ -34,7 +34,7 @@ from rft import (
     work_done,
 )
 from rft.balance.solver import Accuracy
-from rft.bodies.base import halves
+from rft.bodies.base import half_lengths
 from rft.contact import assemble
 from rft.se2 import compose, exp
 from rft.stepping import Stepping
@@ -486,7 +486,7 @@ def test_a_kicked_body_coasts():
     alpha, alphadot = (x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64))
     body, effects = Chain(), (heavy(1e6),)
     assembly = assemble(Viscous(2.0), body, effects)
-    steps = Stepping(assembly, alpha, alphadot, Accuracy(1e-6, 1e-10), "numpy", True, halves(body))
+    steps = Stepping(assembly, alpha, alphadot, Accuracy(1e-6, 1e-10), "numpy", True, half_lengths(body))
     over_ground = lambda s: s.pasts[0][-1][:, :, 0].sum(1)  # momentum, and its moment
     state = steps.begin()
     for _ in range(5):
@@ -521,7 +521,7 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     ahead = np.concatenate([found.xi[:1], 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]])  # mean of the last and the next
     pose = np.concatenate([found.pose[:1], compose(found.pose[:-2], exp(dt * ahead))])
     at, facing = pose[:, 0] + 1j * pose[:, 1], np.exp(1j * pose[:, 2])
-    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.place
+    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.centres
     velocity = (motion.v[0] + 1j * motion.v[1]) * along + facing * (x + 1j * y) + 1j * turn * (place - at)
     spin = motion.v[2] / half + turn
     p = 2 * half * velocity
@@ -625,7 +625,7 @@ def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
 
 def test_halves_are_the_whole_body():
     for body in BODIES.values():
-        assert 2 * halves(body).sum() == pytest.approx(1)
+        assert 2 * half_lengths(body).sum() == pytest.approx(1)
 
 
 def random_march(rng):

@@ -29,7 +29,7 @@ class Linkage(Chain):
 
     masses: tuple[float, ...] = ()
 
-    def _of_link(self, x: np.ndarray, link: int | None) -> np.ndarray:
+    def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
         masses = np.asarray(self.masses)
         return x[link] if link is not None else masses @ x / masses.sum()
 

@@ -20,11 +20,11 @@ from geomech.systems.said import Said
 from geomech.systems.solver import Solver
 from rft.balance.solver import ELEMENTS_TOGETHER
 from rft.bodies import KINDS as BODIES
-from rft.bodies.base import checked_body, halves, is_reversible, pace
+from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
 from rft.contact import Assembly, assemble
 from rft.effects import KINDS as EFFECTS
-from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
-from rft.laws.base import is_central, require_law
+from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
+from rft.laws.base import is_odd, require_law
 from rft.laws.records import record, rule_for
 from rft.stepping import Row, State, Stepping
 
@@ -85,11 +85,11 @@ class Swimmer(Said, Plain):
     points = property(lambda self: getattr(self.body, "points", None))
     shape_labels = property(lambda self: getattr(self.body, "shape_labels", super().shape_labels))
     mirror = property(lambda self: is_mirror(self.medium))
-    odd = property(lambda self: is_central(self.medium) and all(e.odd for e in self.effects))
-    reversible = property(lambda self: not self.effects and is_central(self.medium) and is_reversible(self.body))
+    odd = property(lambda self: is_odd(self.medium) and all(e.odd for e in self.effects))
+    reversible = property(lambda self: not self.effects and is_odd(self.medium) and is_reversible(self.body))
     kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
-    power_degree = property(lambda self: None if self.lacks & RATES else power_of(self.medium) + 1.0)
+    power_degree = property(lambda self: None if self.lacks & RATES else speed_exponent(self.medium) + 1.0)
     held = property(lambda self: sum(e.memory_size for e in self.effects))
     frequency = property(lambda self: next((e.frequency for e in self.effects if hasattr(e, "frequency")), None))
 
@@ -148,7 +148,7 @@ class Swimmer(Said, Plain):
         are shorter; 0 without such effects."""
         if not any(e.varies_along for e in self.effects):
             return 0
-        return max(self.solver.pieces, int(np.ceil(0.5 / halves(self.body).max() - 1e-9)))
+        return max(self.solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
 
     @property
     def elements(self) -> int:
@@ -228,7 +228,7 @@ class Swimmer(Said, Plain):
         right; balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a force
         balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
-        speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
+        speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.steps:
             images = self.images(alpha, alphadot)
             asked = (images.some(x) for x in (alpha, alphadot, start))

@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.balance.backend import check
 from rft.balance.solver import Accuracy, Solved, solve
-from rft.bodies.base import Body, pace
+from rft.bodies.base import Body, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, real_array
 from rft.contact import assemble
@@ -90,7 +90,7 @@ def body_velocity(
     batch = alpha.shape[:-1]
     guess = None if start is None else _started(start, batch, body.length)
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
-    speed = pace(body, alphadot)
+    speed = joint_speed(body, alphadot)
     moves = speed > 0
     if not moves.all():  # where joints are at rest so is the body
         moving = np.flatnonzero(moves)

@@ -38,7 +38,7 @@ class Site(NamedTuple):
     def centres(self, elements) -> np.ndarray:
         """Return the centres of elements on the ground as complex numbers x + i y, (n, B)."""
         x, y, theta = self.pose
-        return x + 1j * y + np.exp(1j * theta) * elements.place
+        return x + 1j * y + np.exp(1j * theta) * elements.centres
 
     def headings(self, elements) -> np.ndarray:
         """Return the headings of elements on the ground as complex numbers exp(i theta), (n, B)."""

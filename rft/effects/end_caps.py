@@ -42,7 +42,7 @@ class EndCaps(Effect):
         e = problem.sides.elements
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
-        ends = e.fixed([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
+        ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
         return problem.with_points(Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))), cap_terms(problem.medium))
 
     def traction(self, medium: Granular, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:

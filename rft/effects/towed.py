@@ -10,7 +10,7 @@ import numpy as np
 from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
 from rft.effects.base import Effect
-from rft.laws.base import power_of
+from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
 
 
@@ -36,10 +36,12 @@ class TowedSled(Effect):
 
     def check(self, medium) -> None:
         name = type(medium).__name__
-        require(power_of(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}")
+        require(
+            speed_exponent(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}"
+        )
 
     def apply(self, problem: Problem, site=None, state=None) -> Problem:
         e = problem.sides.elements
-        point = e.fixed([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
+        point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
         sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).multiplied(self.pull, self.pull, self.pull)
         return problem.with_points(sled, Coulomb().dry)
