@@ -142,8 +142,8 @@ def test_no_overflow_is_a_solution(size, solved_by, monkeypatch):
     """Whatever brought a descent there: a residual that is 0 because squares overflow, or nan, is none."""
     alpha, alphadot = (x.T for x in GAIT.cycle(8))
     assembly = assemble(GLASS, BODY)
-    problem = assembly.rescaled(assembly.at(alpha, alphadot), np.ones(8))
-    given = np.ones(8), balance.Accuracy(1e-6, 1e-10), assembly.law, assembly.points, solved_by, 1
+    problem = assembly.rescaled(assembly.problem(alpha, alphadot), np.ones(8))
+    given = np.ones(8), balance.Accuracy(1e-6, 1e-10), assembly.law, assembly.n_law_points, solved_by, 1
     assert (balance.solve(problem.take, *given).residual < 1e-10).all()
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(balance, name, ())
@@ -297,7 +297,7 @@ class Softening(Effect):
 
     def apply(self, problem, site, past):
         share = self.travel / (self.travel + past)
-        return problem._replace(sides=problem.sides.multiplied(share, share, share))
+        return problem._replace(sides=problem.sides.with_factors(share, share, share))
 
     def after(self, problem, site, past, v):
         return 0.5 * past + site.dt * np.hypot(v[0], v[1])

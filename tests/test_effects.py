@@ -28,7 +28,7 @@ from rft import (
 )
 from rft.contact import assemble
 from rft.effects import KINDS, batched_effect, engine
-from rft.link import square
+from rft.link import quadratic_load
 from rft.premise import ALL, negated
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -321,8 +321,8 @@ def test_grain_inertia_takes_the_grains_own_pressure():
 
     def added(effect, medium):
         """Normal load of an element that goes across at 0.7 body lengths per rad, over what the medium itself gives."""
-        strength = assemble(medium, Chain(), [effect]).at(np.zeros((2, 1)), np.ones((2, 1))).square
-        return float(square(m, zero, strength).n[0, 0])
+        strength = assemble(medium, Chain(), [effect]).problem(np.zeros((2, 1)), np.ones((2, 1))).quadratic_drag
+        return float(quadratic_load(m, zero, strength).n[0, 0])
 
     speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s
     unit = 1.5 * speed**2 / (9.81 * 0.05)

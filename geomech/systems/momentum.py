@@ -18,7 +18,7 @@ import numpy as np
 
 from geomech.core.errors import real_array, short
 from geomech.systems.base import Plain
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements
 
@@ -119,7 +119,7 @@ class Momentum(Plain):
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
         return (
-            (weights * (motion.v + np.stack(np.broadcast_arrays(*carried(motion, *xi)))) ** 2)
+            (weights * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi)))) ** 2)
             .sum((0, 1))
             .reshape(shape)
         )

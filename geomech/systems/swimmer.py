@@ -153,11 +153,11 @@ class Swimmer(Said, Plain):
     @property
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
-        return self._assembly.elements
+        return self._assembly.n_elements
 
     @property
     def evaluations(self) -> int:
-        return self._assembly.points
+        return self._assembly.n_law_points
 
     @property
     def _assembly(self) -> Assembly:

@@ -37,8 +37,8 @@ class Elements(NamedTuple):
     def from_complex(cls, heading, centre, velocity, rotation, half) -> Elements:
         """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
         velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
-        to_element = heading.conj()
-        v, lever = velocity * to_element, centre * to_element
+        back = heading.conj()
+        v, lever = velocity * back, centre * back
         c, s = heading.real.copy(), heading.imag.copy()
         return cls(
             c, s, -lever.imag, lever.real.copy(), half, 2.0 * half, v.real.copy(), v.imag.copy(), rotation * half

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 from rft.checks import Number, check_numbers, require
 from rft.contact import Problem
 from rft.effects.base import Effect, Site
-from rft.momentum import Momenta, from_frame, momenta, over_ground
+from rft.momentum import MomentumRate, element_momenta, frame_to_ground, ground_to_frame
 from rft.premise import Premise
 
 
@@ -53,16 +53,18 @@ class BodyInertia(Effect):
         first_order = site.count == 1
         rate = (1.0 if first_order else 1.5) / site.dt
         past = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
-        strength = np.atleast_2d(self.inertia * problem.unit)
-        return problem._replace(momenta=Momenta(np.full((1, 1), rate), *from_frame(site.pose, past), strength))
+        strength = np.atleast_2d(self.inertia * problem.axial_drag)
+        return problem._replace(
+            momentum_rate=MomentumRate(np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength)
+        )
 
     def after(self, problem: Problem, site: Site, state: np.ndarray, v) -> np.ndarray:
-        return np.stack([state[1], over_ground(site.pose, momenta(problem.sides.elements, v))])
+        return np.stack([state[1], frame_to_ground(site.pose, element_momenta(problem.sides.elements, v))])
 
     def with_velocity_change(self, problem: Problem, site: Site, state: np.ndarray, change, drag) -> np.ndarray:
         # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
         e = problem.sides.elements
-        last = momenta(e, carried(e, *change))
+        last = element_momenta(e, to_element(e, *change))
         loss = site.dt / (self.inertia + site.dt) * drag
         older = last + e.half / e.half.sum(0) * loss[:, None]
-        return state + np.stack([over_ground(site.pose, older), over_ground(site.pose, last)])
+        return state + np.stack([frame_to_ground(site.pose, older), frame_to_ground(site.pose, last)])

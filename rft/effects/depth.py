@@ -52,7 +52,7 @@ class DepthProfile(Effect):
     def apply(self, problem: Problem, site: Site | None, state=None) -> Problem:
         def with_depths(contact):
             depth = np.where(contact.buried > 0, self.depths(contact, site), 1.0)
-            return contact.multiplied(depth, depth, depth)
+            return contact.with_factors(depth, depth, depth)
 
         return problem._replace(sides=with_depths(problem.sides), points=with_depths(problem.points))
 

@@ -65,7 +65,9 @@ class DisturbedGround(Effect):
         points, m = self.points(problem, site), problem.memory
         offset = 1j * LOOK_AHEAD * self.radius * site.headings(problem.sides.elements)
         left, right = (1 - self.weakening * self.disturbance(state, points + x).mean(0) for x in (offset, -offset))
-        return problem._replace(memory=m._replace(given_left=m.given_left * left, given_right=m.given_right * right))
+        return problem._replace(
+            memory=m._replace(intact_left=m.intact_left * left, intact_right=m.intact_right * right)
+        )
 
     def after(self, problem: Problem, site: Site, state: Tiles, v) -> Tiles:
         if site.count == 0:  # the first step is on undisturbed ground

@@ -12,7 +12,7 @@ from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
 from rft.effects.base import Effect
 from rft.laws.granular import Granular
-from rft.link import point
+from rft.link import dry_point
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class EndCaps(Effect):
     def traction(self, medium: Granular, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
         drag."""
-        load = point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))
+        load = dry_point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * load.t, factor * load.n
 

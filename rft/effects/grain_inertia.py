@@ -58,4 +58,4 @@ class GrainInertia(Effect):
         k = self._known_k(problem.medium)
         strength = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
         # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
-        return problem._replace(square=problem.square + np.atleast_2d(strength))
+        return problem._replace(quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength))

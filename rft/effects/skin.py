@@ -40,4 +40,4 @@ class SkinFriction(Effect):
 
     def apply(self, problem: Problem, site=None, state=None) -> Problem:
         factors = self.forward / self.reference, self.backward / self.reference, 1.0
-        return problem._replace(sides=problem.sides.multiplied(*factors))
+        return problem._replace(sides=problem.sides.with_factors(*factors))

@@ -75,6 +75,6 @@ class Slope(Effect):
             rows = map(np.atleast_2d, (cos, sin / np.tan(self.repose), weight))
             return contact._replace(incline=Incline(downhill.real, downhill.imag, *rows))
 
-        weight = self.weight * sin * problem.unit
+        weight = self.weight * sin * problem.axial_drag
 
         return problem._replace(sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0))

@@ -43,5 +43,5 @@ class TowedSled(Effect):
     def apply(self, problem: Problem, site=None, state=None) -> Problem:
         e = problem.sides.elements
         point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
-        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).multiplied(self.pull, self.pull, self.pull)
+        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(self.pull, self.pull, self.pull)
         return problem.with_points(sled, Coulomb().dry)

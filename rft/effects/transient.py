@@ -11,7 +11,7 @@ import numpy as np
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
 from rft.effects.base import Effect, Site
-from rft.link import decay, pivot_of
+from rft.link import decay, find_pivot
 from rft.premise import Premise
 
 SHORTEST = 1e-6  # body lengths, least travel: an element at rest creeps at the regularisation
@@ -52,15 +52,15 @@ class Transient(Effect):
     def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
         left, right = state
         dt, rate = np.full((1, 1), site.dt), np.atleast_2d(self.rate)
-        memory = problem.memory._replace(left=left, right=right, before=site.v_before[1], dt=dt, rate=rate)
+        memory = problem.memory._replace(left=left, right=right, v_n_before=site.v_before[1], dt=dt, rate=rate)
         return problem._replace(memory=memory)
 
     def after(self, problem: Problem, site: Site, state: np.ndarray, v) -> np.ndarray:
         velocity, left = part_velocities(v[1], v[2])
-        share_remains, lack_remains, _, _ = decay(SIGN * site.v_before[1], SIGN * velocity, site.dt, self.rate)
-        # In each part the share of the side that it moves to develops; what the opposite share lacks develops likewise.
-        own = 1 - (1 - share_remains * state) * lack_remains
-        opposite = (1 - share_remains * (1 - state[::-1])) * lack_remains
+        share, deficit, _, _ = decay(SIGN * site.v_before[1], SIGN * velocity, site.dt, self.rate)
+        # In each part the share of the side that it moves to grows, and the share of the opposite side decays likewise.
+        own = 1 - (1 - share * state) * deficit
+        opposite = (1 - share * (1 - state[::-1])) * deficit
         return np.array([left * own[0] + (1 - left) * opposite[1], left * opposite[0] + (1 - left) * own[1]])
 
     @property
@@ -72,7 +72,7 @@ class Transient(Effect):
 def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean velocities v_n (2, n, B) of the parts of elements that move left and right, 0 where a part is
     empty, and the left part's fraction of the length (n, B)."""
-    _, inside, _ = pivot_of(v_n, v_w)
+    _, inside, _ = find_pivot(v_n, v_w)
     difference = np.abs(v_w)  # of v_n, between centre and end
     left = np.where(inside, (v_n + difference) / 2, np.maximum(v_n, 0.0))
     right = np.where(inside, (v_n - difference) / 2, np.minimum(v_n, 0.0))

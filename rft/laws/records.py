@@ -15,7 +15,7 @@ import numpy as np
 
 from rft.checks import is_number
 from rft.laws.base import cached_if_immutable, is_closed, numbers_of_terms, require_law, terms_slopes, terms_traction
-from rft.link import added, dry, viscous
+from rft.link import dry, sum_loads, viscous
 from rft.quadrature import QUADRATURE, by_nodes, nodes_of, parse, slopes_by_differences
 from rft.vectors import formula, is_formula
 
@@ -25,7 +25,7 @@ def closed_form(law, v_t, v_n, v_w, rounding):
     """Return the exact load of viscous and dry terms."""
     load = viscous(v_t, v_n, v_w, law.viscous[0, 0], law.viscous[0, 1])
     for j in range(len(law.dry)):
-        load = added(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
+        load = sum_loads(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
     return load
 
 
