@@ -24,15 +24,15 @@ def animate(
     from geomech.output import animate as film
     from geomech.study import motion
     from geomech.study.bench import Study
-    from geomech.study.cost import built, price
+    from geomech.study.cost import connection, price
 
     film.check_format(out)
     scene = loaded(name)
     count = (3 if film.is_film(out) else 1) if cycles is None else cycles
     check_outputs(scene, out, None)
     study = Study(scene)
-    mapped = scene.system.joints == 2 and "path" in study.methods
-    costs = [motion.cost(scene, count), *([price([built(scene, "path")])] if mapped else [])]
+    mapped = scene.system.joints == 2 and study.has_connection
+    costs = [motion.cost(scene, count), *([price(connection(scene))] if mapped else [])]
     if film.is_film(out):
         costs.append(film.cost(scene.numerics.phases, count))
     balances, seconds, memory = zip(*costs)

@@ -55,7 +55,7 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     own = scene.system.stored("connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
-    if scene.system.joint_angles and not own:
+    if scene.system.traits.joint_angles and not own:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene
@@ -108,29 +108,29 @@ def field(
     with_gait: and the gait, which is refused if it leaves the field. harmonics: with those of the velocity, where it has
     any beside the connection, and the metric, if it has one. metric: it must."""
     from geomech.study.bench import Study
-    from geomech.study.cost import built, of_metric, price
+    from geomech.study.cost import connection, of_metric, price
+    from geomech.study.cost import harmonics as of_harmonics
     from geomech.study.effort import shared, why_none
-    from geomech.tiers import TIERS
-    from geomech.tiers.path import fits
+    from geomech.tiers.fitted import fits
 
     scene = loaded(name, grid, extent)
     study, joints = Study(scene), scene.system.joints
     with named(scene.name):
-        TIERS["path"].refuse(scene.system)
+        study.refuse_connection()
         if maps and joints == 1:
             raise SceneError(NO_MAP)
         if with_gait:
             study.refuse_outside()
         check_outputs(scene, output, plot)
-        parts, jobs = [study.compute_field], [built(scene, "path")]
+        parts, jobs = [study.compute_field], connection(scene)
         if metric and (reason := why_none(scene.system)):
             raise SceneError(f"{scene.name}: {reason}")
         costed = metric or (harmonics and not why_none(scene.system))
         if costed:
             parts, jobs = [*parts, study.compute_metric], [*jobs, *of_metric(scene)]
-        if harmonics and "harmonic" in study.lookups:
-            parts.append(lambda progress: study.table("harmonic", progress=progress))
-            jobs += [] if costed and shared(scene.system) else [built(scene, "harmonic")]
+        if harmonics and study.has_harmonics:
+            parts.append(study.compute_harmonics)
+            jobs += [] if costed and shared(scene.system) else of_harmonics(scene)
         less = f"lower --grid, to {fits(joints)} or less" if joints > 2 else "ask for less"
         allow(scene, price(jobs), yes, WORTH_SAYING, less)
     with terminal.progress(f"field of {scene.name}") as bar:
@@ -149,11 +149,10 @@ def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
 
     from geomech.commands.options import numbers
     from geomech.study.cost import of_planes, price
-    from geomech.tiers import TIERS
 
     scene, joints = study.scene, study.scene.system.joints
     with named(scene.name):
-        TIERS["path"].refuse(scene.system)
+        study.refuse_connection()
         if joints == 1:
             raise SceneError(NO_MAP)
         pairs = [_pair(pair, joints)] if pair is not None else list(combinations(range(joints), 2))
@@ -209,10 +208,10 @@ def _held(scene, pair: tuple[int, int], angles: list[float] | None, alone: bool)
 
 def beside_field(study, frame: str, yes: bool):
     """The study of the same scene in another body frame, with its field computed."""
-    from geomech.study.cost import built, price
+    from geomech.study.cost import connection, price
 
     other = study.in_frame(frame)
-    allow(other.scene, price([built(other.scene, "path")]), yes, WORTH_SAYING)
+    allow(other.scene, price(connection(other.scene)), yes, WORTH_SAYING)
     with terminal.progress(f"field of {other.scene.name}, frame {frame}") as bar:
         other.compute_field(bar)
     return other

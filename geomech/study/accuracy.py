@@ -22,7 +22,9 @@ from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.cost import Cost
 from geomech.study.offer import tiers
-from geomech.tiers import TIERS
+from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers.base import Plan
+from geomech.tiers.direct import DIRECT
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TOLERANCES = 10.0 ** -np.arange(1, 7)
@@ -56,16 +58,16 @@ class Knob:
 
     def applies(self, scene: Scene) -> bool:
         system = scene.system
-        if system.linear and self.setting in ("regularisation", "directions"):
+        if system.traits.linear and self.setting in ("regularisation", "directions"):
             return False
         if self.setting == "regularisation" and system.solver is None:
             return False
-        of_a_field = self.setting in (*TIERS["path"].depends_on, *TIERS["harmonic"].depends_on)
+        of_a_field = self.setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
         if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
             return False
-        if self.tier != "direct" and TIERS[self.tier].is_direct(system):
+        if self.tier not in tiers(system) or (self.tier != DIRECT.name and _plan(scene, self.tier).exact):
             return False
-        return self.tier in tiers(system) and (self.setting != "pieces" or system.cut > 0)
+        return self.setting != "pieces" or system.cut > 0
 
 
 KNOBS = (
@@ -123,7 +125,8 @@ def cost(scene: Scene, runs: int = 2) -> Cost:
     """Of `study`; SceneError for a gait that does not move."""
     if np.ptp(checked_scene(scene).gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
-    if any(TIERS[knob.tier].on_grid for knob in _knobs(scene)):
+    tables = [_plan(scene, knob.tier).table for knob in _knobs(scene)]
+    if any(table and table.axes for table in tables):
         with named(scene.name):
             Study(scene).refuse_outside()
     jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
@@ -135,13 +138,19 @@ def cost(scene: Scene, runs: int = 2) -> Cost:
 
 def _jobs(knob: Knob, scene: Scene) -> list[foretold.Job]:
     """Those of a displacement by the knob's tier."""
-    if TIERS[knob.tier].looks_up:
-        return [foretold.built(scene, knob.tier)]
+    plan = _plan(scene, knob.tier)
+    if not plan.exact:
+        return foretold.predicted(scene, plan, len(FRACTIONS))
     return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
 
 
+def _plan(scene: Scene, tier: str) -> Plan:
+    """How a tier predicts what a knob of it is swept for."""
+    return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
+
+
 def _truth_phases(scene: Scene) -> int:
-    return TRUTH_STEPS if scene.system.steps else TRUTH_PHASES
+    return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
 
 
 def _knobs(scene: Scene) -> list[Knob]:
@@ -149,7 +158,7 @@ def _knobs(scene: Scene) -> list[Knob]:
 
 
 def _runs(scene: Scene, runs: int) -> int:
-    return 1 if scene.system.steps else runs
+    return 1 if scene.system.traits.steps else runs
 
 
 class Asked(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.scene.model import Scene
 from geomech.study.cost import Cost, direct, price
+from geomech.systems.base import length_unit, shape_labels
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -47,10 +48,10 @@ class Motion:
     def columns(self) -> dict[str, str]:
         """Of a table of it: what each is, by name, with its unit."""
         system = self.scene.system
-        unit, ends = system.unit, self.points(slice(0, 1))
+        unit, ends = length_unit(system), self.points(slice(0, 1))
         timed = {} if self.frequency is None else {"time": "s"}
         place = {"phase": "rad", **timed, "x": unit, "y": unit, "theta": "rad"}
-        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(system.shape_labels)}
+        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(shape_labels(system))}
         count = 0 if ends is None else ends.shape[-2]
         return {**place, **shape, **{f"end_{k}_{axis}": unit for k in range(count) for axis in "xy"}}
 
@@ -89,7 +90,7 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if system.steps and not system.settles:  # each goes on from the one before
+    if system.traits.steps and not system.settles:  # each goes on from the one before
         jobs = [job._replace(count=job.count * cycles) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
     width = 2 * (system.elements + 1) + system.joints + 5

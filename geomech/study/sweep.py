@@ -23,6 +23,7 @@ from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, of_medium, price
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
+from geomech.systems.base import length_unit
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
@@ -135,7 +136,7 @@ def lengths(at: _At, values: Mapping[str, list[float]], names: Iterable[str]) ->
 
 def _units(scene: Scene, results: Mapping) -> dict:
     """Of what a sweep has, by key. Lengths are in body lengths where no point has a size."""
-    unit = scene.system.unit if np.all(results["length"] == scene.system.length) else "m"
+    unit = length_unit(scene.system) if np.all(results["length"] == scene.system.length) else "m"
     every = {"displacement": [unit, unit, "rad"], "estimate": unit, "estimate_heading": "rad", "length": unit}
     every |= {"frequency": "Hz", "speed": f"{unit}/s", "medium_error": unit, "medium_error_heading": "rad"}
     return {key: told for key, told in every.items() if key in results}
@@ -144,7 +145,7 @@ def _units(scene: Scene, results: Mapping) -> dict:
 def _idle(scene: Scene, names: Iterable[str]) -> list[str]:
     """The parameters that change no displacement: the frequency, where no effect has one."""
     timed = [f"{section}.frequency" for section in ("gait", "physical")]
-    return [name for name in names if name in timed and scene.system.frequency is None]
+    return [name for name in names if name in timed and scene.system.traits.frequency is None]
 
 
 def _speeds(scene: Scene, results: dict) -> dict:
@@ -175,7 +176,7 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
     jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
     balances, each, _ = np.array(list(map(price, jobs))).T
-    if not scene.system.steps and total > MOST_BATCHES * together:
+    if not scene.system.traits.steps and total > MOST_BATCHES * together:
         with suiting(balances.mean()):
             seconds += total / together * _of_a_batch(at, ([points[0]], values.get(AMPLITUDE, [])[:1] or None))
     held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
