@@ -14,7 +14,7 @@ from rft.walking.planar import Robots, State
 from rft.walking.sdirk import (
     EFFORT,
     GAMMA,
-    SOLVED,
+    TOLERANCE,
     Effort,
     Step,
     has_ended,
@@ -72,7 +72,7 @@ def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, 
             robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
             ground,
         )  # fmt: skip
-        tolerance = SOLVED * ground.rounding
+        tolerance = TOLERANCE * ground.rounding
         newton, solved, failed = newton_step(
             steps.newton, residual, slopes, power, k, robots.reach[robot], tolerance, effort
         )
