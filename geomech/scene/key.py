@@ -69,6 +69,8 @@ def keys_of(kind: type) -> list[Key]:
             required = field.default is field.default_factory is dataclasses.MISSING
             default = None if required else _default(field)
             schema, (unit, meaning) = _plain(shapes.get(field.name, {})), told.get(field.name, ("", ""))
+            if number := numbers_of(kind).get(field.name):
+                schema = schema | {"minimum": number.low, "maximum": number.high}
             if word := words_of(kind).get(field.name):
                 schema, unit, meaning = schema | {"enum": [*word.known]}, "-", word.meaning
             name, alias = (shown[field.name], field.name) if field.name in shown else (field.name, "")
@@ -84,7 +86,9 @@ def aliases(kind: type) -> Mapping[str, str]:
 
 @functools.cache
 def angles_of(kind: type) -> frozenset[str]:
-    """Return the fields in rad, which a file may give in degrees."""
+    """Return the fields in rad, which a file may give in degrees; none of what is no dataclass."""
+    if not dataclasses.is_dataclass(kind):
+        return frozenset()
     return frozenset(name for name, (unit, _) in meanings(kind).items() if unit == "rad")
 
 

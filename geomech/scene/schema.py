@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -100,7 +101,8 @@ def _properties(keys: list[Key]) -> dict[str, Any]:
         for name in (key.name, *[key.alias] * bool(key.alias)):
             made[name] = {**key.schema, "description": f"{key.meaning}{unit}", **more}
         if key.degrees:
-            made[f"{key.name}_deg"] = {**key.schema, "description": f"{key.meaning} (degrees)"}
+            bounds = {x: math.degrees(key.schema[x]) for x in ("minimum", "maximum") if x in key.schema}
+            made[f"{key.name}_deg"] = {**key.schema, **bounds, "description": f"{key.meaning} (degrees)"}
     return made
 
 
