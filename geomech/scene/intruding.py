@@ -12,7 +12,7 @@ from geomech.core.errors import named, short
 from geomech.systems.said import said
 from rft.checks import check_numbers
 from rft.ground import KINDS, GroundEffect, checked, weight
-from rft.premise import not_so
+from rft.premise import negated
 
 
 class Intruding:
@@ -91,7 +91,7 @@ def of_effects(effects) -> list[str]:
     lines = []
     for effect in effects:
         lines.append(
-            f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"on:  {said(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
             f"gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:
