@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance import arrays, backend
+from rft.balance.listening import listener
 from rft.balance.newton import Descent, Limits
 from rft.balance.path import follow
 from rft.contact import Problem
@@ -70,7 +71,7 @@ def solve(
     problem_at(index): the balance of these samples. scale: (B,), the size of their velocities. law: its record. points:
     places of a sample at which the law is evaluated, by which samples are put together. method: a back end
     (`rft.balance.backend`). guess: (3, B), tried first but where it is nan, or beyond FASTEST."""
-    size = scale.size
+    size, tell = scale.size, listener()
     together = max(1, ELEMENTS_TOGETHER // points)
     driver, useful = arrays, 2 * together
     if backend.compiles(method, law):
@@ -93,10 +94,13 @@ def solve(
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
+            new = int(np.count_nonzero(iterations[index] == 0))
             index = slice(None) if index.size == size else index  # which is quicker
             first = guess[:, index] if attempt is WARM else None
             found = driver.solve(problem, _begin(attempt, problem, limits), limits, first)
             take(index, found, limits, problem.linear)
+            if new:
+                tell(new, points, problem.linear)
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / together)):
