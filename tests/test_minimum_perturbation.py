@@ -157,7 +157,7 @@ def test_sand_is_closer_to_its_area_integral():
 
 def test_singular_shapes_are_refused():
     snake = NoSlipSnake((1, 1, 1))
-    first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, singularity=snake.singularity)
+    first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, traits=snake.traits)
     with pytest.raises(ValueError, match="singular shapes"):
         minimum_perturbation(first)
 

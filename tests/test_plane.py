@@ -12,6 +12,7 @@ from geomech.commands.asked import _held
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
 from geomech.geometry.plane import Plane, Seen, looked_up, plane
+from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
 from geomech.scene.frames import framed
@@ -96,7 +97,7 @@ def test_a_plane_is_that_of_the_whole_field_in_sand():
     for at, half in (([0.6, 0.6, -1.2], False), ([0.0, 0.0, 0.0], True)):
         asked = []
         velocity = lambda a, u: asked.append(len(a)) or system.velocity(a, u)
-        cut = plane(velocity, (axes[0], axes[2]), (0, 2), at, 16, mirror=True)
+        cut = plane(velocity, (axes[0], axes[2]), (0, 2), at, 16, traits=Traits(mirror=True))
         k = np.abs(axes[1] - at[1]).argmin()
         for name in ("A", "residual", "speed"):
             whole = getattr(fitted, name)[..., k, :]

@@ -10,6 +10,7 @@ import rft
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.study.bench import Study
+from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
 
 GOOD = """
@@ -63,7 +64,7 @@ def test_every_key_arrives():
     assert read.system.medium == Granular(1.8, math.radians(13.8))
     assert read.system.body == Chain((1, 2, 1), 0.4, "link-2")
     assert read.gait.tilt == pytest.approx(math.pi / 4)
-    assert (read.numerics.grid, read.name, read.system.unit) == (21, "good", "m")
+    assert (read.numerics.grid, read.name, length_unit(read.system)) == (21, "good", "m")
     assert scenes.parse(GOOD.replace("gamma0_deg = 13.8", "gamma0 = 0.24")).system.medium.gamma0 == 0.24
     assert scenes.parse(GOOD.replace("C = 1.8", "C = 1.8\nk = 3")).system.medium.k == 3.0
     assert scenes.parse(GOOD.replace("tilt_deg = 45", "centre_deg = [90, 0]")).gait.centre[0] == pytest.approx(

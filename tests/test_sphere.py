@@ -8,6 +8,7 @@ from test_cli import geomech
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
+from geomech.geometry.traits import Traits
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.systems import Swimmer
@@ -44,7 +45,10 @@ def test_polynomials_on_the_sphere_come_back(joints, highest):
 
 def test_the_first_degree_is_the_connection():
     system, axes = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6))), connection.grid(3, 4, 1.0)
-    fitted, table = system.fitted(axes, 24, 3), harmonics.fit(system.velocity, axes, 24, highest=1, mirror=True)
+    fitted, table = (
+        system.fitted(axes, 24, 3),
+        harmonics.fit(system.velocity, axes, 24, highest=1, traits=Traits(mirror=True)),
+    )
     alpha, u = np.random.default_rng(1).uniform(-1, 1, (2, 9, 3))
     np.testing.assert_allclose(table.velocity(alpha, u), fitted.velocity(alpha, u), atol=1e-12)
 

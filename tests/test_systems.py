@@ -14,12 +14,14 @@ from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import crossed
+from geomech.geometry.traits import Traits
 from geomech.output import netcdf
 from geomech.output.explain import explain
 from geomech.scene import Scene
 from geomech.study import cost, estimate
 from geomech.study.bench import Study
 from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
+from geomech.systems.base import length_unit
 from geomech.systems.swimmer import Solver
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
@@ -109,7 +111,7 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     masked = np.isnan(fitted.A).all((0, 1))
     assert (np.isnan(fitted.A).any((0, 1)) == masked).all()
     assert 41 <= masked.sum() < 4 * 41
-    d = system.singularity(shapes)
+    d = system.traits.singularity(shapes)
     for axis in (0, 1):
         one, other = (np.moveaxis(x, axis, 0) for x in (d, masked))
         assert (other[1:] & other[:-1])[one[1:] * one[:-1] < 0].all()
@@ -170,16 +172,16 @@ def test_what_a_system_says_of_itself_holds(name):
     other_side = system.velocity(-alpha, -alphadot)
     assert (
         np.allclose(other_side, xi * [1, -1, -1], rtol=1e-6, atol=1e-8)
-        == system.mirror
+        == system.traits.mirror
         == (name != "differential-drive")
     )
     np.testing.assert_allclose(system.velocity(alpha, 3 * alphadot), 3 * xi, rtol=1e-5, atol=1e-6)
     columns = np.stack([system.velocity(alpha, e) for e in np.eye(system.joints)], -1)
     linear = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max() < 1e-9 * np.abs(columns).max()
-    assert linear == system.linear
-    assert system.unit == "m"
-    if system.mirror and not system.stored("connection"):  # a cart has one frame, a table that it was made in
-        assert system.in_frame("link-2").frame == "link-2"
+    assert linear == system.traits.linear
+    assert length_unit(system) == "m"
+    if system.traits.mirror and not system.stored("connection"):  # a cart has one frame, a table that it was made in
+        assert system.in_frame("link-2").traits.frame == "link-2"
     assert KINDS[system.kind] is type(system)
     scene = Scene(system, AWAY)
     run = scene.cycle(phases=64)
@@ -193,7 +195,7 @@ def test_whatever_has_a_velocity_is_a_system():
     """A system of one's own: a disc that is pushed along by its one joint, and turns."""
 
     class Disc(Plain):
-        joints, linear, kind = 2, True, "disc"
+        joints, traits, kind = 2, Traits(linear=True), "disc"
 
         def velocity(self, alpha, alphadot):
             alpha, alphadot = np.broadcast_arrays(alpha, alphadot)

@@ -61,7 +61,7 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     own = scene.system.stored("connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
-    if scene.system.joint_angles and not own:
+    if scene.system.traits.joint_angles and not own:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene

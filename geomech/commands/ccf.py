@@ -66,13 +66,14 @@ def ccf(
 def _map(study, style: str | None, stretch: bool, metric: bool, beside: str | None, yes: bool):
     """The figure of the CCF of two joints that a field has."""
     from geomech.output import plots
+    from geomech.systems.base import shape_labels
 
     system, told = study.scene.system, {"gaits": [study.scene.gait]}
-    told |= {"error": study.curvature_error, "labels": system.shape_labels}
+    told |= {"error": study.curvature_error, "labels": shape_labels(system)}
     if stretch:
         from geomech.geometry.stretch import stretch as redrawn
 
-        plane, effort = redrawn(study.metric), "BL" if system.power_degree == 1 else "path length"
+        plane, effort = redrawn(study.metric), "BL" if system.traits.power_degree == 1 else "path length"
         return plots.stretched_figure(study.curvature, plane, **told, effort=effort)
     told |= {"style": style or "map", "metric": study.metric if metric else None}
     if beside is not None:
@@ -85,9 +86,10 @@ def _slices(scene, style: str, asked: tuple, beside: str | None, yes: bool):
     """The figure of `planes_figure` that a scene is asked for."""
     from geomech.output import plots
     from geomech.study.bench import Study
+    from geomech.systems.base import shape_labels
 
     study, system = Study(scene), scene.system
-    found, told = planes(study, *asked, yes), {"labels": system.shape_labels, "style": style}
+    found, told = planes(study, *asked, yes), {"labels": shape_labels(system), "style": style}
     if beside is not None:
         if len(found) > 1:
             raise SceneError("--beside draws one pair of joints: say which with --pair")

@@ -44,6 +44,7 @@ def connection(
     from geomech.io.tables import ORDERS, SIGNS
     from geomech.output import mat, netcdf, plots
     from geomech.study.bench import Study
+    from geomech.systems.base import shape_labels
 
     check_netcdf(out, matlab=True)
     for option, word, known in (("--sign", sign, SIGNS), ("--order", order, ORDERS)):
@@ -74,7 +75,7 @@ def connection(
             if not sign:
                 note(f"{out} has {SIGNS['+']}; --sign - gives the other")
         if plot:
-            told = {"labels": study.scene.system.shape_labels, "style": style or "quiver"}
+            told = {"labels": shape_labels(study.scene.system), "style": style or "quiver"}
             if sliced:
                 plots.save(plots.plane_connection_figure(found, **told), plot)
                 return

@@ -21,6 +21,7 @@ def trajectory(
     """Where the body is at every phase of the scene's gait: pose, joint angles and ends of all links, as CSV."""
     from geomech.output import trajectories
     from geomech.study import motion
+    from geomech.systems.base import length_unit
 
     trajectories.check_csv(out)
     scene = loaded(name)
@@ -31,6 +32,6 @@ def trajectory(
         with storing(scene, out, command="trajectory", cycles=cycles):
             found = motion.motion(scene, cycles)
             trajectories.save(out, found, bar)
-    (x, y, theta), unit = found.pose[-1], scene.system.unit
+    (x, y, theta), unit = found.pose[-1], length_unit(scene.system)
     ends = f"after {cycles} cycle{'s' * (cycles > 1)} x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad"
     print(f"{ends}; {len(found.phase)} rows of {len(found.columns)} columns in {out}")

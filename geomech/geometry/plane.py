@@ -16,6 +16,7 @@ from geomech.geometry.curvature import ccf, error
 from geomech.geometry.field import UNTOLD, Field
 from geomech.geometry.gait import Gait
 from geomech.geometry.images import mirrored
+from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.tube import Tube
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
@@ -89,9 +90,8 @@ def plane(
     count: int,
     degree: int = 3,
     progress: Callable | None = None,
-    mirror: bool = False,
-    singularity: Callable | None = None,
     *,
+    traits: Traits = NOTHING,
     unit: str = UNTOLD,
     length: float | None = None,
     map: Map = each,
@@ -104,8 +104,10 @@ def plane(
     pair = checked_pair(pair, len(at))
     alpha = shapes_of(axes, pair, at)
     rates = directions(len(at), count)
-    alike = mirrored(alpha.reshape(-1, len(at)), count) if mirror else ()
-    A, residual, speed = sampled_on(velocity, alpha, rates, least_squares(rates), progress, alike, singularity, map)
+    alike = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
+    A, residual, speed = sampled_on(
+        velocity, alpha, rates, least_squares(rates), progress, alike, traits.singularity, map
+    )
     found = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
     return Plane(pair, tuple(at.tolist()), found)
 

@@ -23,6 +23,7 @@ from geomech.output.netcdf import (
 )
 from geomech.study.bench import Study
 from geomech.study.results import Displacements, Swept
+from geomech.systems.base import length_unit, shape_labels
 
 
 def xarray() -> Any:
@@ -60,7 +61,7 @@ def _called(axes, names: Sequence[str]) -> dict:
 
 def of_study(study: Study):
     """As the file of `geomech connection`: A, its fit residual, the CCF and what else that has."""
-    coordinates = of_shapes(study.fitted.axes, study.scene.system.shape_labels)
+    coordinates = of_shapes(study.fitted.axes, shape_labels(study.scene.system))
     return dataset(variables(study), coordinates, attributes(study))
 
 
@@ -88,7 +89,7 @@ def displacements(table: Displacements):
     """displacement (tier, amplitude, component) and its errors (tier, amplitude); where there is a frequency speeds, and
     where the medium is uncertain what that does, alike."""
     names, system = table.tiers, table.scene.system
-    unit = units_of(system.unit)
+    unit = units_of(length_unit(system))
     each = lambda key: np.array([table.errors(key)[name] for name in names])
     poses = np.array([table[name] for name in names], float).reshape(len(names), len(table["amplitude"]), 3)
     over = ("tier", "amplitude")
@@ -103,7 +104,7 @@ def displacements(table: Displacements):
     amplitude = np.array(table["amplitude"], float), {"long_name": table.gait.amplitude_label}
     coordinates = {"tier": (names, {}), "amplitude": amplitude, "component": (list(COMPONENTS), {})}
     attrs = {"title": f"Net displacement per cycle of the scene {table.scene.name}", "frame": table.scene.frame}
-    attrs |= _sized(system.unit, system.length)
+    attrs |= _sized(length_unit(system), system.length)
     if "frequency" in table:
         attrs |= {"frequency": float(table["frequency"]), "frequency_unit": "Hz"}
     if "estimate_is" in table:

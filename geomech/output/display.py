@@ -15,6 +15,7 @@ from geomech.geometry.field import Field
 from geomech.output import plots, sweeps
 from geomech.study.bench import Study
 from geomech.study.results import Displacements, Swept
+from geomech.systems.base import length_unit
 
 MOST_ROWS = 40
 DPI = 90
@@ -74,7 +75,7 @@ def study(bench: Study) -> str:
 
 def displacements(table: Displacements) -> str:
     """A row an amplitude and tier."""
-    unit, rows = table.scene.system.unit, []
+    unit, rows = length_unit(table.scene.system), []
     told = {
         "estimate": f"error ({unit})",
         "estimate_heading": "error of heading (rad)",

@@ -41,9 +41,9 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
 def _lost(system) -> list[str]:
     """A line of the results that are not to be had for each reason there is."""
     reasons: dict[str, list[str]] = {}
-    if system.lacks & ALL:
+    if system.traits.lacks & ALL:
         first = reasons[f"{system.blames} takes away what they rest on"] = ["connection", "CCF"]
-        first += ["velocity at a single shape"] if system.steps else []
+        first += ["velocity at a single shape"] if system.traits.steps else []
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     elif system.joints > MOST_JOINTS:
@@ -64,12 +64,12 @@ def _listed(lost: list[str]) -> str:
 
 def _why(tier, system) -> str:
     """Why a tier says nothing of a system."""
-    if system.lacks & tier.rests_on:
+    if system.traits.lacks & tier.rests_on:
         return f"{system.blames} takes away what they rest on"
     if system.joints not in tier.joints:
         return _joints(system, tier.joints)
     return (
-        f"the field has singular shapes, where {system.singular}; maps and files leave these out, and gaits that meet "
+        f"the field has singular shapes, where {system.traits.singular}; maps and files leave these out, and gaits that meet "
         "one are refused"
     )
 

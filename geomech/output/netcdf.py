@@ -21,6 +21,7 @@ from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
+from geomech.systems.base import length_unit, shape_labels
 
 COMPONENTS = ("x", "y", "theta")
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -43,7 +44,7 @@ def save_connection(path: str | Path, study: Study) -> None:
     pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
     something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
     read it. The file appears whole or not at all."""
-    write(path, attributes(study), study.fitted.axes, study.scene.system.shape_labels, variables(study))
+    write(path, attributes(study), study.fitted.axes, shape_labels(study.scene.system), variables(study))
 
 
 def write(path: str | Path, told: Mapping, axes, labels, found: Sequence[Variable]) -> None:
@@ -75,7 +76,7 @@ def attributes(study: Study) -> dict:
         "interpolation": int(study.fitted.degree),
         **(
             {}
-            if (degree := scene.system.power_degree) is None or effort.why_none(scene.system)
+            if (degree := scene.system.traits.power_degree) is None or effort.why_none(scene.system)
             else {"power_degree": degree}
         ),
     }
@@ -83,7 +84,7 @@ def attributes(study: Study) -> dict:
 
 def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
-    unit = study.scene.system.unit
+    unit = length_unit(study.scene.system)
     found = of_connection(study.fitted)
     if (error := study.scene.system.stored("A_error")) is not None:
         found.append(of_error(error, unit))
@@ -260,7 +261,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": units_of(system.unit),
+        "length_unit": units_of(length_unit(system)),
         **system.about(),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

@@ -25,7 +25,7 @@ from geomech.study.bench import Study
 from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.systems import Swimmer
-from geomech.systems.base import System
+from geomech.systems.base import System, length_unit, shape_labels
 from geomech.tiers import TIERS
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
@@ -81,7 +81,7 @@ def is_mapped(system: System) -> bool:
 
 def _maps(study: Study, folder: Path, gaits: list[Gait]) -> None:
     """Pictures of the connection and of the CCF, of three joints for every pair."""
-    scene, labels = study.scene, study.scene.system.shape_labels
+    scene, labels = study.scene, shape_labels(study.scene.system)
     if scene.system.joints == 3:
         planes = [study.plane(pair) for pair in combinations(range(3), 2)]
         _save(plots.plane_connection_figure(planes, labels=labels), folder / "connection")
@@ -121,7 +121,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     is no field, or one with singular shapes, up to its own, which is the last.
     SceneError for a gait that does not move or lies outside."""
     system, n = scene.system, scene.numerics
-    own = not PATH.is_offered(system) or system.singularity is not None or is_too_large(system, n)
+    own = not PATH.is_offered(system) or system.traits.singularity is not None or is_too_large(system, n)
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
@@ -142,7 +142,7 @@ def _near(scene: Scene, gait: Gait) -> list[float]:
     found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
     with named(scene.name):
         scene.system.refuse_singular(gait.cycle(scene.numerics.phases)[0])
-    reached = lambda a: (scene.system.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
+    reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
     return [a for a in found if reached(a)]
 
 
@@ -162,7 +162,7 @@ def _save(fig, stem: Path) -> None:
 def text_table(title: str, table: dict, scene: Scene) -> str:
     """x, y, heading and net distance per cycle by tier, each with its error in its own unit, as plain text."""
     tiers = [m for m in table if m in TIERS]
-    length, unit = scene.system.length, scene.system.unit
+    length, unit = scene.system.length, length_unit(scene.system)
     lines = [f"{title}: {table['note']}"] if "note" in table else []
     for quantity, headline, by, places in _blocks(table, length, unit):
         lines.append(f"{title}: {headline}")
@@ -207,7 +207,7 @@ def _surfaces(table: dict, scene: Scene) -> list[str]:
         lines.append(
             f"{m}: over a cone from the loop's mean shape; other surfaces that it spans differ by, which is in the error,"
         )
-        lines.append(f"amplitude position ({scene.system.unit})  heading (rad)")
+        lines.append(f"amplitude position ({length_unit(scene.system)})  heading (rad)")
         turned = table["surface_spread_heading"][m]
         rows = zip(table["amplitude"], spread, turned)
         lines += [f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows]

@@ -13,8 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from geomech.core.errors import SceneError
-from geomech.run.backend import preferred
-from rft.balance.listening import listen, listener
+from geomech.run.backend import listen, listener, preferred
 
 LONGEST = 60.0  # s of computing that a command begins without being told to
 LARGEST = 2e9  # bytes of memory, likewise

@@ -58,7 +58,7 @@ class Knob:
 
     def applies(self, scene: Scene) -> bool:
         system = scene.system
-        if system.linear and self.setting in ("regularisation", "directions"):
+        if system.traits.linear and self.setting in ("regularisation", "directions"):
             return False
         if self.setting == "regularisation" and system.solver is None:
             return False
@@ -150,7 +150,7 @@ def _plan(scene: Scene, tier: str) -> Plan:
 
 
 def _truth_phases(scene: Scene) -> int:
-    return TRUTH_STEPS if scene.system.steps else TRUTH_PHASES
+    return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
 
 
 def _knobs(scene: Scene) -> list[Knob]:
@@ -158,7 +158,7 @@ def _knobs(scene: Scene) -> list[Knob]:
 
 
 def _runs(scene: Scene, runs: int) -> int:
-    return 1 if scene.system.steps else runs
+    return 1 if scene.system.traits.steps else runs
 
 
 class Asked(NamedTuple):

@@ -26,6 +26,7 @@ from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
 from geomech.study.offer import METHODS, methods, tiers
 from geomech.study.results import Displacements
+from geomech.systems.base import shape_labels
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
@@ -154,7 +155,7 @@ class Study(Faced):
     def has_harmonics(self) -> bool:
         """Whether there are `harmonics`."""
         system = self.scene.system
-        return not system.linear and HARMONIC.is_offered(system)
+        return not system.traits.linear and HARMONIC.is_offered(system)
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
@@ -204,7 +205,7 @@ class Study(Faced):
         system = self.scene.system
         if system.stored("connection"):
             return system.stored("even part")
-        build = lambda: even_part(system.velocity, self.fitted.axes, system.singularity)
+        build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
         return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
 
     @property
@@ -236,13 +237,13 @@ class Study(Faced):
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in system.shape_labels])[:, 0]
+        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
         in_groups(shapes, every, system.at_once(n.phases))
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
         system, phases = self.scene.system, self.scene.numerics.phases
-        if system.singularity is not None:
+        if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if plan.table and plan.table.amplitudes is not None:
                 a = plan.table.amplitudes

@@ -50,7 +50,7 @@ def cheapest(
         return Displacements(table, scene, gait)
 
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
-    phases = max(FEWEST_STEPS if system.steps else 32, 8 * gait.harmonics)
+    phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
     if study.lookups:
         pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
         phases = settings["phases"]

@@ -53,7 +53,7 @@ def price(jobs: Sequence[Job]) -> Cost:
             if system.solver is None:
                 besides += CLOSED * system.evaluations * job.count
             else:
-                seconds += assumed(job.weight * job.count, system.evaluations, system.linear, job.batches)
+                seconds += assumed(job.weight * job.count, system.evaluations, system.traits.linear, job.batches)
     return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides)
 
 
@@ -121,7 +121,7 @@ def direct(
 ) -> list[Job]:  # fmt: skip
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
     (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
-    system, stepping = scene.system, scene.system.steps
+    system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, system.at_once(phases))
@@ -139,7 +139,7 @@ def direct(
 
 def cycles_of(system: System) -> int:
     """Return how many cycles a gait is run for: as it is told, one where no cycle is like another, else an assumption."""
-    return CYCLES if system.settles else (system.steps and system.solver.cycles) or 1
+    return CYCLES if system.settles else (system.traits.steps and system.solver.cycles) or 1
 
 
 def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
@@ -148,7 +148,7 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     pieces at a quarter of the phases, and half and a quarter of them at all."""
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
-    runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.steps else []
+    runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
     runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if system.cut else []
     return runs + ([(quarter, 1.0)] if system.finer() else [])
 
@@ -176,7 +176,7 @@ def of_even_part(scene: Scene) -> list[Job]:
     if system.stored("connection"):
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
-    looked_at = EVEN_SHAPES + (0 if system.odd else shapes)
+    looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
     return _spread_out(scene, 2 * looked_at * EVEN_DIRECTIONS * system.joints, BASE + 8 * TABLES * 3 * shapes)
 
 
@@ -193,7 +193,7 @@ def of_metric(scene: Scene) -> list[Job]:
         return []
     if effort.shared(system):
         return built(scene, effort.shared_table(system, n))
-    rates = system.joints * (system.joints + 1) // 2 if system.linear else harmonic.directions(system, n)
+    rates = system.joints * (system.joints + 1) // 2 if system.traits.linear else harmonic.directions(system, n)
     count, numbers = np.prod([len(a) for a in fitted.axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
     return _spread_out(scene, float(count * rates), BASE + 8 * TABLES * float(count * numbers))
 
@@ -204,5 +204,5 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     phases, system = effort.phases_of(scene), scene.system
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
-    jobs += once(phases // 2) + once(phases // 4) if system.steps else []
+    jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
     return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if system.cut else [])

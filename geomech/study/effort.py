@@ -9,6 +9,7 @@ straight and along itself, as far in the same time.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -44,12 +45,12 @@ def why_none(system: System) -> str:
         return "" if system.stored("metric") else "no metric with this table: its file tells no power"
     if system.cost is not None:
         return ""
-    if system.power_degree is None:
+    if system.traits.power_degree is None:
         power = (
             "its power is of no one degree in the rate" if hasattr(system, "work") else "nothing says what moving costs"
         )
         return f"no metric with {_who(system)}: {power}"
-    if not system.linear and system.joints != 2:
+    if not system.traits.linear and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
     return "" if _even(system) else f"no metric with {_who(system)}: one way costs another power than the way back"
 
@@ -62,7 +63,7 @@ def _who(system: System) -> str:
 @lru_cache(maxsize=16)
 def _even(system: System) -> bool:
     """Whether power is the same for alphadot and -alphadot, at a few shapes that stand for all."""
-    if system.linear:
+    if system.traits.linear:
         return True
     rng = np.random.default_rng(0)
     alpha, alphadot = rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)), connection.directions(2, 8)
@@ -77,7 +78,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     if own := system.stored("metric"):
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
-    if system.cost is not None or system.linear:
+    if system.cost is not None or system.traits.linear:
         return metric.fit(system.cost or system.power, grid, degree, progress)
     norm = partial(_norm_of, system)
     count = harmonic.directions(system, numerics)
@@ -86,7 +87,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
 
 def shared(system: System) -> bool:
     """Whether a metric takes the very velocities of the harmonic table."""
-    of_its_own = system.linear or system.cost is not None or system.stored("connection")
+    of_its_own = system.traits.linear or system.cost is not None or system.stored("connection")
     return not of_its_own and HARMONIC.is_offered(system)
 
 
@@ -105,7 +106,7 @@ def with_harmonics(
     found = harmonic.table(seen, numerics).build(progress)
     P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
     P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
-    F = _norm(P, system.power_degree).T.reshape(-1, *map(len, found.axes))
+    F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, found.axes))
     unit = connection.directions(2, len(F))
     return found, metric.of_samples(F, found.axes, unit, found.degree, highest=HIGHEST)
 
@@ -113,10 +114,9 @@ def with_harmonics(
 class _Watched:
     """A system of which powers are kept as its velocities are asked for, shape after shape of a half of the grid."""
 
-    reversible = False
-
     def __init__(self, system: System):
         self.system, self.powers = system, []
+        self.traits = replace(system.traits, reversible=False)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.system, name)
@@ -137,7 +137,7 @@ class _Driven(connection.Telling):
 
 
 def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
-    return _norm(system.power(alpha, alphadot), system.power_degree)
+    return _norm(system.power(alpha, alphadot), system.traits.power_degree)
 
 
 def _norm(power, degree: float) -> np.ndarray:
@@ -170,7 +170,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         rates = _rates(system, *shapes)
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
-        if system.steps:  # a step rests on the one before: fewer phases are other steps
+        if system.traits.steps:  # a step rests on the one before: fewer phases are other steps
             half, quarter = (integral(_rates(system, *some)) for some in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
@@ -186,12 +186,12 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:
     """Return the phases that `effort` takes where so many are asked for, or the scene's own."""
-    return max(32 if scene.system.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
+    return max(32 if scene.system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
 
 
 def _rates(system: System, alpha, alphadot) -> np.ndarray:
     """(B, 2, N): what path length and work are the integrals of, nan where there is none."""
-    degree = system.power_degree
+    degree = system.traits.power_degree
     if system.cost is not None:  # a metric, of which there is no work
         square = np.asarray(system.cost(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
@@ -212,7 +212,7 @@ def transport(scene: Scene, found: Mapping, poses: Mapping) -> dict:
     """Of what `effort` found and the net poses (B, 3) by tier: JSON's {"path_length", "work", "path_length_error",
     "work_error": [...], "efficiency", "cost_of_transport": {tier: [...]}}, None where there is none. efficiency: net
     distance, in body lengths, over path length."""
-    degree, length = scene.system.power_degree, scene.system.length
+    degree, length = scene.system.traits.power_degree, scene.system.length
     distance = {m: tables.of_pose(p)["net_distance"] / length for m, p in poses.items()}
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = {m: d / found["path_length"] for m, d in distance.items()}
@@ -231,8 +231,8 @@ def units(system: System) -> dict[str, str]:
     """Of the keys of `transport`."""
     if system.cost is not None:
         return {"path_length": METRIC, "path_length_error": METRIC, "efficiency": f"BL / {METRIC}"}
-    length = "BL" if system.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
-    work = "axial drag x BL" if system.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
+    length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
+    work = "axial drag x BL" if system.traits.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
     each = {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}
     return {**each, "path_length_error": length, "work_error": work}
 

@@ -11,7 +11,7 @@ from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study.cost import cycles_of, direct, price
-from geomech.systems.base import Premise
+from geomech.systems.base import Premise, length_unit, shape_labels
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -49,10 +49,10 @@ class Motion:
     def columns(self) -> dict[str, str]:
         """Of a table of it: what each is, by name, with its unit."""
         system = self.scene.system
-        unit, ends = system.unit, self.points(slice(0, 1))
+        unit, ends = length_unit(system), self.points(slice(0, 1))
         timed = {} if self.frequency is None else {"time": "s"}
         place = {"phase": "rad", **timed, "x": unit, "y": unit, "theta": "rad"}
-        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(system.shape_labels)}
+        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(shape_labels(system))}
         count = 0 if ends is None else ends.shape[-2]
         return {**place, **shape, **{f"end_{k}_{axis}": unit for k in range(count) for axis in "xy"}}
 
@@ -91,8 +91,10 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if system.steps and not system.settles:  # each goes on from the one before; cycles that are alike are run first
-        alike = 0 if system.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
+    if (
+        system.traits.steps and not system.settles
+    ):  # each goes on from the one before; cycles that are alike are run first
+        alike = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
         times = (alike + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1

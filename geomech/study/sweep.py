@@ -22,6 +22,7 @@ from geomech.study.batch import beside, kind
 from geomech.study.cost import direct, of_medium, price
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
+from geomech.systems.base import length_unit
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
@@ -134,7 +135,7 @@ def lengths(at: _At, values: Mapping[str, list[float]], names: Iterable[str]) ->
 
 def _units(scene: Scene, results: Mapping) -> dict:
     """Of what a sweep has, by key. Lengths are in body lengths where no point has a size."""
-    unit = scene.system.unit if np.all(results["length"] == scene.system.length) else "m"
+    unit = length_unit(scene.system) if np.all(results["length"] == scene.system.length) else "m"
     every = {"displacement": [unit, unit, "rad"], "estimate": unit, "estimate_heading": "rad", "length": unit}
     every |= {"frequency": "Hz", "speed": f"{unit}/s", "medium_error": unit, "medium_error_heading": "rad"}
     return {key: told for key, told in every.items() if key in results}
@@ -143,7 +144,7 @@ def _units(scene: Scene, results: Mapping) -> dict:
 def _idle(scene: Scene, names: Iterable[str]) -> list[str]:
     """The parameters that change no displacement: the frequency, where no effect has one."""
     timed = [f"{section}.frequency" for section in ("gait", "physical")]
-    return [name for name in names if name in timed and scene.system.frequency is None]
+    return [name for name in names if name in timed and scene.system.traits.frequency is None]
 
 
 def _speeds(scene: Scene, results: dict) -> dict:

@@ -9,6 +9,7 @@ import numpy as np
 from geomech.gaits import Gait
 from geomech.geometry.field import UNTOLD
 from geomech.scene.model import Scene, frequency_of
+from geomech.systems.base import length_unit
 
 ERRORS = ("estimate", "estimate_heading")
 QUANTITIES = ("x", "y", "heading", "net_distance")  # of a pose
@@ -36,7 +37,7 @@ def table(scene: Scene, gait: Gait, amplitudes, poses: Mapping, errors: Mapping,
     "medium_shift_of", alike, by how much it shifts the mean, and "medium_error_rule" [...].
     Of a measured gait "estimate_is" says in words what the estimates leave out.
     """
-    unit, length, frequency = scene.system.unit, scene.system.length, frequency_of(scene.system, gait)
+    unit, length, frequency = length_unit(scene.system), scene.system.length, frequency_of(scene.system, gait)
     found = {m: of_pose(p) for m, p in poses.items()}
     units = {"amplitude": gait.amplitude_label, **dict.fromkeys(("x", "y", "net_distance"), unit), "heading": "rad"}
     units |= {"estimate": unit, "estimate_heading": "rad", "body_length": unit, "seconds": "s"}

@@ -144,11 +144,11 @@ class Tier:
 
     def meets_singular_shapes(self, system: System) -> bool:
         """Return whether singular shapes keep it from saying anything of this system."""
-        return self.regular and system.singularity is not None
+        return self.regular and system.traits.singularity is not None
 
     def is_possible(self, system: System) -> bool:
         """Return whether it says something of this system."""
-        possible = system.joints in self.joints and not system.lacks & self.rests_on
+        possible = system.joints in self.joints and not system.traits.lacks & self.rests_on
         return possible and not self.meets_singular_shapes(system)
 
     def is_offered(self, system: System) -> bool:
@@ -158,7 +158,7 @@ class Tier:
 
 def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
-    if system.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
+    if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
     return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
 

@@ -14,7 +14,8 @@ from geomech.geometry.field import inside
 from geomech.geometry.images import images, mirrored, to_solve
 from geomech.geometry.plane import Plane, looked_up, shapes_of
 from geomech.geometry.plane import plane as fit_plane
-from geomech.systems.base import ALL, System
+from geomech.geometry.traits import Traits
+from geomech.systems.base import ALL, System, length_unit, shape_labels
 from geomech.tiers.base import Numerics, Table
 
 INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
@@ -31,7 +32,7 @@ def refuse(system: System) -> None:
 
 def directions(system: System, numerics: Numerics) -> int:
     """Return the number of directions of alphadot at each shape."""
-    return numerics.directions or (8 if system.joints <= 2 else (4 if system.linear else 16) * system.joints)
+    return numerics.directions or (8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints)
 
 
 def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
@@ -79,18 +80,18 @@ def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
 
 def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
     if own := system.stored("connection"):
-        return own if own.length else replace(own, unit=system.unit, length=system.length)
+        return own if own.length else replace(own, unit=length_unit(system), length=system.length)
     return system.fitted(axes(system, numerics), directions(system, numerics), numerics.interpolation, progress)
 
 
 def at_shapes(system: System, numerics: Numerics) -> Callable:
     """Return the connection as a function of shapes (..., d), without a field."""
-    return connection.fitted_at(system.velocity, system.joints, directions(system, numerics), system.linear)
+    return connection.fitted_at(system.velocity, system.joints, directions(system, numerics), system.traits.linear)
 
 
 def solved_at(system: System, numerics: Numerics) -> int:
     """Return the velocities that `at_shapes` takes for each shape."""
-    return system.joints if system.linear else directions(system, numerics)
+    return system.joints if system.traits.linear else directions(system, numerics)
 
 
 def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
@@ -101,10 +102,10 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
     if own := system.stored("connection"):
         return looked_up(own, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
-    at = inside((axis,) * system.joints, at, [name for name, _ in system.shape_labels])
-    count, how = directions(system, numerics), (system.halved, system.singularity)
-    more = {"unit": system.unit, "length": system.length}
-    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, *how, **more)
+    at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
+    count = directions(system, numerics)
+    known = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **known)
 
 
 def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int], at) -> int:
@@ -113,7 +114,7 @@ def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int],
         return 0
     axis, count = connection.grid(1, numerics.grid, numerics.extent)[0], directions(system, numerics)
     alpha = shapes_of((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
-    return int(to_solve(mirrored(alpha, count) if system.halved else (), len(alpha)).sum()) * count
+    return int(to_solve(mirrored(alpha, count) if system.traits.halved else (), len(alpha)).sum()) * count
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
@@ -121,7 +122,7 @@ def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
     stored."""
     if system.stored("connection"):
         return 0
-    return _solved_shapes(system.joints, numerics.grid, count, system.halved, system.reversible)
+    return _solved_shapes(system.joints, numerics.grid, count, system.traits.halved, system.traits.reversible)
 
 
 @lru_cache
@@ -129,4 +130,5 @@ def _solved_shapes(joints: int, points: int, count: int, mirror: bool, reversibl
     if points**joints > LARGEST_GRID:  # which is refused before it is solved
         return points**joints // (2 if mirror else 1)
     grid, unit = connection.grid(joints, points), connection.directions(joints, count)
-    return int(to_solve(images(grid, unit, mirror, reversible), points**joints).sum())
+    alike = images(grid, unit, Traits(mirror=mirror, reversible=reversible))
+    return int(to_solve(alike, points**joints).sum())

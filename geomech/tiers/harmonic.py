@@ -58,12 +58,12 @@ def _build(system, numerics, progress: Callable | None) -> Harmonics:
     if own := system.stored("harmonics"):
         return own
     count, degree = directions(system, numerics), numerics.interpolation
-    known = {"highest": highest(system, numerics), "reversible": system.reversible}
-    return harmonics.fit(system.velocity, _axes(system, numerics), count, degree, progress, system.halved, **known)
+    known = {"highest": highest(system, numerics), "traits": system.traits}
+    return harmonics.fit(system.velocity, _axes(system, numerics), count, degree, progress, **known)
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    if system.linear:  # there are none beyond the first
+    if system.traits.linear:  # there are none beyond the first
         return itself(system, numerics, gait)
     d = system.joints
     read = 3 * harmonics.terms(d, highest(system, numerics)) * (numerics.interpolation + 1) ** d

@@ -17,7 +17,7 @@ def path(A: Connection | Velocity, gait: Gait, amplitudes=None, phases: int = 25
 
 
 def _plan(system, numerics, gait, amplitudes) -> Plan:
-    if system.linear:  # xi = A alphadot holds exactly
+    if system.traits.linear:  # xi = A alphadot holds exactly
         return itself(system, numerics, gait)
     if fitted.is_too_large(system, numerics):
         A = fitted.at_shapes(system, numerics)
