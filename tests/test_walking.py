@@ -542,7 +542,10 @@ def test_other_refusals(geomech, tmp_path):
     legless = SMALL[: SMALL.index("[robot.legs]")] + SMALL[SMALL.index("[gait]") :]
     (tmp_path / "bad.toml").write_text(legless)
     (tmp_path / "small.toml").write_text(SMALL)
+    weightless = SMALL[: SMALL.index("[robot]")] + '[robot]\nkind = "wheel"\n' + SMALL[SMALL.index("[robot.legs]") :]
+    (tmp_path / "wheel.toml").write_text(weightless)
     for args, said in (
+        (("walk", "wheel.toml"), "missing required field `mass`: add mass = ..., in kg"),
         (("walk", "bad.toml"), "the table [robot.legs] is missing: add it"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),

@@ -51,13 +51,13 @@ class IntruderScene(Intruding):
     """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
     TOML."""
 
-    medium: Annotated[PlateStress, Keys(StressKeys, of=" of an intruder scene")]
+    medium: Annotated[PlateStress, Keys(StressKeys, owner="an intruder scene")]
     intruder: Annotated[Shape, OUTLINES]
     motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE})]
     elements: Annotated[
-        int, Within("numerics", of=" of an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
+        int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
     ] = 100
-    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS, of=" of an intruder scene"))] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)

@@ -70,15 +70,15 @@ class MeshScene(Intruding):
     """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
     the medium's strength was taken from, where it was told by a name of the vertical plane."""
 
-    medium: Annotated[Spatial, Keys(MatchedKeys, of=" of an intruder scene of a mesh", spread=True)]
+    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh", spread=True)]
     intruder: Annotated[Solid, OneOf(KINDS)]
-    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, of=" of a mesh")]
+    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, owner="a mesh")]
     triangles: Annotated[
         int,
-        Within("numerics", of=" of an intruder scene of a mesh"),
+        Within("numerics", owner="an intruder scene of a mesh"),
         Number(1, 2_000_000, "-", TRIANGLES, whole=True),
     ] = 5000
-    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS, of=" of an intruder scene"))] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)

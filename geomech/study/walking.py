@@ -16,16 +16,17 @@ import numpy as np
 from geomech.core.errors import SceneError, named
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
+from geomech.run.cost import BASE, Cost
 from geomech.scene import write as written
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
-from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.sweep import LARGEST, Points, changed, listed, stored_in
 from rft.laws.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
 
+PILOT = 0.05  # s of time steps that tell how long others take
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
@@ -151,7 +152,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
     seconds = each * steps * (batches + (count - batches) * more)
-    return Steps(round(steps * count), seconds, BASE)
+    return Steps(round(steps * count), seconds, BASE, seconds)
 
 
 def _speeding_up(scene: WalkerScene) -> float:
@@ -276,7 +277,8 @@ def cost(scene: WalkerScene) -> Steps:
     shares = sum(v / scene.numerics.steps for v in (*KNOBS["steps"], FINEST["steps"]))
     shares += sum(0.5 + v / 32 for v in (*KNOBS["elements"], FINEST["elements"])) + 2 * len(KNOBS["rounding"])
     one = price(scene, settling=True)
-    return Steps(round(one.balances * shares / 2), one.seconds * shares / 2, BASE)
+    seconds = one.seconds * shares / 2
+    return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
 
 
 def table(results: dict) -> str:

@@ -39,7 +39,6 @@ class Slope(GroundEffect):
     kind = "slope"
     limit = "angle = 0"
     cost = "one multiplication an element"
-    angles = ("angle", "repose")
 
     def __post_init__(self):
         check_numbers(self)

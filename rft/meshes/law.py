@@ -112,7 +112,6 @@ class Spatial:
             "0 to 0.5, 0 for a jump; stress grows from 0 to its own as the velocity turns by that angle out of the face",
         ),
     ] = math.radians(2.0)  # fmt: skip  # assumed
-    angles = ("grazing",)
 
     def __post_init__(self):
         check_numbers(self)

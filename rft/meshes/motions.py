@@ -54,7 +54,6 @@ class Drag(Motion):
     distance: Distance = 0.1
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 51
-    angles = ("direction", "heading", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
@@ -78,7 +77,6 @@ class Penetrate(Motion):
     speed: Speed = 0.01
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 51
-    angles = ("direction", "heading", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
@@ -110,7 +108,6 @@ class Rotate(Motion):
     heading: Heading = 0.0
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 361
-    angles = ("start", "stop", "heading", "attitude")
     turns = True
 
     def __post_init__(self):

@@ -31,7 +31,6 @@ class PlateDrags(PlateStress):
     zeta: Zeta = 1.0
     grazing: Grazing = GRAZING
     tension: str = "keep"
-    angles = ("beta", "gamma", "grazing")
 
     def __post_init__(self):
         for name in ("beta", "gamma", "alpha_x", "alpha_z"):

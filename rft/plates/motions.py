@@ -37,7 +37,6 @@ class Drag(Motion):
     distance: Distance = 0.1
     attitude: Attitude = 0.0
     samples: Samples = 51
-    angles = ("direction", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
@@ -56,7 +55,6 @@ class Penetrate(Motion):
     speed: Speed = 0.01
     attitude: Attitude = 0.0
     samples: Samples = 51
-    angles = ("direction", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
@@ -81,7 +79,6 @@ class Rotate(Motion):
     stop: Angle = math.pi
     speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the hub, forwards")] = 0.0
     samples: Samples = 361
-    angles = ("start", "stop")
     turns = True
 
     def __post_init__(self):

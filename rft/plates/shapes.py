@@ -49,7 +49,6 @@ class Plate(Shape):
     length: Annotated[float, metres("length in the plane")]
     width: Width
     tilt: Annotated[float, Number(-100, 100, "rad", "beta, 0 lying flat")] = 0.0
-    angles = ("tilt",)
 
     def curve(self, elements: int):
         s = np.linspace(-0.5, 0.5, elements + 1)[:, None] * self.length

@@ -117,7 +117,6 @@ class StressMap(PlateStress):
     zeta: Zeta = 1.0
     grazing: Grazing = GRAZING
     tension: str = "keep"
-    angles = ("grazing",)
 
     def __post_init__(self):
         self._check()

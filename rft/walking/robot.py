@@ -43,7 +43,6 @@ class Tripod:
         math.pi
     )
     middle: Annotated[float, Number(-math.pi, math.pi, "rad", "angle of a leg in the middle of its stance")] = 0.0
-    angles = ("sweep", "middle")
 
     def __post_init__(self):
         check_numbers(self)
