@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rft.balance.backend import compiles
-from rft.vectors import at
+from rft.vectors import gather
 from rft.walking.planar import Robots, State
 from rft.walking.sdirk import EFFORT, GAMMA, SOLVED, Effort, Way, advanced, begun, ended, judged, when
 
@@ -48,7 +48,7 @@ def stepped_by_numpy(robots: Robots, which, state: np.ndarray, angles, rates, le
     while one.size:
         robot, length = which[one], lengths[now, one]
         h, turned = w.part * length, (when(w) * length)[:, None]
-        width, rate = at(effort.widths, w.width, 0), rates[now, one]
+        width, rate = gather(effort.widths, w.width, 0), rates[now, one]
         ground, k = robots.ground_under(robot, width), GAMMA * h
         off, slopes, power = robots.residual(
             robot, w.base, w.start, w.trial, angles[now, one] + turned * rate, rate, k, ground
