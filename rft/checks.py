@@ -28,7 +28,7 @@ class Number(NamedTuple):
 
 
 @functools.cache
-def numbers_of(kind: type) -> dict[str, Number]:
+def number_fields(kind: type) -> dict[str, Number]:
     """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
@@ -42,7 +42,7 @@ def check_numbers(owner: Any) -> None:
     """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
     that is the default; store integers as int."""
     defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
-    for name, number in numbers_of(type(owner)).items():
+    for name, number in number_fields(type(owner)).items():
         value = getattr(owner, name)
         if value is not None or defaults.get(name) is not None:
             in_range(name, value, number.low, number.high, number.whole, number.unit)

@@ -42,7 +42,7 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
     return load
 
 
-def nodes_of(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
+def nodes_and_weights(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes and weights of a rule: "gauss" (Gauss-Legendre) or "midpoint" (equal parts with the velocity of their
     middle).
 
