@@ -82,14 +82,14 @@ class OfDrag:
         """A file that a scene takes as ``[medium] file``."""
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
-        of += f", widened for {f.free} degrees of freedom (Student)" if own else ""
-        about = f"# Fitted to {json.dumps(self.name)}: {f.data.angles} angles, rms residual {f.rms:.3g} N{of}.\n"
+        of += f", widened for {f.degrees_of_freedom} degrees of freedom (Student)" if own else ""
+        about = f"# Fitted to {json.dumps(self.name)}: {f.data.n_angles} angles, rms residual {f.rms:.3g} N{of}.\n"
         return about + table("medium", self._medium())
 
     def text(self) -> str:
         """All of it in words and a table of residuals."""
         f = self.fit
-        lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {f.data.angles} angles"]
+        lines = [f"{f.law} law fitted to {self.name}: {f.data.n_forces} forces at {f.data.n_angles} angles"]
         for name, x, (low, high) in zip(f.names, _shown(f, f.values), _shown(f, f.intervals)):
             unit = f" {UNITS[name]}" if UNITS.get(name) else ""
             lines.append(f"{name:13}{x:12.5g}, {low:.4g} to {high:.4g}{unit} with 95 %")
@@ -101,7 +101,7 @@ class OfDrag:
         known = [f"{name} {getattr(f.rod, name):g} {unit}" for name, unit in SIZES.items() if getattr(f.rod, name)]
         lines.append(f"end caps: {caps}; rod and bed: {', '.join(known) or 'sizes not known'}")
         unknown = [name for name in SIZES if not getattr(f.rod, name)]
-        if unknown and FITS[f.law].grains:
+        if unknown and FITS[f.law].granular:
             lines.append(f"k is not known without {', '.join(unknown)}: in the header lines, or as --{unknown[0]}")
         repeated = repeats(f.data.psi, f.data.forces)
         lines.append(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.calibrate import widening
+from rft.calibrate import student_factor
 from rft.checks import in_range, real_array, require
 from rft.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
@@ -57,7 +57,7 @@ class StressFit:
     @property
     def intervals(self) -> np.ndarray:
         """Intervals (9, 2) of 95 %, N/cm^3."""
-        return self.values[:, None] + widening(self.free) * self.errors[:, None] * [-1.0, 1.0]
+        return self.values[:, None] + student_factor(self.free) * self.errors[:, None] * [-1.0, 1.0]
 
     @property
     def undetermined(self) -> list[str]:
@@ -98,7 +98,7 @@ class ZetaFit:
     @property
     def interval(self) -> np.ndarray:
         """Interval (2,) of 95 % of zeta."""
-        return self.zeta + widening(self.free) * self.error * np.array([-1.0, 1.0])
+        return self.zeta + student_factor(self.free) * self.error * np.array([-1.0, 1.0])
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
