@@ -84,7 +84,7 @@ def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any
     for name, (section, *_) in sections_of(scene).items():
         if name in tables:
             part = read_section(source, name, tables[name], section)
-            parts |= part if isinstance(section, Keys) and section.spread else {name: part}
+            parts |= part if isinstance(part, dict) else {name: part}
     return parts
 
 
