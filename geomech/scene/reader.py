@@ -188,7 +188,7 @@ def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
     except SceneError as error:
-        raise SceneError(f"{error}; it has {label}" if label else str(error)) from None
+        raise SceneError(f"{error} ({label})" if label else str(error)) from None
 
 
 def _check_degrees(place: str, value) -> None:
