@@ -106,7 +106,7 @@ class IntruderScene(Intruding):
     def run(self, elements: int | None = None) -> Intrusion:
         """Forces along the motion, with as many elements if told so."""
         outline = self.outline if elements is None else self.intruder.outline(elements)
-        t, pose, twist = self.motion.course(outline)
+        t, pose, twist = self.motion.trajectory(outline)
         found: Loads = loads(self.medium, outline, pose, twist, self.effects)
         return Intrusion(t, pose, twist, self.weighed(found.force), found.moment, found.power(twist))
 

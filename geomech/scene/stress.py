@@ -108,7 +108,7 @@ class SpatialKeys(Spatial):
         """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
         more = {key: getattr(self, key) for key in ("surface_friction", "tension", "grazing")}
         if self.density is not None:
-            return Spatial.of_grains(self.density, self.internal_friction, **more)
+            return Spatial.from_grains(self.density, self.internal_friction, **more)
         if strength := {*given} & {"name", "file", "zeta"}:
             vertical = build(place, {key: getattr(self, key) for key in strength}, StressKeys)
             return Spatial(matched_strength(vertical), **more)
