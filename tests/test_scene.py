@@ -86,7 +86,7 @@ BAD = [
         r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'",
     ),
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
-    (GOOD.replace('law = "granular"', 'name = "glass"'), "'C' is unknown; use one of name; it has no 'law'"),
+    (GOOD.replace('law = "granular"', 'name = "glass"'), r"'C' is unknown; use one of name \(no 'law'\)"),
     (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),
     (GOOD.replace("C = 1.8", ""), r"\[medium\] .*missing required field `C`"),
     (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),

@@ -103,10 +103,11 @@ def spellings(kind: type) -> dict[str, tuple[str, bool]]:
 
 @functools.cache
 def words_of(kind: type) -> dict[str, Word]:
-    """Return the annotations `Word` of a form of keys by field."""
-    if not hasattr(kind, "to_part"):  # the names of a user's annotations need not be known
+    """Return the annotations `Word` of a class by field."""
+    try:
+        hints = get_type_hints(kind, include_extras=True)
+    except (NameError, TypeError):  # of a class of a user's, whose annotations name what is not there
         return {}
-    hints = get_type_hints(kind, include_extras=True)
     marked = {name: [x for x in get_args(hint) if isinstance(x, Word)] for name, hint in hints.items()}
     return {name: found[0] for name, found in marked.items() if found}
 

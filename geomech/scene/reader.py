@@ -84,7 +84,7 @@ def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any
     for name, (section, *_) in sections_of(scene).items():
         if name in tables:
             part = read_section(source, name, tables[name], section)
-            parts |= part if isinstance(section, Keys) and section.spread else {name: part}
+            parts |= part if isinstance(part, dict) else {name: part}
     return parts
 
 
@@ -188,7 +188,7 @@ def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
     except SceneError as error:
-        raise SceneError(f"{error}; it has {label}" if label else str(error)) from None
+        raise SceneError(f"{error} ({label})" if label else str(error)) from None
 
 
 def _check_degrees(place: str, value) -> None:
