@@ -365,7 +365,7 @@ def test_no_medium_of_ours_is_suspected(name):
         ("gamma0_deg = 13.8", "gamma0 = 13.8 deg", "a number has no unit: a key that ends in _deg takes degrees"),
         ("C = 1.8", "C: 1.8", "'C: 1.8', write KEY = VALUE"),
         ("C = 1.8", "C =", "give the key a value"),
-        ("C = 1.8\n", "", "[medium] Object missing required field `C`: add C = ..."),
+        ("C = 1.8\n", "", "[medium] has no `C`: add C = ..."),
         ("C = 1.8", 'C = "big"', "Expected `float`, got `str` - at `.C`: give a number in place of 'big'"),
         ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number in place of '1'"),
         ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] in place of 3"),

@@ -545,7 +545,7 @@ def test_other_refusals(geomech, tmp_path):
     weightless = SMALL[: SMALL.index("[robot]")] + '[robot]\nkind = "wheel"\n' + SMALL[SMALL.index("[robot.legs]") :]
     (tmp_path / "wheel.toml").write_text(weightless)
     for args, said in (
-        (("walk", "wheel.toml"), "missing required field `mass`: add mass = ..., in kg"),
+        (("walk", "wheel.toml"), "[robot] has no `mass`: add mass = ..., in kg"),
         (("walk", "bad.toml"), "the table [robot.legs] is missing: add it"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),
