@@ -19,7 +19,7 @@ from geomech.core.errors import SceneError
 from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
 from geomech.output import plots
-from geomech.study import accuracy, cost, estimate, sweep
+from geomech.study import accuracy, cost, cycles, estimate, sweep
 from geomech.study.bench import Study
 from rft.balance import solver as balance
 from rft.effects import SkinFriction
@@ -104,12 +104,12 @@ def test_what_is_not_tried_is_not_taken_for_less(monkeypatch):
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
-    foretold = accuracy.cost(scene).balances
+    foretold = accuracy.Accuracy(scene).cost().balances
     solved.clear()
     accuracy.study(scene)
     assert foretold == pytest.approx(sum(solved), rel=0.02)
     over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
-    foretold = sweep.cost(VISCOUS, over).balances
+    foretold = sweep.Sweep(VISCOUS, over).cost().balances
     solved.clear()
     sweep.sweep(VISCOUS, over)
     assert foretold == sum(solved)
@@ -171,7 +171,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.commands.asked.WORTH_SAYING", 0.0)
+    monkeypatch.setattr("geomech.study.shape_space.ShapeSpace.worth_saying", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
     assert err.startswith("five.toml: 8,192 force balances, about 1 s of computing and 16")
@@ -198,10 +198,10 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
 )
 def test_what_does_not_share_a_batch_is_counted(over, batches, monkeypatch):
     """A sweep of media takes ten times what their balances do: each is a batch, which takes its 100 s here."""
-    monkeypatch.setattr(sweep, "_of_a_batch", lambda at, part: 100.0)
+    monkeypatch.setattr(cycles.Cycles, "_seconds_of_a_batch", lambda *_: 100.0)
     scene = VISCOUS.changed(effects=(SkinFriction(0.8, 1.2, 1.0),))
     values = {k: np.linspace(0.5, 1.0, n).tolist() for k, n in over.items()}
-    assert sweep.cost(scene, values).seconds == pytest.approx(100 * batches, abs=20)
+    assert sweep.Sweep(scene, values).cost().seconds == pytest.approx(100 * batches, abs=20)
 
 
 def test_a_cost_reads_well():
@@ -253,8 +253,8 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     """Many amplitudes are many batches: a stop keeps those that are done, in the middle of a row too."""
     over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist()}
     whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 3)
-    rows, calls = sweep._rows, []
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
+    rows, calls = cycles._rows, []
 
     def stopping(at, amplitudes):
         calls.append((at[0].system.medium.ratio, len(amplitudes)))
@@ -262,7 +262,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
             raise terminal.Stopped(signal.SIGTERM)
         return rows(at, amplitudes)
 
-    monkeypatch.setattr(sweep, "_rows", stopping)
+    monkeypatch.setattr(cycles, "_rows", stopping)
     with pytest.raises(terminal.Stopped):
         sweep.sweep(VISCOUS, over, kept)
     again = sweep.sweep(VISCOUS, over, kept)

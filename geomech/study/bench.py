@@ -240,9 +240,8 @@ class Study(Faced):
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        told = tables.of_choices({m: choices[m] for m in methods if m in choices})
-        table = tables.table(self.scene, gait, amplitudes, poses, errors, medium, **told, seconds=seconds, kept=kept)
-        return Displacements(table, self.scene, gait)
+        told = {"seconds": seconds, "kept": kept}
+        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, choices, **told))
 
     def _built(self, chosen: dict, gait: Gait, amplitudes, progress) -> tuple[dict[str, float], list[str]]:
         """The tables of tiers, built: seconds that each took, whenever that was, and the names of those that were there."""
