@@ -22,7 +22,7 @@ def compute(scene: str = "three-link-glass", grid: int = 51, directions: int = 4
     axes = connection.grid(2, grid, loaded.numerics.extent)
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)[:, :, None]
     solution = loaded.system.solve(alpha, connection.directions(2, directions)).checked()
-    fit = functools.partial(harmonics.fit, loaded.system.velocity, axes, directions, mirror=True)
+    fit = functools.partial(harmonics.fit, loaded.system.velocity, axes, directions, traits=loaded.system.traits)
     residual = {k: fit(highest=k).residual[2] for k in (1, 15)}
     return {"axes": axes, "stuck": (solution.status == "stuck").mean(-1), "residual": residual}
 

@@ -34,6 +34,7 @@ from rft.walking import Fineness, engine
 
 FILE = pathlib.Path(__file__).parent / "data" / "golden.json"
 TOLERANCE, OF_ESTIMATES = 1e-12, 1e-8  # relative, of the largest number of an entry; the second for walks too
+OF_RESIDUALS = 1e-6  # of rod.csv: 2e-5 N of forces of 3.7 N, whose roundoff differs between processors by 4e-12 N
 SOLVED = {"regularisation": 1e-3, "tolerance": 1e-15}
 COARSE = {"regularisation": 1e-3, "tolerance": 1e-13, "grid": 7, "phases": 32, "curves": 6, "harmonics": 5, "cycles": 2}
 GEOMETRY = ("grid", "phases", "curves", "harmonics")
@@ -258,7 +259,8 @@ def changed(old: dict, new: dict) -> dict[str, float]:
     loose = lambda name: (
         "estimate" in name or name.startswith(("walk", "measured, log", "measured, rod", "measured, plates"))
     )
-    return {k: x for k, x in every.items() if not x <= (OF_ESTIMATES if loose(k) else TOLERANCE)}
+    allowed = lambda name: OF_RESIDUALS if "residuals, F_" in name else OF_ESTIMATES if loose(name) else TOLERANCE
+    return {k: x for k, x in every.items() if not x <= allowed(k)}
 
 
 def table(old: dict, new: dict) -> str:

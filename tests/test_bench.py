@@ -14,6 +14,7 @@ from geomech.gaits import Circle, Fourier, Sine
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.systems import Solver, Swimmer, base
+from geomech.systems.base import length_unit
 
 GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
@@ -128,7 +129,7 @@ SIZES = "[physical]\nlength = 0.1\nfrequency = 3\nmass = 0.016\nradius = 0.06\n"
 
 def test_sizes_stand_once():
     scene = scenes.parse(PLAIN + SIZES + MASS)
-    assert scene.system.body == rft.Chain(length=0.1) and scene.system.unit == "m"
+    assert scene.system.body == rft.Chain(length=0.1) and length_unit(scene.system) == "m"
     assert scene.system.effects == (rft.BodyInertia(0.016, 3.0, 0.1, 2.1), rft.EndCaps(0.06))
     ground = '[[effects]]\nkind = "disturbed-ground"\nradius = 0.2\nweakening = 0.1\n'  # of the track, not the body
     assert scenes.parse(PLAIN + SIZES + MASS + ground).system.effects[2] == rft.DisturbedGround(0.2, 0.1)

@@ -90,10 +90,10 @@ def test_what_is_not_tried_is_not_taken_for_less(monkeypatch):
     within a few times of what it takes."""
     tried = []
     monkeypatch.setattr(cost, "_grown", lambda f, samples, most: tried.append(f) or 0.0)
-    cost.price([cost.built(GLASS.with_numerics(grid=200), "path")])
+    cost.price(cost.connection(GLASS.with_numerics(grid=200)))
     assert len(tried) == 1
     small = GLASS.with_numerics(grid=60)
-    told = cost.price([cost.built(small, "path")])
+    told = cost.price(cost.connection(small))
     assert len(tried) == 1
     rng = np.random.default_rng(0)
     start = time.process_time()

@@ -12,7 +12,7 @@ from geomech import symbolic
 from geomech.geometry import connection, curvature
 from geomech.study import fields
 from geomech.study.bench import Study
-from geomech.tiers import TIERS
+from geomech.tiers import fitted
 from rft import se2
 
 GLASS = scenes.load("three-link-glass")
@@ -21,7 +21,7 @@ BENCH = Study(GLASS)
 
 def local(scene, shapes, h=2e-4):
     """The CCF (..., 3) of the scene's own fit at shapes (..., 2), by differences over 2 h of A solved there."""
-    unit = connection.directions(2, TIERS["path"].directions(scene.system, scene.numerics))
+    unit = connection.directions(2, fitted.directions(scene.system, scene.numerics))
 
     def A(alpha):
         return np.einsum("jc,...ci->...ij", np.linalg.pinv(unit), scene.system.velocity(alpha[..., None, :], unit))

@@ -149,7 +149,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     table = Table(str(tmp_path / "made.nc"))
     own, back = study.metric, table.stored("metric")
     name = "M" if medium is FLUID else "coefficients"
-    assert np.array_equal(getattr(back, name), getattr(own, name)) and table.power_degree == (
+    assert np.array_equal(getattr(back, name), getattr(own, name)) and table.traits.power_degree == (
         2 if medium is FLUID else 1
     )
     again = geomech.Study(scene(table)).effort(amplitudes=[1.0])
@@ -157,7 +157,7 @@ def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     assert again["path_length"] == pytest.approx(there["path_length"], rel=3e-3)
     assert again["work"] == pytest.approx(there["work"], rel=5e-3)
     saved = study.to_xarray()
-    assert saved.attrs["power_degree"] == table.power_degree
+    assert saved.attrs["power_degree"] == table.traits.power_degree
     assert ("metric" if medium is FLUID else "norm") in saved
 
 

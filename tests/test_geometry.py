@@ -11,6 +11,7 @@ from geomech import symbolic
 from geomech.gaits import Circle, Ellipse, Fourier
 from geomech.geometry import connection, coordinates, curvature, reconstruct
 from geomech.geometry.field import Field
+from geomech.geometry.traits import Traits
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -62,7 +63,8 @@ def test_half_the_grid_tells_the_other_half(points):
         asked.append(len(a))
         return body_velocity(MEDIA["glass-0.3mm-loose"], Chain((1, 2, 3)), a, d).checked().xi
 
-    whole, half = (connection.fit(glass, connection.grid(2, points), mirror=m, trusted=True) for m in (False, True))
+    fit = lambda traits: connection.fit(glass, connection.grid(2, points), traits=traits, trusted=True)
+    whole, half = fit(Traits()), fit(Traits(mirror=True))
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(half, name), getattr(whole, name), atol=1e-7)
     assert asked[1] == (asked[0] + 1) // 2

@@ -9,12 +9,14 @@ from registry import BODIES, GAITS
 from geomech.gaits import Butterfly, Circle, Fourier, Sine
 from geomech.geometry import connection, harmonics
 from geomech.geometry.images import around, images, to_solve
+from geomech.geometry.traits import NOTHING, Traits
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
 from rft.laws.base import TermLaw, is_central
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
+MIRROR, BACKWARDS, BOTH = Traits(mirror=True), Traits(reversible=True), Traits(mirror=True, reversible=True)
 REVERSIBLE = {
     "two": False, "three": True, "three-middle": True, "uneven": False, "five": True, "modes": False,
     "serpenoid": False, "arcs": False, "backbone": True,
@@ -29,11 +31,11 @@ def test_which_bodies_are_reversible(name):
 
 def test_what_else_tells_head_from_tail():
     chain = Chain((1, 2, 1))
-    assert Swimmer(GLASS, chain).reversible
-    assert not Swimmer(GLASS, chain, (EndCaps(radius=0.06),)).reversible
-    assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).reversible
-    assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).reversible
-    assert not Swimmer(Scales(), chain).reversible
+    assert Swimmer(GLASS, chain).traits.reversible
+    assert not Swimmer(GLASS, chain, (EndCaps(radius=0.06),)).traits.reversible
+    assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).traits.reversible
+    assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).traits.reversible
+    assert not Swimmer(Scales(), chain).traits.reversible
     assert is_central(GLASS)
     assert not is_reversible(Chain((1, 2, 1 + 1e-9)))
 
@@ -60,17 +62,11 @@ def test_fields_are_those_of_all_shapes(body, points, count):
         return xi
 
     axes = connection.grid(body.joints, points, 2.2)
-    whole, part = (
-        connection.fit(velocity, axes, count, trusted=True, mirror=alike, reversible=alike) for alike in (False, True)
-    )
+    whole, part = (connection.fit(velocity, axes, count, trusted=True, traits=traits) for traits in (NOTHING, BOTH))
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
     if body.joints == 2:
-        given = {"highest": 3, "reversible": True}
-        odd, alike = (
-            harmonics.fit(velocity, axes, count, mirror=known, **{**given, "reversible": known})
-            for known in (False, True)
-        )
+        odd, alike = (harmonics.fit(velocity, axes, count, highest=3, traits=traits) for traits in (NOTHING, BOTH))
         np.testing.assert_allclose(alike.coefficients, odd.coefficients, rtol=0, atol=1e-9)
     share = 4 if body.joints == 2 else 2
     assert asked[1] / asked[0] < 1 / share + 0.6 / points
@@ -83,7 +79,7 @@ def test_fields_are_those_of_all_shapes(body, points, count):
 def test_fields_of_bodies_that_slide_more_easily_forwards(medium, effects):
     """Their velocity does not turn round with the rates, so that a mirror tells nothing of the same directions."""
     swimmer, axes = Swimmer(medium, Chain((1, 2, 1)), effects), connection.grid(2, 5, 1.5)
-    assert swimmer.mirror and swimmer.halved == (type(effects[0]) is EndCaps if effects else False)
+    assert swimmer.traits.mirror and swimmer.traits.halved == (type(effects[0]) is EndCaps if effects else False)
     whole, part = connection.fit(swimmer.velocity, axes, 5, trusted=True), swimmer.fitted(axes, 5, 3)
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
@@ -91,18 +87,18 @@ def test_fields_of_bodies_that_slide_more_easily_forwards(medium, effects):
 
 def test_axes_and_directions_that_do_not_match():
     square, unit = connection.grid(2, 6, 1.0), connection.directions(2, 8)
-    assert len(images(square, unit, True, True)) == 3
-    assert len(images(square, unit, False, True)) == len(images(square, unit, True, False)) == 1
-    assert len(images(square, connection.directions(2, 5), True, True)) == 1  # the mirror alone
+    assert len(images(square, unit, BOTH)) == 3
+    assert len(images(square, unit, BACKWARDS)) == len(images(square, unit, MIRROR)) == 1
+    assert len(images(square, connection.directions(2, 5), BOTH)) == 1  # the mirror alone
     shifted = tuple(a + 0.1 for a in square)
-    assert [x.factor[0].tolist() for x in images(shifted, unit, True, True)] == [[-1.0, 1.0, -1.0]]
-    assert images((square[0], square[1][:5]), unit, True, True) == []
+    assert [x.factor[0].tolist() for x in images(shifted, unit, BOTH)] == [[-1.0, 1.0, -1.0]]
+    assert images((square[0], square[1][:5]), unit, BOTH) == []
 
 
 def test_the_table_says_what_it_took():
     """Foreseen balances are those that are solved."""
     from geomech import scene as scenes
-    from geomech.tiers import TIERS
+    from geomech.tiers import fitted, harmonic
 
     for name in ("three-link-glass", "butterfly-glass"):
         scene = scenes.load(name).with_numerics(grid=7)
@@ -116,10 +112,10 @@ def test_the_table_says_what_it_took():
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Swimmer, "velocity", counted)
-            for tier in (TIERS["path"], TIERS["harmonic"]):
+            for table in (fitted.table(swimmer, scene.numerics), harmonic.table(swimmer, scene.numerics)):
                 seen.clear()
-                tier.table(swimmer, scene.numerics)
-                assert sum(seen) == tier.solves(swimmer, scene.numerics, scene.gait, 1, 8)
+                table.build(None)
+                assert sum(seen) == table.balances
 
 
 ELLIPSE = Fourier(cos=((0.4,), (0.0,)), sin=((0.0,), (0.7,)))  # its second half is the first in a mirror, and no more
@@ -162,7 +158,7 @@ def test_gaits_are_those_of_all_phases(name):
 
 def test_what_is_nearly_an_image_is_none():
     """Neither shapes nor rates, neither of a large gait nor of a small one beside it; nor gaits that differ in their images."""
-    count = lambda *cycle: around(*cycle, True, True).count
+    count = lambda *cycle: around(*cycle, BOTH).count
     both = Circle().cycle(32, [1.0, 1e-6])
     assert count(*both) == 9
     for part in (0, 1):
@@ -173,7 +169,7 @@ def test_what_is_nearly_an_image_is_none():
                 assert count(*moved) == 32, (part, where)
     circle, butterfly = Circle().cycle(32), Butterfly().cycle(32)
     assert count(*map(np.stack, zip(circle, butterfly))) == 16
-    assert around(*circle, False, False).count == 32 and around(*circle, False, True).count == 17
+    assert around(*circle, NOTHING).count == 32 and around(*circle, BACKWARDS).count == 17
 
 
 def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):

@@ -18,6 +18,7 @@ from geomech import cli
 from geomech.core.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
+from geomech.geometry.traits import Traits
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
 from geomech.scene.keys import schema, text
 from geomech.scene.kinds import FAMILIES, load_file, register
@@ -157,7 +158,7 @@ def test_the_speed_matters_under_a_law_of_no_one_power():
     for mud in (Mud(), Bare(Mud())):
         assert not is_rate_independent(mud)
         swimmer = Swimmer(mud, Chain())
-        assert swimmer.lacks == Premise.RATE_INDEPENDENT
+        assert swimmer.traits.lacks == Premise.RATE_INDEPENDENT
         with pytest.raises(
             ValueError,
             match="no connection or CCF with the law .*no one power of the speed: use the direct tier, or take another law",
@@ -242,7 +243,7 @@ class Car(Plain):
     base: float = 0.4
     kind = "car"
     joints = 2
-    linear = True
+    traits = Traits(linear=True)
 
     def velocity(self, alpha, alphadot):
         alpha, alphadot = np.broadcast_arrays(alpha, alphadot)

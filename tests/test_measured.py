@@ -33,6 +33,7 @@ from geomech.scene import Scene, load
 from geomech.study import fields
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
+from geomech.systems.base import length_unit
 from geomech.text import measured as told
 from geomech.text.explain import explain
 from rft import se2
@@ -232,6 +233,18 @@ def test_every_entry_of_A_and_its_slope_is_the_truth_without_noise(viscous):
     slope = (A(shape + far) - A(shape - far)) / 0.1
     assert np.abs((f.known.of(shape + far) - f.known.of(shape - far)) / 0.1 - slope).max() < 0.02  # of 0.2
     np.testing.assert_allclose(f.displacement[0], true_net(f, viscous), atol=3e-5)
+
+
+@pytest.mark.parametrize(("wave", "kept"), [(1, 4), (5, 7), (7, 9)])
+def test_as_many_harmonics_as_the_connection_asks_for_and_two_more(wave, kept):
+    """A that goes up and down ``wave`` times along the gait; at least four harmonics."""
+    alongside = lambda alpha: np.real((alpha[..., 0] + 1j * alpha[..., 1]) ** wave)[..., None, None]
+    A = lambda alpha: 0.2 + 0.1 * alongside(alpha) * np.array([[1.0, 0.4], [0.3, -0.7], [0.5, 0.2]])
+    velocity = lambda alpha, alphadot: np.einsum("...ij,...j->...i", A(alpha), alphadot)
+    made = synthetic.made(
+        velocity, gaits.Circle(amplitude=1.0), cycles=30, samples=60, noise=1e-3, pose_noise=1e-3, seed=2
+    )
+    assert measured.fit_log(log_of(made)).known.A.shape[-1] == 2 * kept + 1
 
 
 def test_where_and_when_a_log_begins_does_not_matter(viscous):
@@ -641,7 +654,8 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     np.testing.assert_allclose(two.own_error(*cycle), Table(field / "field.nc").own_error(*cycle) * [0.5, 1])
     metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
     save_field(tmp_path / "m.nc", metres)
-    assert (Table(tmp_path / "m.nc").length, Table(tmp_path / "m.nc").unit) == (0.3, "m")
+    table = Table(tmp_path / "m.nc")
+    assert (table.length, length_unit(table)) == (0.3, "m")
 
 
 def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, tmp_path):

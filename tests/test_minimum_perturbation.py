@@ -46,6 +46,18 @@ def test_viscous_three_link_swimmer():
     assert np.hypot(*direct(Swimmer(FLUID, Chain()).velocity, Circle(), 1.0)[:2]) == pytest.approx(0.0513, abs=1e-4)
 
 
+def test_work_is_the_same_in_every_frame():
+    """Power and internal moments belong to no frame, whichever the velocity is told in."""
+    scene = scenes.load("three-link-viscous").with_numerics(grid=9, extent=1.0)
+    scene = scene.changed(system=Swimmer(FLUID, Chain((0.7, 1.4, 0.9), length=0.3)))
+    inner, outer = scene.system, Study(scene).in_frame("minimum-perturbation").scene.system
+    alpha, alphadot = np.random.default_rng(4).uniform(-0.8, 0.8, (2, 20, 2))
+    here = inner.work(alpha, alphadot, inner.velocity(alpha, alphadot))
+    there = outer.work(alpha, alphadot, outer.velocity(alpha, alphadot))
+    np.testing.assert_allclose(there.power, here.power, rtol=1e-9)
+    assert np.abs(outer.velocity(alpha, alphadot) - inner.velocity(alpha, alphadot)).max() > 1e-3
+
+
 @pytest.mark.parametrize("body", [Chain((0.7, 1.4, 0.9), length=0.3), Chain((1, 2, 3))])
 def test_it_is_the_same_frame_wherever_one_starts(body):
     poses, found = [], []
@@ -145,7 +157,7 @@ def test_sand_is_closer_to_its_area_integral():
 
 def test_singular_shapes_are_refused():
     snake = NoSlipSnake((1, 1, 1))
-    first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, singularity=snake.singularity)
+    first = connection.fit(snake.velocity, connection.grid(2, 21, 1.5), 4, traits=snake.traits)
     with pytest.raises(ValueError, match="singular shapes"):
         minimum_perturbation(first)
 

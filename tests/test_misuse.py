@@ -338,11 +338,11 @@ CONSTANT = ["differential-drive"]  # whose connection is the same at all angles 
 def test_no_system_of_ours_is_suspected(name):
     """Those of which a connection is to be had."""
     system = scenes.load(name).system
-    if system.joints == 2 and not system.lacks:
+    if system.joints == 2 and not system.traits.lacks:
         small = connection.grid(2, 4, 1.2)
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            connection.fit(system.velocity, small, singularity=system.singularity)
+            connection.fit(system.velocity, small, traits=system.traits)
 
 
 @pytest.mark.parametrize("name", MEDIA)

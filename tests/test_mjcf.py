@@ -94,6 +94,13 @@ def test_the_clock_drives_what_it_is_told_to_and_the_rest_keeps_its_keyframe(car
     assert course.body.facets.heights(data.xmat[[2]].reshape(1, 3, 3), data.xpos[[2]]).min() == pytest.approx(0.0)
 
 
+def test_without_a_keyframe_what_the_clock_does_not_drive_is_left_at_zero(cart):
+    robot = Mjcf(str(cart / "parts" / "cart.xml"), ("fl",), ("rr",), (0.25,))
+    clock = Course(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8)).clock
+    controls = clock(0.1, 0.1)
+    assert controls[:3].tolist() == [0.0, 0.0, 0.0] and controls[3] != 0.0
+
+
 @pytest.mark.parametrize(
     ("kind", "volume", "size"),
     [

@@ -196,6 +196,12 @@ def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     np.testing.assert_allclose(other[:, 1:4], first[:, 1:4], atol=1e-6)
 
 
+@pytest.mark.parametrize("aside", [(0.03,), (0.03, -0.04), (0.03, 2e3), ((0.03, 0.04),), (0.03, np.nan)])
+def test_distances_of_legs_from_the_middle_plane_are_checked(aside):
+    with pytest.raises(ValueError, match="^aside must be 2 numbers from 0 to .* m, one for each hip, got"):
+        Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=aside)
+
+
 def test_legs_alternate_as_in_the_plane():
     robot = XPLORER.robot
     legs = dict(zip(map(tuple, np.sign(hexapod.hips(robot)).astype(int).tolist()), hexapod.phases(robot)))

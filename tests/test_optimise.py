@@ -390,9 +390,9 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
 def test_singular_shapes_are_kept_away_from():
     snake = geomech.load("no-slip-snake")
     found = optimise(snake, within=1.6, harmonics=2)
-    d = snake.system.singularity(found.gait.cycle(500)[0])
+    d = snake.system.traits.singularity(found.gait.cycle(500)[0])
     assert found.value > 2 * found.start.value
-    assert np.abs(d).min() > 0.45 * np.abs(snake.system.singularity(snake.gait.cycle(500)[0])).min()
+    assert np.abs(d).min() > 0.45 * np.abs(snake.system.traits.singularity(snake.gait.cycle(500)[0])).min()
 
 
 def test_a_gait_drawn_together_is_kept_clear_of_them_too():
@@ -456,7 +456,7 @@ def test_where_one_sense_brings_more_it_is_the_one_found():
     """A skin that slides forwards more easily: its table, which is odd, leads to either sense alike."""
     skin = SkinFriction(forward=0.05, backward=0.3, reference=0.2)
     scene = Scene(Swimmer(SAND, Chain((1, 1, 1)), effects=(skin,)), Circle(amplitude=1.0), numerics=Numerics(grid=9))
-    assert not scene.system.odd
+    assert not scene.system.traits.odd
     found = optimise(scene, harmonics=1, within=1.2, starts=1)
     back = found.request.loops.gait(series.reversed_(found.request.loops.of(found.gait)))
     assert found.value > 0.48 > 5 * np.hypot(*displacement(scene.system.run(*back.cycle(128)).xi)[:2])
@@ -682,8 +682,8 @@ def test_several_answers_are_told_from_one_found_again():
 def test_all_starts_keep_off_singular_shapes():
     snake = geomech.load("no-slip-snake")
     found = optimise(snake, within=1.6, harmonics=2, starts=5)
-    least = np.abs(snake.system.singularity(snake.gait.cycle(1000)[0])).min()
-    d = snake.system.singularity(found.gait.cycle(1000)[0])
+    least = np.abs(snake.system.traits.singularity(snake.gait.cycle(1000)[0])).min()
+    d = snake.system.traits.singularity(found.gait.cycle(1000)[0])
     assert np.ptp(np.sign(d)) == 0
     assert np.abs(d).min() > 0.47 * least
     assert ("singular shapes" in found.active) == (np.abs(d).min() < 0.53 * least)

@@ -15,6 +15,7 @@ from geomech.output.plots.precision import KNOBS as PRECISION
 from geomech.output.plots.precision import PANELS
 from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
+from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 
 AXES = np.linspace(-1.0, 1.5, 11), np.linspace(-0.5, 2.0, 9)
@@ -160,13 +161,13 @@ def test_a_gait_is_drawn_as_far_as_the_field_goes():
 def test_modes_are_named_on_the_axes():
     """Shape variables that are no joint angles, on maps, arrows and in the units of the colours."""
     system = scenes.load("serpenoid-glass").system
-    names = [f"{name} ({unit})" for name, unit in system.shape_labels]
+    names = [f"{name} ({unit})" for name, unit in shape_labels(system)]
     assert "cosine" in names[0] and "sine" in names[1] and "rad" in names[0]
     field = Field(AXES, np.stack([SHAPES[0]] * 3))
     labels = (("bend", "deg"), ("roll", "m"))
     fitted = Connection(AXES, np.ones((3, 2, 11, 9)), SHAPES[0], SHAPES[0])
     for axes, bar in (
-        (plots.ccf_figure(field, labels=system.shape_labels).axes[:3], None),
+        (plots.ccf_figure(field, labels=shape_labels(system)).axes[:3], None),
         (plots.ccf_figure(field, labels=labels).axes[:3], "(length/(deg m))"),
         (
             plots.connection_figure(fitted, labels=labels).axes[:3],

@@ -1,8 +1,7 @@
 """Planes of shape space on which two joints of many move, the area tier of three joints, and what commands draw of them."""
 
-import copy
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from geomech import Numerics, Scene, Study
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
 from geomech.geometry.plane import Plane, Seen, looked_up, plane
+from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
 from geomech.scene.frames import framed
@@ -19,7 +19,7 @@ from geomech.study.choose import cheapest
 from geomech.study.shape_space import through as _held
 from geomech.systems import Plain, Swimmer
 from geomech.tiers import TIERS
-from geomech.tiers.path import around, fits
+from geomech.tiers.fitted import fits, is_too_large
 from rft import CATALOGUE, Chain, Viscous, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -97,7 +97,7 @@ def test_a_plane_is_that_of_the_whole_field_in_sand():
     for at, half in (([0.6, 0.6, -1.2], False), ([0.0, 0.0, 0.0], True)):
         asked = []
         velocity = lambda a, u: asked.append(len(a)) or system.velocity(a, u)
-        cut = plane(velocity, (axes[0], axes[2]), (0, 2), at, 16, mirror=True)
+        cut = plane(velocity, (axes[0], axes[2]), (0, 2), at, 16, traits=Traits(mirror=True))
         k = np.abs(axes[1] - at[1]).argmin()
         for name in ("A", "residual", "speed"):
             whole = getattr(fitted, name)[..., k, :]
@@ -142,7 +142,7 @@ def test_the_spread_is_that_of_another_surface():
                 total += (system.ccf(where, i, j) * (u[:, i] * v[:, j] - u[:, j] * v[:, i])[:, None]).mean(0)
         found.append(se2.exp(2 * np.pi * total / 40))
     apart = max(np.hypot(*(x - found[-1])[:2]) for x in found)
-    assert study.choice("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
+    assert study.spread("area", amplitudes=sizes)[0, 0] == pytest.approx(apart, rel=0.02)
     np.testing.assert_allclose(study.displacement("area", amplitudes=sizes)[0], found[-1], atol=3e-4)
 
 
@@ -245,7 +245,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
     looked_up, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
     found = looked_up.study(*asked)
     assert "field" in found["seconds"]
-    monkeypatch.setattr("geomech.tiers.path.FIELD", 9_999)
+    monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
     study = Study(scene)
     around = study.study(*asked)
     assert "field" not in around["seconds"] and not any(key[0] == "connection" for key in study.computed)
@@ -254,7 +254,7 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
         assert np.abs(np.array(around[tier]) - found["direct"]).max() > 1e-3
     assert around["surface_spread"]["area"] == pytest.approx(found["surface_spread"]["area"], rel=0.3)  # fewer surfaces
     jobs = study.cost(*asked)
-    assert jobs.balances >= TIERS["path"].along(scene.system, scene.numerics, 2, 256)
+    assert jobs.balances >= study.plan("path").balances(2, 256) == 2 * 256 * 64
     assert study.displacement("area").shape == study.displacement("path").shape == (3,)
 
 
@@ -291,30 +291,29 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
 
 def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     """Even where the force balance is near by chance."""
-    monkeypatch.setattr(TIERS["area"].__class__, "choice", lambda *asked: np.array([[0.3, 0.2], [1e-9, 0.4]]))
+    spread = np.array([[0.3, 0.2], [1e-9, 0.4]])
+    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: spread))
     scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
     table = Study(scene).study([0.4, 0.5], ["area"])
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
-    costly = {name: dear(TIERS[name], 10**k) for k, name in ((8, "adapted"), (9, "direct"))}
-    monkeypatch.setattr("geomech.study.choose.TIERS", TIERS | costly)
+    monkeypatch.setitem(TIERS, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
+    monkeypatch.setattr("geomech.study.choose.solved", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
-    monkeypatch.setattr(TIERS["area"].__class__, "choice", lambda *asked: np.full((2, 2), 0.01))
+    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
     assert found["tier"] == "area" and min(found["estimate"]["area"]) == 0.01
 
 
-def dear(tier, solves):
-    """The tier, as if it asked for so many velocities."""
-    other = copy.copy(tier)
-    other.solves = lambda *asked: solves
-    return other
+def planned(tier, **changes):
+    """The tier with another plan."""
+    return replace(tier, plan=lambda *asked: replace(tier.plan(*asked), **changes))
 
 
 def test_three_joints_keep_their_field_and_more_have_one_that_fits():
     three, four = Cubic(), Sandy()
-    assert not any(around(three, Numerics(grid=n)) for n in (31, 61))
-    assert [around(four, Numerics(grid=n)) for n in (13, 15)] == [False, True] and fits(4) == 13 and fits(5) == 7
+    assert not any(is_too_large(three, Numerics(grid=n)) for n in (31, 61))
+    assert [is_too_large(four, Numerics(grid=n)) for n in (13, 15)] == [False, True] and fits(4) == 13 and fits(5) == 7
     chain = Swimmer(Viscous(2.0), Chain((1,) * 5))
     with pytest.raises(ValueError, match=r"a frame on a grid of 15\^4 shapes is too large: lower \[numerics\] grid"):
         framed(chain, Numerics(grid=15))

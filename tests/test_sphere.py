@@ -8,10 +8,11 @@ from test_cli import geomech
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics
+from geomech.geometry.traits import Traits
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.systems import Swimmer
-from geomech.tiers import TIERS
+from geomech.tiers import harmonic
 from rft import CATALOGUE, Chain
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -44,7 +45,10 @@ def test_polynomials_on_the_sphere_come_back(joints, highest):
 
 def test_the_first_degree_is_the_connection():
     system, axes = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6))), connection.grid(3, 4, 1.0)
-    fitted, table = system.fitted(axes, 24, 3), harmonics.fit(system.velocity, axes, 24, highest=1, mirror=True)
+    fitted, table = (
+        system.fitted(axes, 24, 3),
+        harmonics.fit(system.velocity, axes, 24, highest=1, traits=Traits(mirror=True)),
+    )
     alpha, u = np.random.default_rng(1).uniform(-1, 1, (2, 9, 3))
     np.testing.assert_allclose(table.velocity(alpha, u), fitted.velocity(alpha, u), atol=1e-12)
 
@@ -72,7 +76,7 @@ def test_three_joints_in_sand_within_a_few_percent():
     chain = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6)))
     gait = Fourier(cos=((1.0, 0.0), (0.2, 0.3), (-0.5, 0.2)), sin=((0.1, 0.2), (0.9, 0.0), (0.4, -0.4)))
     study = Study(Scene(chain, gait, Numerics(grid=6, extent=0.6, phases=64)))
-    assert "harmonic" not in study.methods and TIERS["harmonic"].directions(chain, study.scene.numerics) == 110
+    assert "harmonic" not in study.methods and harmonic.directions(chain, study.scene.numerics) == 110
     table = study.study([0.4], ["harmonic", "path", "direct"])
     off = {m: np.hypot(*(np.array(table[m]) - table["direct"])[0, :2]) for m in ("harmonic", "path")}
     size = table["net_distance"]["direct"][0]

@@ -14,10 +14,12 @@ from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import crossed
+from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
 from geomech.study.bench import Study
 from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
+from geomech.systems.base import length_unit
 from geomech.systems.swimmer import Solver
 from geomech.text.explain import explain
 from geomech.tiers.direct import direct
@@ -46,6 +48,14 @@ def test_the_snake_moves_as_its_closed_form(length):
     wanted = exact(alpha, alphadot) * [length, length, 1]
     found = NoSlipSnake(length=length, frame="link-2").velocity(alpha, alphadot)
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_a_cycle_tells_the_mean_rate_of_each_gait():
+    """|alphadot| over the joints, averaged over the phases, of gaits side by side and of one alone."""
+    alpha, alphadot = AWAY.cycle(16, np.array([0.5, 0.8]))
+    wanted = [np.mean([np.hypot(*rate) for rate in gait]) for gait in alphadot]
+    np.testing.assert_allclose(NoSlipSnake().run(alpha, alphadot).speed, wanted, rtol=1e-14)
+    np.testing.assert_allclose(NoSlipSnake().run(alpha[1], alphadot[1]).speed, wanted[1], rtol=1e-14)
 
 
 @pytest.mark.parametrize("frame", ["mean", "link-1", "link-3"])
@@ -100,7 +110,7 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
     masked = np.isnan(fitted.A).all((0, 1))
     assert (np.isnan(fitted.A).any((0, 1)) == masked).all()
     assert 41 <= masked.sum() < 4 * 41
-    d = system.singularity(shapes)
+    d = system.traits.singularity(shapes)
     for axis in (0, 1):
         one, other = (np.moveaxis(x, axis, 0) for x in (d, masked))
         assert (other[1:] & other[:-1])[one[1:] * one[:-1] < 0].all()
@@ -161,16 +171,16 @@ def test_what_a_system_says_of_itself_holds(name):
     other_side = system.velocity(-alpha, -alphadot)
     assert (
         np.allclose(other_side, xi * [1, -1, -1], rtol=1e-6, atol=1e-8)
-        == system.mirror
+        == system.traits.mirror
         == (name != "differential-drive")
     )
     np.testing.assert_allclose(system.velocity(alpha, 3 * alphadot), 3 * xi, rtol=1e-5, atol=1e-6)
     columns = np.stack([system.velocity(alpha, e) for e in np.eye(system.joints)], -1)
     linear = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max() < 1e-9 * np.abs(columns).max()
-    assert linear == system.linear
-    assert system.unit == "m"
-    if system.mirror and not system.stored("connection"):  # a cart has one frame, a table that it was made in
-        assert system.in_frame("link-2").frame == "link-2"
+    assert linear == system.traits.linear
+    assert length_unit(system) == "m"
+    if system.traits.mirror and not system.stored("connection"):  # a cart has one frame, a table that it was made in
+        assert system.in_frame("link-2").traits.frame == "link-2"
     assert KINDS[system.kind] is type(system)
     scene = Scene(system, AWAY)
     run = scene.cycle(phases=64)
@@ -184,7 +194,7 @@ def test_whatever_has_a_velocity_is_a_system():
     """A system of one's own: a disc that is pushed along by its one joint, and turns."""
 
     class Disc(Plain):
-        joints, linear, kind = 2, True, "disc"
+        joints, traits, kind = 2, Traits(linear=True), "disc"
 
         def velocity(self, alpha, alphadot):
             alpha, alphadot = np.broadcast_arrays(alpha, alphadot)

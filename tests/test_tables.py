@@ -27,6 +27,7 @@ from geomech.scene import Numerics, Scene
 from geomech.study import accuracy, choose, estimate, fields, tiered
 from geomech.study.bench import Study
 from geomech.systems import NoSlipSnake, Swimmer, Table
+from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
 from geomech.text import accuracy as text
 from geomech.text.explain import explain
@@ -98,7 +99,7 @@ def test_a_mat_round_trip_keeps_every_digit(sign, order, made, tmp_path):
     again = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
     np.testing.assert_array_equal(again.fitted.A, s.fitted.A)
     np.testing.assert_array_equal(again.fitted.residual, s.fitted.residual)
-    assert (again.scene.system.unit, again.scene.system.length, again.scene.frame) == ("m", 0.3, "link-1")
+    assert (length_unit(again.scene.system), again.scene.system.length, again.scene.frame) == ("m", 0.3, "link-1")
     mat.save_connection(tmp_path / "b.mat", again, sign, order)
     more = loadmat(tmp_path / "b.mat")
     for name in ("alpha1", "alpha2", "Ax1", "Ax2", "Ay1", "Ay2", "Atheta1", "Atheta2"):
@@ -425,7 +426,7 @@ def test_a_table_is_told_its_unit_once(made, tmp_path):
         Table(folder / "a.mat", sha256="0" * 64)
     plain_mat(tmp_path / "a.mat", s.fitted)
     thirds, ones = Table(tmp_path / "a.mat", body_length=3.0), Table(tmp_path / "a.mat")
-    assert thirds.unit == ones.unit == "BL"
+    assert length_unit(thirds) == length_unit(ones) == "BL"
     xi = ones.velocity([0.2, 0.4], [1.0, -0.5])
     np.testing.assert_allclose(thirds.velocity([0.2, 0.4], [1.0, -0.5]), xi / [3, 3, 1], rtol=1e-13)
     with pytest.raises(ValueError, match="has the frame it was made in"):
@@ -445,7 +446,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
         assert told == [f"{file}: {LENGTHS}"] and LENGTHS in bare.told()
-        assert (bare.unit, bare.length) == ("BL", 1.0)
+        assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
         for length in (1.0, 3.0):
@@ -550,6 +551,15 @@ def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
     text = f'[system]\nkind = "table"\nfile = "{tmp_path}/a.nc"\n[gait]\nkind = "circle"\n'
     with pytest.raises(SceneError, match=said):
         scenes.parse(text, "s.toml")
+
+
+def test_a_metric_of_a_file_is_a_quadratic_form(tmp_path):
+    fields.save_connection(tmp_path / "a.nc", study(rft.Viscous(), grid=5))
+    raw = (tmp_path / "a.nc").read_bytes()
+    assert tables.load(tmp_path / "a.nc").metric is not None
+    (tmp_path / "a.nc").write_bytes(altered(raw, metric=put((0, 1, 2, 3), 9.0)))
+    with pytest.raises(SceneError, match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric"):
+        tables.load(tmp_path / "a.nc")
 
 
 @pytest.mark.parametrize("ending", ["nc", "mat"])

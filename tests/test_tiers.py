@@ -240,7 +240,7 @@ def test_estimates_of_refinement_are_neither_short_nor_long():
     rng, ratios = np.random.default_rng(21), []
     while len(ratios) < 30:
         some = random_scene(rng).with_numerics(regularisation=1e-8)
-        if some.system.linear:
+        if some.system.traits.linear:
             continue
         a = some.gait.amplitude * np.array([0.6, 0.8, 1.0])
         poses, error = estimate.direct(some, some.gait, a, 64)

@@ -172,7 +172,7 @@ def geometries(value):
     yield "a list", lambda: cheapest(plain, value, 0.1)
     yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)
-    yield "method", lambda: Study(plain).needs_field(value)
+    yield "method", lambda: Study(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
     yield "one shape", lambda: plain.system.single(value, [1, 0])
     yield "nothing", lambda: plain.system.with_solver(nonsense=value)

@@ -25,6 +25,7 @@ from rft.plates import (
     Polygon,
     Rotate,
     RoundRod,
+    Spline,
     SquareRod,
     StressMap,
     Wheel,
@@ -491,6 +492,7 @@ def test_limits(name):
             make(largest * (1 + 1e-9))
 
 
+CROSSES_BETWEEN_POINTS = [(0.026, 0), (0.003, 0.029), (-0.009, 0.023), (0.021, 0.043), (-0.039, 0.023)]  # chords do not
 REFUSED = [
     (lambda: StressMap(zeta=0), "zeta must be a number from 1e-06"),
     (lambda: StressMap(A00=np.nan), "A00 must be a number"),
@@ -512,6 +514,7 @@ REFUSED = [
     (lambda: Polygon([(0, 0), (1, 0)], 0.1), "a closed outline takes 3 to 2000 points, got 2"),
     (lambda: Polygon([(0, 0), (1, 0), (1, np.inf)], 0.1), "points must be finite"),
     (lambda: Polygon([(0, 0), (2, 0), (2, 1), (1, 0), (0, 1)], 0.1), "cross or touch"),
+    (lambda: Spline(CROSSES_BETWEEN_POINTS, 0.1), "elements [3] and [6] of the outline cross or touch"),
     (lambda: Polygon([(0, 0, 0), (1, 0, 0), (1, 1, 1)], 0.1), "points must be a list of (x, z)"),
     (lambda: RoundRod(0.1, 0.1).outline(0), "elements must be a whole number from 1 to 5000"),
     (lambda: Rotate(0.02, rate=1.0, start=1.0, stop=-1.0), "a rate from start to stop"),

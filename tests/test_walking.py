@@ -67,6 +67,14 @@ def test_the_clock_turns_once_a_cycle_and_sweeps_while_it_stands(gait):
     assert all(min(abs(k - x) for x in kinks) < 1.2e-3 for k in jumps)
 
 
+def test_each_kink_of_the_clock_stands_once():
+    """Where a leg of the one tripod changes its rate as one of the other does, too; and where the rate never changes."""
+    assert Tripod(1.0, 0.3).kinks == pytest.approx((0.0, 0.15, 0.35, 0.5))
+    assert Tripod(1.0, 0.8).kinks == pytest.approx((0.0, 0.1, 0.4, 0.5))
+    assert Tripod(1.0, 0.5, 1.0).kinks == (0.0, 0.25, 0.5)
+    assert Tripod(1.0, 0.3, 0.6 * np.pi).kinks == (0.0, 0.5)
+
+
 @pytest.mark.parametrize("robot", [ROBOT, Sheet(**vars(ROBOT))], ids=["box", "sheet"])
 @pytest.mark.parametrize("tension", ["keep", "cut"])
 def test_forces_are_the_sum_over_legs_and_belly(tension, robot):

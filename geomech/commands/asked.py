@@ -35,7 +35,7 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     own = scene.system.stored("connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
-    if scene.system.joint_angles and not own:
+    if scene.system.traits.joint_angles and not own:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene
@@ -63,10 +63,10 @@ def loaded_walker(name: str):
 
 def loaded_moving(name: str) -> Scene | WalkerScene:
     """Return the scene of that name; SceneError for one with neither a gait nor a robot."""
-    from geomech.scene import WalkerScene, load
+    from geomech.scene import load
 
     scene = load(name)  # once: it may come through a pipe
-    return scene if isinstance(scene, WalkerScene) else loaded(scene)
+    return scene if hasattr(scene, "robot") else loaded(scene)
 
 
 def loaded_any(name: str) -> Scene | Intruding | WalkerScene:

@@ -29,5 +29,5 @@ def sweep(
 
     scene = loaded_moving(name)
     axes = parameters(over, scene, 2 if plot else None)
-    file = Output(out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, behind("in"))
+    file = Output(out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, behind("results in"))
     execute(Sweep(scene, axes), file, Output(plot, pictures.sweep, pictures.check), yes=yes)

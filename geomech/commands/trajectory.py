@@ -23,4 +23,4 @@ def trajectory(
     from geomech.output import trajectories
     from geomech.study.motion import Trajectory
 
-    execute(Trajectory(loaded(name), cycles), Output(out, trajectories.save, formats.csv, behind("table in")), yes=yes)
+    execute(Trajectory(loaded(name), cycles), Output(out, trajectories.write, formats.csv, behind("table in")), yes=yes)

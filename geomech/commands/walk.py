@@ -34,5 +34,5 @@ def walk(
     from geomech.study.walking import Walking
 
     question = Walking(loaded_walker(name), engine, math.inf if yes else LONGEST)
-    results, picture = Output(out, walks.save, folder=True), Output(animate, walks.film, film.check_format)
+    results, picture = Output(out, walks.write, folder=True), Output(animate, walks.film, film.check_format)
     execute(question, results, picture, as_json=as_json, yes=yes)

@@ -18,6 +18,7 @@ from geomech.core.face import Faced
 from geomech.core.work import Map, each
 from geomech.geometry.field import UNTOLD, Field, as_axes, half_of
 from geomech.geometry.images import Image, images, to_solve
+from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import Telling, Velocity, evaluate, tried
 
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
@@ -114,9 +115,7 @@ def sampled(
     keep: Callable,
     degree: int = 3,
     progress: Callable | None = None,
-    mirror: bool = False,
-    singularity: Callable | None = None,
-    reversible: bool = False,
+    traits: Traits = NOTHING,
     map: Map = each,
 ) -> list[np.ndarray]:
     """`sampled_at` at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
@@ -124,8 +123,8 @@ def sampled(
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
             raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
-    alike = images(axes, unit, mirror, reversible)
-    return sampled_on(velocity, alpha, unit, keep, progress, alike, singularity, map)
+    alike = images(axes, unit, traits)
+    return sampled_on(velocity, alpha, unit, keep, progress, alike, traits.singularity, map)
 
 
 def sampled_on(
@@ -195,18 +194,19 @@ def _asked(asked: tuple, alpha: np.ndarray) -> tuple[np.ndarray, ...]:
     return evaluate(lambda *at: xi, alpha, unit, masked), more
 
 
-def even_part(velocity: Velocity, axes, singularity: Callable | None = None, map: Map = each) -> np.ndarray | None:
+def even_part(velocity: Velocity, axes, traits: Traits = NOTHING, map: Map = each) -> np.ndarray | None:
     """(3, N_1, ..., N_d): rms over directions of xi(alpha, alphadot) + xi(alpha, -alphadot), |alphadot| = 1, which a fit from
     half of the directions takes for 0; None where it is nothing but rounding at a few shapes that stand for all."""
     axes = tuple(np.asarray(a, float) for a in axes)
     unit = directions(len(axes), EVEN_DIRECTIONS * len(axes))
     rng = np.random.default_rng(0)
     some = np.stack([rng.uniform(a[0], a[-1], (EVEN_SHAPES, 1)) for a in axes], -1)
-    forth, back = (evaluate(velocity, some, sign * unit, masked=singularity is not None) for sign in (1.0, -1.0))
+    forth, back = (evaluate(velocity, some, sign * unit, masked=traits.singularity is not None) for sign in (1.0, -1.0))
     if np.nanmax(np.abs(forth + back)) <= EVEN * np.nanmax(np.abs(forth)):
         return None
     both = lambda alpha, alphadot: velocity(alpha, alphadot) + velocity(alpha, -alphadot)
-    return sampled(both, axes, unit, lambda xi: (np.sqrt((xi**2).mean(1)).T,), 1, singularity=singularity, map=map)[0]
+    known = Traits(singularity=traits.singularity)  # what is even has no images
+    return sampled(both, axes, unit, lambda xi: (np.sqrt((xi**2).mean(1)).T,), 1, traits=known, map=map)[0]
 
 
 def crossed(d: np.ndarray) -> np.ndarray:
@@ -227,22 +227,19 @@ def fit(
     count: int = 8,
     degree: int = 3,
     progress: Callable | None = None,
-    mirror: bool = False,
     *,
-    singularity: Callable | None = None,
+    traits: Traits = NOTHING,
     trusted: bool = False,
-    reversible: bool = False,
     unit: str = UNTOLD,
     length: float | None = None,
     map: Map = each,
 ) -> Connection:
     """Least-squares A on the grid spanned by ``axes``, from ``count`` uniform directions of alphadot at each shape.
 
-    progress: called with the fraction done. mirror: the swimmer's left and right are alike, so that xi(-alpha, -alphadot) =
-    (xi_x, -xi_y, -xi_theta), and xi turns round with alphadot: half of a symmetric grid tells the other half. reversible: so
-    are its head and tail (`geomech.geometry.images`), which halves it again where the directions allow. singularity: a
-    function of shapes (..., d) that passes through 0 where the velocity does not exist; there the connection is nan. Raises
-    what ``velocity`` raises.
+    progress: called with the fraction done. traits: what the velocity claims. Where left and right are alike (``halved``)
+    half of a symmetric grid gives the other half; ``reversible`` halves it again where the directions allow
+    (`geomech.geometry.images`); where ``singularity`` passes through 0 the connection is nan. Raises what ``velocity``
+    raises.
 
     A velocity that takes one shape at a time is asked for each in turn, and what it returns is broadcast. It is tried at a
     few shapes: `VelocityWarning` if it is not odd or not homogeneous in alphadot, or ignores alpha. trusted: it is not tried.
@@ -253,9 +250,8 @@ def fit(
     check_knobs(degree, progress)
     rates = directions(len(axes), count)
     if callable(velocity) and not trusted and all(a.ndim == 1 and a.size for a in axes):
-        velocity = tried(velocity, axes, singularity is not None)
-    keep, known = least_squares(rates), (mirror, singularity, reversible)
-    found = sampled(velocity, axes, rates, keep, degree, progress, *known, map)
+        velocity = tried(velocity, axes, traits.singularity is not None)
+    found = sampled(velocity, axes, rates, least_squares(rates), degree, progress, traits, map)
     return Connection(axes, *found, degree, unit=unit, length=length)
 
 

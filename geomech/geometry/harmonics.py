@@ -28,6 +28,7 @@ from geomech.core.errors import is_whole, number, real_array, short
 from geomech.core.work import Map, each
 from geomech.geometry.connection import Velocity, check_knobs, directions, sampled
 from geomech.geometry.field import Field, as_axes, half_of
+from geomech.geometry.traits import NOTHING, Traits
 
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
@@ -118,10 +119,9 @@ def fit(
     count: int = 24,
     degree: int = 3,
     progress: Callable | None = None,
-    mirror: bool = False,
     *,
     highest: int = 9,
-    reversible: bool = False,
+    traits: Traits = NOTHING,
     map: Map = each,
 ) -> Harmonics:
     """Odd harmonics up to ``highest`` from ``count`` uniform directions at each shape; other arguments, and their order,
@@ -154,5 +154,5 @@ def fit(
         coefficients = np.einsum("jc,sci->ijs", inverse, xi)
         return coefficients, unseen * np.sqrt(((xi - np.einsum("cj,ijs->sci", at, coefficients)) ** 2).mean(1)).T
 
-    found = sampled(velocity, axes, unit, keep, degree, progress, mirror, None, reversible, map)
+    found = sampled(velocity, axes, unit, keep, degree, progress, traits, map)
     return Harmonics(axes, *found, degree)

@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.geometry.traits import Traits
+
 SAME = (
     1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
 )
@@ -33,9 +35,10 @@ class Image(NamedTuple):
         return self.factor * xi[:, self.source]
 
 
-def images(axes: Sequence[np.ndarray], unit: np.ndarray, mirror: bool, reversible: bool) -> list[Image]:
-    """Those that a grid and directions (C, d) have with themselves, of a body whose left and right (mirror), head and tail
-    (reversible) are alike."""
+def images(axes: Sequence[np.ndarray], unit: np.ndarray, traits: Traits) -> list[Image]:
+    """Those that a grid and directions (C, d) have with themselves, of a body whose left and right (``traits.halved``), head
+    and tail (``traits.reversible``) are alike."""
+    mirror, reversible = traits.halved, traits.reversible
     index = np.arange(np.prod([len(a) for a in axes])).reshape([len(a) for a in axes])
     backwards = axes[::-1]
     moves = (
@@ -92,9 +95,10 @@ class Around(NamedTuple):
         return self.factor * xi[..., self.source, :]
 
 
-def around(alpha: np.ndarray, alphadot: np.ndarray, mirror: bool, reversible: bool) -> Around:
-    """Of cycles (..., N, d) together, as far as all are images of themselves in one way, of a body whose velocity turns round
-    with the rates and whose left and right (mirror), head and tail (reversible) are alike."""
+def around(alpha: np.ndarray, alphadot: np.ndarray, traits: Traits) -> Around:
+    """Of cycles (..., N, d) together, as far as all are images of themselves in one way, of a body whose left and right
+    (``traits.halved``), head and tail (``traits.reversible``) are alike."""
+    mirror, reversible = traits.halved, traits.reversible
     phases, joints = alpha.shape[-2:]
     if not (mirror or reversible):
         return _around(phases, False, ())

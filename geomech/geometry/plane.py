@@ -16,6 +16,7 @@ from geomech.geometry.curvature import ccf, error
 from geomech.geometry.field import UNTOLD, Field
 from geomech.geometry.gait import Gait
 from geomech.geometry.images import mirrored
+from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.tube import Tube
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
@@ -82,9 +83,8 @@ def plane(
     count: int,
     degree: int = 3,
     progress: Callable | None = None,
-    mirror: bool = False,
-    singularity: Callable | None = None,
     *,
+    traits: Traits = NOTHING,
     unit: str = UNTOLD,
     length: float | None = None,
     map: Map = each,
@@ -98,8 +98,10 @@ def plane(
     alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
     alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
     rates = directions(len(at), count)
-    alike = mirrored(alpha.reshape(-1, len(at)), count) if mirror else ()
-    A, residual, speed = sampled_on(velocity, alpha, rates, least_squares(rates), progress, alike, singularity, map)
+    alike = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
+    A, residual, speed = sampled_on(
+        velocity, alpha, rates, least_squares(rates), progress, alike, traits.singularity, map
+    )
     found = Connection(axes, A[:, list(pair)], residual, speed, degree, unit=unit, length=length)
     return Plane(pair, tuple(at.tolist()), found)
 

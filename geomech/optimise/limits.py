@@ -33,7 +33,7 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
         pairs = np.array([[-float(within), float(within)]] * system.joints)
     else:
         pairs = _pairs(within, system.joints)
-    if system.joint_angles:
+    if system.traits.joint_angles:
         check_angle("a limit of joints", float(np.abs(pairs).max()))
     slack = 1e-9 * (1 + np.abs(pairs))
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():

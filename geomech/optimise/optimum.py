@@ -11,6 +11,7 @@ from geomech.gaits import Gait, Sine
 from geomech.optimise.request import Request
 from geomech.scene.model import Scene
 from geomech.scene.write import gait_table
+from geomech.systems.base import length_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ class Optimum:
     def numbers(self) -> dict:
         """As JSON has them; the value of a distance is over the body's length, the displacement is not."""
         b, system = self.best, self.scene.system
-        aim, unit = self.request.aim.unit, system.unit
+        aim, unit = self.request.aim.unit, length_unit(system)
         return {
             "objective": self.request.aim.name,
             "value": b.value,

@@ -14,6 +14,7 @@ from geomech.scene.model import Scene
 from geomech.study.cost import Cost
 from geomech.study.effort import why_none
 from geomech.study.question import Allow, Progress, Question
+from geomech.systems.base import length_unit
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Optimize(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         found = search(self.request, progress)
-        best, aim, unit = found.best, self.request.aim, self.scene.system.unit
+        best, aim, unit = found.best, self.request.aim, length_unit(self.scene.system)
         told = [Variable("value", (), best.value, aim.unit, aim.name, best.error)]
         told += [
             Variable(name, (), x, u, "net displacement per cycle")

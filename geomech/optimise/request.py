@@ -63,11 +63,12 @@ class Request:
         return _inner(self.scene.system)
 
     whole = property(
-        lambda self: self.system.steps or isinstance(self.loops, Undulations), doc="Whether gaits are run as a whole."
+        lambda self: self.system.traits.steps or isinstance(self.loops, Undulations),
+        doc="Whether gaits are run as a whole.",
     )
     looks_up = property(
-        lambda self: not self.whole and self.system.joints == 2 and not self.system.linear and self.stored is None
-        and self.system.singularity is None,
+        lambda self: not self.whole and self.system.joints == 2 and not self.system.traits.linear and self.stored is None
+        and self.system.traits.singularity is None,
         doc="Whether a table leads near.",
     )  # fmt: skip
     stored = property(lambda self: self.system.stored("connection"))
@@ -78,7 +79,7 @@ class Request:
         own metric for a system that has one; None where nothing tells what moving costs."""
         system, length = self.system, self.system.length
         if self.stored:
-            told, degree, box = system.stored("metric"), system.power_degree or 2.0, self.loops.box
+            told, degree, box = system.stored("metric"), system.traits.power_degree or 2.0, self.loops.box
             return told and (lambda alpha, alphadot, xi: told.norm(np.clip(alpha, *box), alphadot) ** degree)
         if system.cost is not None:
             return lambda alpha, alphadot, xi: system.cost(alpha, alphadot)
@@ -97,9 +98,9 @@ class Request:
                 raise ValueError(f"--power is that of drag, and the {system.kind} has none: say --rate")
             return 2.0
         if self.stored:
-            return system.power_degree
-        if self.system.steps:
-            return 1.0 if self.system.kinks else 2.0
+            return system.traits.power_degree
+        if self.system.traits.steps:
+            return 1.0 if not self.system.traits.smooth else 2.0
         rng = np.random.default_rng(0)
         alpha, rate = (
             self.loops.unit * rng.normal(size=(8, self.system.joints)),
@@ -137,7 +138,7 @@ class Request:
         finished = min(FINISHED, self.starts) if self.looks_up else self.starts
         jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
-            jobs.append(cost.built(scene.changed(system=self.system).with_numerics(extent=self.extent), "harmonic"))
+            jobs += cost.harmonics(scene.changed(system=self.system).with_numerics(extent=self.extent))
             beside = 2 * MORE * (self.starts > 1)
             steps = (finished + 2 * beside) * FINISH + POLISH * self.phases / loops.phases
         else:
@@ -177,7 +178,7 @@ def checked(
             )
         wanted = Aim(aim, towards, system.length, **limits)
         if wanted.timed:
-            if system.lacks & Premise.RATE_INDEPENDENT:
+            if system.traits.lacks & Premise.RATE_INDEPENDENT:
                 system.refuse("speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
                 waves = isinstance(scene.gait, Sine)
@@ -186,7 +187,7 @@ def checked(
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not wanted.straight:
             raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
-        if isinstance(loops, Undulations) and wanted.direction == "y" and system.mirror:
+        if isinstance(loops, Undulations) and wanted.direction == "y" and system.traits.mirror:
             raise SceneError("a sine along a straight axis brings nothing across it: drop --direction, or say x")
         if isinstance(loops, Undulations) and wanted.rate is not None:
             raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
@@ -212,12 +213,12 @@ def told_by(system: System) -> str:
 
 def _in_mirror(request: Request) -> bool:
     """Whether the last of `OUTLINES` are others in the mirror."""
-    return request.system.mirror and not request.loops.middle.any()
+    return request.system.traits.mirror and not request.loops.middle.any()
 
 
 def _stays(system: System) -> bool:
     """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
-    if system.steps or not system.linear or system.stored("connection"):
+    if system.traits.steps or not system.traits.linear or system.stored("connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
         system = system.in_frame("mean")
@@ -229,7 +230,7 @@ def _stays(system: System) -> bool:
 def _never_turns(request: Request) -> bool:
     """Whether the heading of a system is a function of its shape, dA_theta = 0, by a few loops that stand for all."""
     system, loops = request.system, request.loops
-    if system.steps or not system.linear or system.singularity is not None:
+    if system.traits.steps or not system.traits.linear or system.traits.singularity is not None:
         return False
     some = np.array(loops.starts(loops.of(request.gait), LOOPS))
     turning = evaluate(system.velocity, *loops.cycle(some))[..., 2]
@@ -246,7 +247,7 @@ def _own_power(scene: Scene) -> float:
     gait, system = scene.gait, scene.system
     done = system.run(*gait.cycle(PHASES), True).work
     per_second = 2 * np.pi * scene.frequency if scene.frequency else 1.0
-    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.power_degree) or 1.0
+    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.traits.power_degree) or 1.0
 
 
 def _loops(scene: Scene, harmonics: int | None, within: Asked) -> Loops | Undulations:

@@ -84,13 +84,13 @@ class _Search:
     @property
     def _rough(self) -> bool:
         """Many a loop is the best near by."""
-        return self.r.looks_up or self.r.system.singularity is not None
+        return self.r.looks_up or self.r.system.traits.singularity is not None
 
     def optimum(self) -> Optimum:
         r = self.r
         own = r.loops.of(r.scene.gait)
         self.origin, *others = r.loops.starts(own, r.starts)
-        self.keeping = Keeping(r.loops, r.system.singularity, self.origin)
+        self.keeping = Keeping(r.loops, r.system.traits.singularity, self.origin)
         start = self._told(self._start())
         self._timed(start)  # refuses what no gait can be
         turn = abs(float(start.displacement[2]))
@@ -123,7 +123,7 @@ class _Search:
         near = self._near(
             ways.table(r, *looked_up), starts + self._led_on(looked_up, starts, turn), turn, looked_up, NEAR
         )
-        if not r.system.odd:  # where the table, which is, takes either sense for as good
+        if not r.system.traits.odd:  # where the table, which is, takes either sense for as good
             near += [series.reversed_(p) for p in near]
         ranked = self._ranked(tier, near, turn)
         further = self._each([p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE)
@@ -224,7 +224,7 @@ class _Search:
         before = cycles.count
         p = climb(
             cycles, self.r.aim, p, turn=how.turn, most=how.most, tolerance=how.tolerance, stroke=self.keeping.stroke,
-            singularity=self.r.system.singularity, away=self.keeping.away, told=how.told or (lambda: None),
+            singularity=self.r.system.traits.singularity, away=self.keeping.away, told=how.told or (lambda: None),
             even=EVEN_AT_LAST if how.phases else EVEN,
         )  # fmt: skip
         self.count += cycles.count - before
@@ -243,7 +243,7 @@ class _Search:
         cycles = ways.direct(r, r.phases)
         with contextlib.suppress(RuntimeError):  # of a loop near by that cannot be run
             p = settled(
-                cycles, r.aim, p, turn=turn, stroke=self.keeping.stroke, singularity=r.system.singularity,
+                cycles, r.aim, p, turn=turn, stroke=self.keeping.stroke, singularity=r.system.traits.singularity,
                 away=self.keeping.away,
             )  # fmt: skip
         self.count += cycles.count
@@ -272,7 +272,9 @@ class _Search:
 
     def _same(self, p, q) -> bool:
         loops, system = self.r.loops, self.r.system
-        return series.same(p, q, system.mirror, system.odd) if isinstance(loops, Loops) else loops.same(p, q)
+        return (
+            series.same(p, q, system.traits.mirror, system.traits.odd) if isinstance(loops, Loops) else loops.same(p, q)
+        )
 
     def _start(self) -> Gait:
         """The gait to begin with; a note where that is not the scene's."""
@@ -349,6 +351,6 @@ class Way:
 def _up_from(how: Way, p: np.ndarray) -> tuple[np.ndarray, int]:
     """(where a start leads, cycles)."""
     search = _Search(how.r, None)
-    search.keeping = Keeping(how.r.loops, how.r.system.singularity, how.origin)
+    search.keeping = Keeping(how.r.loops, how.r.system.traits.singularity, how.origin)
     cycles = ways.table(how.r, *how.looked_up) if how.looked_up else ways.direct(how.r, how.phases)
     return search._up(cycles, p, how), search.count

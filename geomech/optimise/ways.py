@@ -26,7 +26,7 @@ def direct(r: Request, phases: int | None = None) -> Phases | Runs:
 def looked_up(r: Request) -> tuple:
     """(harmonics of the velocity, and the norm of what moving costs if that is asked for), on a grid."""
     study = Study(r.scene.changed(system=r.system)).turned(extent=r.extent)
-    found = study.table("harmonic")
+    found = study.compute_harmonics()
     if not r.aim.costs:
         return found, None
     run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)

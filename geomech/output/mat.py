@@ -11,6 +11,7 @@ from geomech.io.files import whole_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 from geomech.study.bench import Study
 from geomech.study.shape_space import check_two_joints
+from geomech.systems.base import length_unit, shape_labels
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
@@ -33,12 +34,12 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
     entries = dict(zip(ENTRIES, factor * fitted.A.reshape(6, *fitted.A.shape[2:])))
     s = scene.system
-    names = [name for name, _ in s.shape_labels]
+    names = [name for name, _ in shape_labels(s)]
     meaning = "alpha_k is the heading of link k+1 minus that of link k, link 1 the tail"
     if names != ["alpha_1", "alpha_2"]:
         meaning = f"alpha1 is {names[0]}, alpha2 {names[1]}"
     about = {
-        "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": s.unit, "interpolation": fitted.degree,
+        "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": length_unit(s), "interpolation": fitted.degree,
         "shapes": names, "conventions": f"xi = {sign} A alphadot; {meaning}",
         **{key: value for key, value in s.about().items() if key in ("singular_shapes", "level")},
     }  # fmt: skip

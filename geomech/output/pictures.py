@@ -12,6 +12,7 @@ from geomech.geometry import stretch
 from geomech.output import plots
 from geomech.study import tables
 from geomech.study.shape_space import Space
+from geomech.systems.base import shape_labels
 
 check = plots.check_format
 
@@ -83,7 +84,7 @@ class Connection:
     def __call__(self, result: Result, path: Path) -> None:
         space: Space = result.subject
         scene = space.study.scene
-        told: dict[str, Any] = {"labels": scene.system.shape_labels, "style": self.style or "quiver"}
+        told: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **told), path)
             return
@@ -117,17 +118,17 @@ class Ccf:
         scene, told = space.study.scene, {"style": self.style or "map"}
         if space.planes_beside:
             told |= {"beside": space.planes_beside[0], "names": [scene.frame, self.beside]}
-        return plots.planes_figure(space.planes, scene.gait, labels=scene.system.shape_labels, **told)
+        return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **told)
 
     def _map(self, space: Space) -> Any:
         study, scene, other = space.study, space.study.scene, space.beside
         told: dict[str, Any] = {
             "gaits": [scene.gait],
             "error": study.curvature_error,
-            "labels": scene.system.shape_labels,
+            "labels": shape_labels(scene.system),
         }
         if self.stretch:
-            effort = "BL" if scene.system.power_degree == 1 else "path length"
+            effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
             return plots.stretched_figure(study.curvature, stretch.stretch(study.metric), **told, effort=effort)
         told |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
         if other:

@@ -18,6 +18,7 @@ from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import accuracy, fields, tables
 from geomech.study.report import Reported
+from geomech.systems.base import shape_labels
 
 SCENE, TABLES = "scene.toml", "displacement.json"
 
@@ -53,7 +54,7 @@ def write(result: Result, folder: Path) -> None:
 def _maps(found: Reported, folder: Path) -> None:
     """Draw the connection and the CCF, of three joints for every pair."""
     study, scene = found.study, found.study.scene
-    labels = scene.system.shape_labels
+    labels = shape_labels(scene.system)
     if found.planes:
         _save(plots.plane_connection_figure(found.planes, labels=labels), folder / "connection")
         _save(plots.planes_figure(found.planes, scene.gait, labels=labels), folder / "ccf")

@@ -9,15 +9,16 @@ from geomech.core.variables import Result
 from geomech.io.files import whole_file
 from geomech.run.progress import progress as shown
 from geomech.study.motion import Motion
+from geomech.systems.base import length_unit, shape_labels
 
 
-def save(result: Result, path: Path) -> None:
+def write(result: Result, path: Path) -> None:
     """Write the table of a motion, and show how much of it is written."""
     with shown(f"table of {result.subject.scene.name}") as bar:
-        write(path, result.subject, bar)
+        save(path, result.subject, bar)
 
 
-def write(path: Path, motion: Motion, progress: Callable | None = None) -> None:
+def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:
     """Write names of the columns, what they mean and in which units behind '#', then a row a phase, with every digit."""
     done = 0
     with whole_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
@@ -33,9 +34,9 @@ def write(path: Path, motion: Motion, progress: Callable | None = None) -> None:
 def about(motion: Motion) -> list[str]:
     """What the columns are, in lines."""
     scene, columns = motion.scene, motion.columns
-    system, unit = scene.system, scene.system.unit
-    shapes = ", ".join(f"alpha_{k + 1} {name} ({u})" for k, (name, u) in enumerate(system.shape_labels[:8]))
-    if all(label == (f"alpha_{k + 1}", "rad") for k, label in enumerate(system.shape_labels)):
+    system, unit = scene.system, length_unit(scene.system)
+    shapes = ", ".join(f"alpha_{k + 1} {name} ({u})" for k, (name, u) in enumerate(shape_labels(system)[:8]))
+    if all(label == (f"alpha_{k + 1}", "rad") for k, label in enumerate(shape_labels(system))):
         shapes = "alpha_k (rad): joint angle, heading of link k+1 less that of link k"
     name = " ".join(scene.name.split())
     lines = [
@@ -43,7 +44,7 @@ def about(motion: Motion) -> list[str]:
         "phase (rad): of the gait, 2 pi a cycle" + ("; time (s)" if "time" in columns else ""),
         f"x ({unit}), y ({unit}), theta (rad): pose of the frame {scene.frame}, seen from where it is at phase 0"
         f"; the body's length: {system.length:g} {unit}",
-        shapes + (" ..." if len(system.shape_labels) > 8 else ""),
+        shapes + (" ..." if len(shape_labels(system)) > 8 else ""),
     ]
     if "end_0_x" in columns:
         lines.append(f"end_k_x, end_k_y ({unit}): end of link k in the same axes, 0 the tail, the last the head")

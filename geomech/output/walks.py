@@ -22,7 +22,7 @@ TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
 
 
-def save(result: Result, folder: Path) -> None:
+def write(result: Result, folder: Path) -> None:
     """Write walk.json, walk.csv, walk.txt and walk.png."""
     write_csv(folder / "walk.csv", result)
     write_text(folder / "walk.json", json.dumps(text.numbers(result)) + "\n")

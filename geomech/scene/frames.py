@@ -5,9 +5,8 @@ from __future__ import annotations
 from geomech.geometry import connection
 from geomech.systems.base import System
 from geomech.systems.framed import Framed
-from geomech.tiers import TIERS
 from geomech.tiers.base import Numerics
-from geomech.tiers.path import FIELD, LARGEST_GRID
+from geomech.tiers.fitted import FIELD, LARGEST_GRID, directions
 
 
 def framed(system: System, numerics: Numerics) -> Framed:
@@ -20,7 +19,7 @@ def framed(system: System, numerics: Numerics) -> Framed:
         )
     axes = connection.grid(inner.joints, numerics.grid, numerics.extent)
     grid = tuple(tuple(a.tolist()) for a in axes)
-    new = Framed(inner, grid, TIERS["path"].directions(inner, numerics), numerics.interpolation)
+    new = Framed(inner, grid, directions(inner, numerics), numerics.interpolation)
     return system if new == system else new
 
 

@@ -49,7 +49,7 @@ class Scene(Told):
         if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
             self.system.note_angles(gait.largest(amplitudes))
 
-    frame = property(lambda self: self.system.frame, doc="The body frame of all velocities and displacements.")
+    frame = property(lambda self: self.system.traits.frame, doc="The body frame of all velocities and displacements.")
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
@@ -103,7 +103,7 @@ def checked_scene(scene) -> Scene:
 def frequency_of(system: System, gait: Gait) -> float | None:
     """Cycles per second of a system that runs a gait: the gait's, or that of effects which have one; None where neither says.
     ValueError if the two contradict each other."""
-    own, others = getattr(gait, "frequency", None), getattr(system, "frequency", None)
+    own, others = getattr(gait, "frequency", None), system.traits.frequency
     if own is None or others is None:
         return others if own is None else own
     if np.any(np.asarray(others) != own):

@@ -20,7 +20,7 @@ def kind(scene: Scene) -> str:
     ]
     s = scene.system
     rest = (s.medium, s.body, s.solver) if isinstance(s, Swimmer) else s
-    return repr((rest, scene.numerics, scene.gait.joints, s.lacks, effects))
+    return repr((rest, scene.numerics, scene.gait.joints, s.traits.lacks, effects))
 
 
 def beside(scenes: list[Scene], amplitudes=None) -> Scene:

@@ -1,4 +1,4 @@
-"""The workbench of a scene: displacements by every tier. The one thing that remembers what was computed."""
+"""The study of a scene: displacements by every tier. The one thing that remembers what was computed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as ccf_error
 from geomech.geometry.field import Field, inside
 from geomech.geometry.gait import checked_gait
+from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.plane import Plane
 from geomech.geometry.two_form import TwoForm, two_form
@@ -23,17 +24,19 @@ from geomech.run.progress import progress as shown
 from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
-from geomech.study.offer import METHODS, lookups, methods, tiers
+from geomech.study.offer import METHODS, methods, tiers
 from geomech.study.results import Displacements
+from geomech.systems.base import shape_labels
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
-from geomech.tiers import TIERS
-from geomech.tiers.base import in_groups
-from geomech.tiers.path import axes, plane
+from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers.base import Plan, Table, Tier, in_groups
+from geomech.tiers.harmonic import HARMONIC
+from geomech.tiers.path import PATH
 
 
 class Study(Faced):
-    """A scene and the tables computed for it so far, kept under what they depend on: the system, some entries of
-    [numerics], for a family also the gait. `turned` gives a bench with other numerics that shares them."""
+    """A scene and the tables computed for it so far, each stored under its name, the system and all else that it depends
+    on. `turned` gives a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -46,7 +49,7 @@ class Study(Faced):
 
     @property
     def computed(self) -> tuple:
-        """What tables there are, each (name, system, ...), all that it depends on."""
+        """What tables there are, each (name, system, key), all that it depends on."""
         return tuple(self._tables)
 
     def turned(self, **numerics) -> Study:
@@ -64,83 +67,124 @@ class Study(Faced):
 
     methods = property(lambda self: methods(self.scene.system))
     tiers = property(lambda self: tiers(self.scene.system))
-    lookups = property(lambda self: lookups(self.scene.system))
 
-    def _kept(self, what: str, depends_on: Sequence[str], reach: tuple, make: Callable):
-        """(what was made, the seconds that took, whether it was there before)."""
+    @property
+    def lookups(self) -> tuple[str, ...]:
+        """Tiers that approximate the system's velocity, of those that say something of it."""
         s = self.scene
-        key = what, s.system, *(getattr(s.numerics, name) for name in depends_on), *reach
+        return tuple(m for m in self.tiers if not TIERS[m].plan(s.system, s.numerics, s.gait, None).exact)
+
+    def _stored(self, name: str, key: tuple, build: Callable):
+        """Return (what is built, the seconds that took, whether it was there before)."""
+        key = name, self.scene.system, key
         if not (there := key in self._tables):
             import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
 
-            self._tables[key] = timed(make)
+            self._tables[key] = timed(build)
         return *self._tables[key], there
 
-    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
-        """What a tier looks up, computed once: a Connection, Harmonics or a Family; SceneError if it has none."""
-        return self._table(tier, gait, amplitudes, progress)[0]
+    def _built(self, table: Table, progress: Callable | None = None):
+        """Return what `_stored` does of a table; how far it is, if nobody wants to be told, is shown where it takes long."""
 
-    def _table(self, tier: str, gait: Gait | None, amplitudes, progress: Callable | None = None):
+        def build():
+            if progress:
+                return table.build(progress)
+            with shown(f"{table.name} of {self.scene.name}, {table.balances:,} force balances", bar=False) as bar:
+                return table.build(bar)
+
+        return self._stored(table.name, table.key, build)
+
+    def _connection(self) -> Table:
+        return fitted.table(self.scene.system, self.scene.numerics)
+
+    def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
+        """How a tier predicts displacements of a gait, or of the scene's own; SceneError if it says nothing of the system."""
         with named(self.scene.name):
-            how = TIERS[choose("methods", tier, METHODS)]
+            how = _tier(tier)
             how.refuse(self.scene.system)
-            reach = how.reach(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
-            make = lambda: self._made(how, reach, progress)
-            return self._kept(how.looks_up, how.depends_on, reach, make)
+            return self._plan(how, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
 
-    def _made(self, how, reach: tuple, progress: Callable | None):
-        """The table of a tier; how far it is, if nobody wants to be told, is shown where it takes long."""
-        if progress:
-            return how.table(self.scene.system, self.scene.numerics, *reach, progress=progress)
-        s = self.scene
-        solves = how.solves(s.system, s.numerics, s.gait, 1, s.numerics.phases)
-        with shown(f"{how.looks_up} of {s.name}, {solves:,} force balances", bar=False) as bar:
-            return how.table(s.system, s.numerics, *reach, progress=bar)
+    def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
+        return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
 
-    def needs_field(self, method: str) -> bool:
-        """Whether a tier looks the fitted connection up on the grid."""
-        tier = TIERS[choose("methods", method, METHODS)]
-        return tier.looks_up == "connection" and self._looked_up(tier)
+    def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
+        """What a tier looks up, computed once: a Connection, Harmonics or a Family; None for nothing. SceneError if it says
+        nothing of the system."""
+        return self._looked_up(self.plan(tier, gait, amplitudes), progress)
 
-    def _looked_up(self, tier) -> bool:
-        return not (tier.is_direct(self.scene.system) or tier.around(self.scene.system, self.scene.numerics))
+    def _looked_up(self, plan: Plan, progress: Callable | None = None) -> Any:
+        with named(self.scene.name):
+            return self._built(plan.table, progress)[0] if plan.table else None
+
+    def refuse_connection(self) -> None:
+        """SceneError if the system has no connection."""
+        with named(self.scene.name):
+            fitted.refuse(self.scene.system)
+
+    @property
+    def has_connection(self) -> bool:
+        """Whether the system has a connection, and joints so few that a plain study fits it."""
+        return PATH.is_offered(self.scene.system)
 
     def compute_field(self, progress: Callable | None = None) -> None:
         """Fill `fitted` now, telling ``progress`` the fraction done."""
-        self.table("path", progress=progress)
+        self._fitted(progress)
 
     @property
     def fitted(self) -> Connection:
         """The least-squares connection on the scene's grid."""
-        return self.table("path")
+        return self._fitted()
+
+    def _fitted(self, progress: Callable | None = None) -> Connection:
+        with named(self.scene.name):
+            fitted.refuse(self.scene.system)
+            return self._built(self._connection(), progress)[0]
+
+    def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
+        """The odd harmonics of the velocity on the scene's grid, telling ``progress`` the fraction done."""
+        with named(self.scene.name):
+            return self._built(harmonic.table(self.scene.system, self.scene.numerics), progress)[0]
+
+    @property
+    def harmonics(self) -> Harmonics | None:
+        """What of the velocity a plain study knows beyond its linear part; None where it has no such part, or too many
+        joints."""
+        return self.compute_harmonics() if self.has_harmonics else None
+
+    @property
+    def has_harmonics(self) -> bool:
+        """Whether there are `harmonics`."""
+        system = self.scene.system
+        return not system.traits.linear and HARMONIC.is_offered(system)
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
         that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, at = self.scene, self.scene.gait.middle if at is None else at
         with named(s.name):
-            make = lambda: plane(s.system, s.numerics, tuple(pair), at, progress)
-            return self._kept("plane", TIERS["path"].depends_on, (*pair, *at), make)[0]
+            build = lambda: fitted.plane(s.system, s.numerics, tuple(pair), at, progress)
+            return self._stored("plane", (*self._connection().key, *pair, *at), build)[0]
 
     @property
     def two_form(self) -> TwoForm:
         """The CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
-        return self._kept("two-form", TIERS["path"].depends_on, (), lambda: two_form(self.fitted))[0]
+        return self._stored("two-form", self._connection().key, lambda: two_form(self.fitted))[0]
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
         """`metric`, telling ``progress`` the fraction done. Where it takes the velocities of the harmonic table, that is
         made beside it, if it is not there yet."""
         s = self.scene
         with named(s.name):
-            return self._kept("metric", effort.DEPENDS_ON, (), lambda: self._made_metric(progress))[0]
+            key = fitted.key(s.numerics, effort.DEPENDS_ON)
+            return self._stored("metric", key, lambda: self._new_metric(progress))[0]
 
-    def _made_metric(self, progress: Callable | None) -> Metric | Finsler:
-        system, n, tier = self.scene.system, self.scene.numerics, TIERS["harmonic"]
-        key = tier.looks_up, system, *(getattr(n, name) for name in tier.depends_on)
-        if key in self._tables or not effort.shared(system):
+    def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
+        system, n = self.scene.system, self.scene.numerics
+        beside = harmonic.table(system, n)
+        if not effort.shared(system) or (beside.name, system, beside.key) in self._tables:
             return effort.table(system, n, progress)
         (harmonics, norm), took = timed(lambda: effort.with_harmonics(system, n, progress))
-        self._tables[key] = harmonics, took
+        self._tables[beside.name, system, beside.key] = harmonics, took
         return norm
 
     @property
@@ -161,52 +205,49 @@ class Study(Faced):
         system = self.scene.system
         if system.stored("connection"):
             return system.stored("even part")
-        make = lambda: even_part(system.velocity, self.fitted.axes, system.singularity)
-        return self._kept("even part", ("grid", "extent"), (), make)[0]
+        build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
+        return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
 
     @property
     def curvature(self) -> Field:
         """The CCF of `fitted`, for joints 1 and 2."""
-        return self._kept("ccf", TIERS["path"].depends_on, (), lambda: ccf(self.fitted))[0]
+        return self._stored("ccf", self._connection().key, lambda: ccf(self.fitted))[0]
 
     @property
     def curvature_error(self) -> Field:
         """The estimated error of `curvature`."""
-        return self._kept("error of the ccf", TIERS["path"].depends_on, (), lambda: ccf_error(self.fitted))[0]
+        return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
         with named(scene.name):
-            tier = TIERS[choose("methods", method, METHODS)]
-            tier.refuse(scene.system)
+            plan = self.plan(method, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
-            self._refuse_singular(tier, gait, amplitudes)
-            table = self.table(method, gait, amplitudes) if self._looked_up(tier) else None
-            return tier.predict(table, scene.system, gait, amplitudes, scene.numerics)
+            self._refuse_singular(plan, gait, amplitudes)
+            return plan.predict(self._looked_up(plan), amplitudes)
 
-    def choice(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
-        """(B, 2), the system's unit and rad: how far `displacement` hangs on a choice of the tier's own, such as a surface
+    def spread(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
+        """(B, 2), the system's unit and rad: how far `displacement` depends on a choice of the tier's own, such as a surface
         that the loop spans; None without one. Part of every estimate."""
-        s, tier, gait = self.scene, TIERS[method], self.scene.gait if gait is None else gait
-        table = self.table(method, gait, amplitudes) if self._looked_up(tier) else None
-        return tier.choice(table, s.system, gait, amplitudes, s.numerics)
+        plan = self.plan(method, gait, amplitudes)
+        return plan.spread(self._looked_up(plan), amplitudes)
 
     def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
         """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
-        field, every = axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in system.shape_labels])[:, 0]
+        field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
         in_groups(shapes, every, system.at_once(n.phases))
 
-    def _refuse_singular(self, tier, gait: Gait, amplitudes) -> None:
+    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
-        system, n = self.scene.system, self.scene.numerics
-        if system.singularity is not None:
+        system, phases = self.scene.system, self.scene.numerics.phases
+        if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
-            if reach := tier.reach(gait, a):
-                a = np.outer([x for x in reach[1:] if x], np.arange(1, n.curves + 1) / n.curves).ravel()
-            system.refuse_singular(gait.cycle(n.phases, a)[0])
+            if plan.table and plan.table.amplitudes is not None:
+                a = plan.table.amplitudes
+            system.refuse_singular(gait.cycle(phases, a)[0])
 
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
@@ -221,13 +262,13 @@ class Study(Faced):
         """
         gait, amplitudes, chosen = self._asked(gait, amplitudes, methods)
         medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # refuses, before the rest
-        seconds, kept = self._built(chosen, gait, amplitudes, progress)
+        seconds, kept = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
-        poses, errors, choices, reference = {}, {}, {}, None
+        poses, errors, spreads, reference = {}, {}, {}, None
         size = [self.scene.system.length, 1.0]  # estimates are in body lengths
         for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
-            if chosen[method].is_direct(self.scene.system):
+            if chosen[method].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
                 reference, seconds[method] = timed(direct)
                 poses[method], errors[method] = reference
@@ -235,36 +276,37 @@ class Study(Faced):
                 poses[method], seconds[method] = timed(lambda m=method: self.displacement(m, gait, amplitudes))
                 check = lambda m=method: estimate.against_direct(self.scene, poses[m], gait, amplitudes, reference)
                 errors[method], took = timed(check)
-                if (choice := self.choice(method, gait, amplitudes)) is not None:
-                    choices[method], errors[method] = choice, np.maximum(errors[method], choice / size)
+                if (spread := self.spread(method, gait, amplitudes)) is not None:
+                    spreads[method], errors[method] = spread, np.maximum(errors[method], spread / size)
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
         told = {"seconds": seconds, "kept": kept}
-        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, choices, **told))
+        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **told))
 
-    def _built(self, chosen: dict, gait: Gait, amplitudes, progress) -> tuple[dict[str, float], list[str]]:
-        """The tables of tiers, built: seconds that each took, whenever that was, and the names of those that were there."""
-        seconds, kept = {}, []
-        looked_up = [m for m in chosen if self._looked_up(chosen[m])]
-        for method in sorted(
-            looked_up, key=lambda m: chosen[m].looks_up != "connection"
-        ):  # the field is the picture, too
-            name = "field" if self.needs_field(method) else f"{method} table"
+    def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
+        """Build the tables of tiers; return the seconds that each took, whenever that was, and the names of those that were
+        there."""
+        field, seconds, kept = self._connection(), {}, []
+        tables = {m: plan.table for m, plan in chosen.items() if plan.table}
+        of_field = lambda m: tables[m].name == field.name
+        for method in sorted(tables, key=of_field, reverse=True):  # the field is the picture, too
+            name = "field" if of_field(method) else f"{method} table"
             if name not in seconds:
-                _, seconds[name], there = self._table(method, gait, amplitudes, progress)
+                with named(self.scene.name):
+                    _, seconds[name], there = self._built(tables[method], progress)
                 kept += [name] * there
         return seconds, kept
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
         """What `study` would take, and ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.study.cost`."""
-        gait, amplitudes, _ = self._asked(gait, amplitudes, methods)
+        gait, amplitudes, plans = self._asked(gait, amplitudes, methods)
         with named(self.scene.name):
-            return cost.price([*cost.study(self.scene, methods, len(amplitudes), gait), *more])
+            return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
     def _asked(self, gait, amplitudes, methods):
-        """(gait, or the scene's own, amplitudes (B,), tiers by name) of a request; SceneError for what makes none."""
+        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; SceneError for what makes none."""
         scene = self.scene
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
@@ -274,13 +316,18 @@ class Study(Faced):
         with named(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
-            chosen = {m: TIERS[choose("methods", m, METHODS)] for m in methods}
-            for tier in chosen.values():
+            chosen = {}
+            for tier in [_tier(m) for m in methods]:
                 tier.refuse(scene.system)
-                self._refuse_singular(tier, gait, amplitudes)
-                if tier.on_grid and self._looked_up(tier):
+                chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
+                self._refuse_singular(plan, gait, amplitudes)
+                if plan.table and plan.table.axes:
                     self.refuse_outside(gait, amplitudes)
         return gait, amplitudes, chosen
+
+
+def _tier(name: str) -> Tier:
+    return TIERS[choose("methods", name, METHODS)]
 
 
 def timed(f: Callable) -> tuple[Any, float]:

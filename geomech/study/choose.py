@@ -15,7 +15,7 @@ from geomech.study import cost, tables, uncertainty
 from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
-from geomech.tiers import TIERS
+from geomech.tiers.base import solved
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # that a tolerance asks for
@@ -49,30 +49,26 @@ def cheapest(
         return Displacements(tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more))
 
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
-    phases = max(FEWEST_STEPS if system.steps else 32, 8 * gait.harmonics)
+    phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
     if study.lookups:
         pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
         phases = settings["phases"]
-    around = lambda m: TIERS[m].around(system, scene.numerics)
-    asked = len(amplitudes), phases
-    solves = lambda m: (
-        TIERS[m].along(system, scene.numerics, *asked)
-        if around(m)
-        else TIERS[m].solves(system, scene.numerics, gait, *asked)
-    )
-    for method in sorted(study.lookups, key=solves):
-        if solves(method) >= solves("direct"):
+    plans = {m: study.plan(m, gait, amplitudes) for m in study.lookups}
+    balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
+    enough = len(amplitudes) * solved(system, gait, phases)  # of the system itself
+    for method in sorted(plans, key=balances.get):
+        if balances[method] >= enough:
             break
-        ask([cost.built(scene, method, gait)])
+        ask(cost.predicted(scene, plans[method], len(amplitudes)))
         try:
             checked = study.displacement(method, gait, amplitudes[some])
         except ValueError:  # the gait leaves the field or the family: this tier cannot say
             continue
         if (apart(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
             poses = study.displacement(method, gait, amplitudes)
-            error, choice = against_direct(scene, poses, gait, amplitudes), study.choice(method, gait, amplitudes)
-            if choice is not None:
-                error = np.maximum(error, choice / [system.length, 1.0])
+            error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(method, gait, amplitudes)
+            if spread is not None:
+                error = np.maximum(error, spread / [system.length, 1.0])
             if error[:, 0].max() <= tol:
                 return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)

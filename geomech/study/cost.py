@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +22,8 @@ from geomech.run.backend import suiting
 from geomech.run.jobs import unaided
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
-from geomech.tiers import TIERS
-from geomech.tiers.base import solved
-from geomech.tiers.path import axes
+from geomech.tiers import fitted, harmonic
+from geomech.tiers.base import Plan, Table, solved
 
 LONGEST = 60.0  # s of computing that a command takes up without being told to
 LARGEST = 2e9  # bytes of memory, likewise
@@ -35,6 +34,7 @@ FREE = (
 )
 SLOW, STEP = 2e-5, 4e-3  # s: some two times what NumPy took on the machine this was written on
 NEXT = 4e-6  # s for each element in a time step, which begins near its end
+READ = 5e-9  # s for each number of a table that a look-up sums; 1.3e-9 to 6e-9 measured
 CYCLES = 3  # that it takes to reach a limit cycle
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
@@ -72,24 +72,21 @@ class Cost(NamedTuple):
 
 class Job(NamedTuple):
     """Part of a request. what: "balances" solved side by side, "steps" of one cycle of ``group`` samples,
-    "powers" of balances, or "look-ups" in a tier's table. gait: whose shapes, None for those all over the field. memory: bytes
-    at the peak."""
+    "powers" of balances, or "look-ups" of so many numbers read each. gait: whose shapes, None for those all over the field.
+    memory: bytes at the peak."""
 
     what: str
     scene: Scene
     gait: Gait | None
     count: float
     group: int = 1
-    tier: str = ""
+    read: int = 0
     memory: float = BASE
 
     @property
     def kind(self) -> str:
         """The same for jobs whose balances, steps or look-ups take the same time."""
-        s = self.scene
-        table = TIERS[self.tier].depends_on if self.tier else ()
-        terms = [getattr(s.numerics, name) for name in table if name not in ("grid", "extent", "directions")]
-        return repr((self.what, s.system.costs_as, self.gait, self.group, self.tier, terms))
+        return repr((self.what, self.scene.system.costs_as, self.gait, self.group, self.read))
 
     @property
     def balances(self) -> int:
@@ -128,27 +125,50 @@ def _size(memory: float) -> str:
     return f"{memory / 1e9:,.2g} GB" if memory >= 1e9 else f"{memory / 1e6:.0f} MB"
 
 
-def study(scene: Scene, methods: Sequence[str], count: int, gait: Gait | None = None, tables: bool = True) -> list[Job]:
-    """`Study.study` of ``count`` amplitudes of a gait, or the scene's own; without its tables if they are there."""
+def study(
+    scene: Scene, plans: Mapping[str, Plan], count: int, gait: Gait | None = None, tables: bool = True
+) -> list[Job]:
+    """`Study.study` of ``count`` amplitudes of a gait, or the scene's own, by the plans of tiers; without tables if they are
+    there."""
     gait, phases = gait or scene.gait, scene.numerics.phases
-    lookups = [m for m in methods if not TIERS[m].is_direct(scene.system)]
-    around = [m for m in lookups if TIERS[m].around(scene.system, scene.numerics)]
-    shared = {TIERS[m].looks_up: m for m in reversed(lookups) if m not in around}
-    jobs = [built(scene, m, gait) for m in reversed(shared.values()) if tables]
-    jobs += frame(scene) if "connection" not in shared else []
-    jobs += [Job("look-ups", scene, None, count * phases, tier=m) for m in lookups if m not in around]
-    along = lambda m: TIERS[m].along(scene.system, scene.numerics, count, phases)
-    jobs += [Job("balances", scene, None, float(along(m)), memory=BASE + 8 * COPIES * SAMPLES_TOGETHER) for m in around]
+    jobs, names = [], set()
+    for plan in sorted(plans.values(), key=lambda plan: -plan.numbers):
+        if tables and plan.table and plan.table.name not in names:
+            names.add(plan.table.name)
+            jobs += built(scene, plan.table, plan.numbers)
+    jobs += frame(scene) if "connection" not in names else []
+    guesses = [plan for plan in plans.values() if not plan.exact]
+    for plan in guesses:
+        jobs += _looked_up(scene, plan, count, phases)
     jobs += of_medium(scene, gait, count)
-    if len(lookups) < len(methods):
-        return jobs + (len(methods) - len(lookups)) * direct(scene, gait, count, phases)
+    if len(guesses) < len(plans):
+        return jobs + (len(plans) - len(guesses)) * direct(scene, gait, count, phases)
     fewer = max(estimate.REFERENCE_PHASES, 8 * gait.harmonics)
-    return jobs + len(lookups) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+    return jobs + len(guesses) * direct(scene, gait, min(count, estimate.CHECKED), fewer)
+
+
+def predicted(scene: Scene, plan: Plan, count: int) -> list[Job]:
+    """The prediction of ``count`` amplitudes by a tier, with its table."""
+    table = built(scene, plan.table, plan.numbers) if plan.table else []
+    return table + _looked_up(scene, plan, count, scene.numerics.phases)
+
+
+def balances(plan: Plan, count: int, phases: int) -> int:
+    """Velocities that the prediction of ``count`` amplitudes at so many phases takes, with its table."""
+    return (plan.table.balances if plan.table else 0) + plan.balances(count, phases)
+
+
+def _looked_up(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
+    """What a tier takes beside its table."""
+    if plan.table:
+        return [Job("look-ups", scene, None, count * phases, read=plan.read)]
+    memory = BASE + 8 * COPIES * SAMPLES_TOGETHER
+    return [Job("balances", scene, None, float(plan.balances(count, phases)), memory=memory)]
 
 
 def frame(scene: Scene) -> list[Job]:
     """The field that a frame is made of which is one itself, as "minimum-perturbation" is: of two joints a trifle."""
-    return [built(scene, "path")] if scene.system.carried and scene.system.joints > 2 else []
+    return connection(scene) if scene.system.carried and scene.system.joints > 2 else []
 
 
 def of_medium(scene: Scene, gait: Gait, count: int) -> list[Job]:
@@ -165,7 +185,7 @@ def direct(
 ) -> list[Job]:  # fmt: skip
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
     (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
-    system, stepping = scene.system, scene.system.steps
+    system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, system.at_once(phases))
@@ -183,26 +203,35 @@ def _refined(scene: Scene, solves: Callable, phases: int) -> float:
     quarter and an eighth of the phases, and a quarter with a finer model where there is one. Pieces of body are doubled on the
     quarter, and halved and quartered at all phases: as much as half and a quarter."""
     full, quarter = solves(phases), solves(phases // 4)
-    again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.steps else 0
+    again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.traits.steps else 0
     again += 2 * quarter + 0.75 * full if scene.system.cut else 0
     return full + again + (quarter if scene.system.finer() else 0)
 
 
-def built(scene: Scene, tier: str, gait: Gait | None = None) -> Job:
-    """The table of a tier; that of area and path is the connection with its CCF."""
-    how, system, n, gait = TIERS[tier], scene.system, scene.numerics, gait or scene.gait
-    family = how.reach(gait, [0.0])
-    if not family:
-        how.axes(system, n)  # refuses a field that is too large
-    memory = BASE + 8 * TABLES * how.size(system, n)
-    return Job("balances", scene, gait if family else None, how.solves(system, n, gait, 1, n.phases), memory=memory)
+def connection(scene: Scene) -> list[Job]:
+    """The connection with its CCF."""
+    return built(scene, fitted.table(scene.system, scene.numerics))
+
+
+def harmonics(scene: Scene) -> list[Job]:
+    """The harmonics of the velocity."""
+    return built(scene, harmonic.table(scene.system, scene.numerics))
+
+
+def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
+    """A table, beside which so many numbers are held."""
+    if table.axes:
+        table.axes()  # refuses a field that is too large
+    gait = None if table.amplitudes is None else scene.gait
+    memory = BASE + 8 * TABLES * (table.numbers + numbers)
+    return [Job("balances", scene, gait, table.balances, memory=memory)]
 
 
 def of_planes(scene: Scene, count: int) -> list[Job]:
     """So many planes of two joints (`Study.plane`)."""
     if scene.system.stored("connection"):
         return []
-    solves = count * scene.numerics.grid**2 * TIERS["path"].directions(scene.system, scene.numerics)
+    solves = count * scene.numerics.grid**2 * fitted.directions(scene.system, scene.numerics)
     return [Job("balances", scene, None, float(solves)), *frame(scene)]
 
 
@@ -212,17 +241,17 @@ def of_metric(scene: Scene) -> list[Job]:
     if system.stored("metric"):
         return []
     if effort.shared(system):
-        table = built(scene, "harmonic")
+        (table,) = harmonics(scene)
         return [table, table._replace(what="powers")]
-    rates = system.joints * (system.joints + 1) // 2 if system.linear else TIERS["harmonic"].directions(system, n)
-    count, numbers = np.prod([len(a) for a in axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
+    rates = system.joints * (system.joints + 1) // 2 if system.traits.linear else harmonic.directions(system, n)
+    count, numbers = np.prod([len(a) for a in fitted.axes(system, n)]), max(system.joints**2, effort.HIGHEST + 1)
     return [Job("balances", scene, None, float(count * rates), memory=BASE + 8 * TABLES * float(count * numbers))]
 
 
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     """Path length and work of ``count`` amplitudes (`effort.effort`): steps of time again at half and a quarter of the
     phases, and a quarter of the phases with twice the pieces."""
-    times = 1.0 + 0.75 * bool(scene.system.steps) + 0.5 * bool(scene.system.cut)
+    times = 1.0 + 0.75 * bool(scene.system.traits.steps) + 0.5 * bool(scene.system.cut)
     jobs = direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
     return [job._replace(count=times * job.count) for job in jobs]
 
@@ -231,8 +260,7 @@ def _per_sample(job: Job, count: float) -> float:
     """Seconds a force balance, the power of one, or a look-up, takes."""
     scene = job.scene
     if job.what == "look-ups":
-        look = TIERS[job.tier].sample(scene.system, scene.numerics) if count >= 1e5 else None
-        return _grown(look, 64, count) if look else 0.0
+        return READ * job.read
     prior = SLOW * scene.system.evaluations
     if prior * count < FREE:
         return prior / 2

@@ -20,6 +20,7 @@ from geomech.study import estimate, tables, uncertainty
 from geomech.study.batch import beside, kind
 from geomech.study.cost import Cost, direct, of_medium, price
 from geomech.study.grid import Grid, at_points
+from geomech.systems.base import length_unit
 
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
 MOST_BATCHES = 10  # that are taken for nothing in a forecast
@@ -65,7 +66,7 @@ class Cycles:
         some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
         jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
         balances, each, _ = np.array(list(map(price, jobs))).T
-        if not grid.scene.system.steps and total > MOST_BATCHES * together:
+        if not grid.scene.system.traits.steps and total > MOST_BATCHES * together:
             with suiting(balances.mean()):
                 seconds += total / together * self._seconds_of_a_batch(first[0], (grid.beside or [])[:1] or None)
         held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
@@ -82,7 +83,9 @@ class Cycles:
     def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
         """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""
         scene, length = grid.scene, _lengths(grid)
-        unit = scene.system.unit if np.all(length == scene.system.length) else "m"  # BL where no point has a size
+        unit = (
+            length_unit(scene.system) if np.all(length == scene.system.length) else "m"
+        )  # BL where no point has a size
         errors = np.stack([length * rows[..., 3], rows[..., 4]], -1)
         sizes = [length, length, np.ones_like(length), length]
         spread = {
@@ -138,7 +141,7 @@ def _lengths(grid: Grid) -> np.ndarray:
 def _idle(scene: Scene, names) -> tuple[str, ...]:
     """Return the parameters that change no displacement: the frequency, where no effect has one."""
     timed = [f"{section}.frequency" for section in ("gait", "physical")]
-    return tuple(name for name in names if name in timed and scene.system.frequency is None)
+    return tuple(name for name in names if name in timed and scene.system.traits.frequency is None)
 
 
 def _rows(scenes: list[Scene], amplitudes) -> list:

@@ -26,9 +26,10 @@ from geomech.scene.model import Scene
 from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES
 from geomech.systems.base import SHAPE_ALONE, System
-from geomech.tiers import TIERS
+from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, in_groups
-from geomech.tiers.path import axes
+from geomech.tiers.fitted import axes
+from geomech.tiers.harmonic import HARMONIC
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
@@ -44,12 +45,12 @@ def why_none(system: System) -> str:
         return "" if system.stored("metric") else "no metric with this table: its file tells no power"
     if system.cost is not None:
         return ""
-    if system.power_degree is None:
+    if system.traits.power_degree is None:
         power = (
             "its power is of no one degree in the rate" if hasattr(system, "work") else "nothing says what moving costs"
         )
         return f"no metric with {_who(system)}: {power}"
-    if not system.linear and system.joints != 2:
+    if not system.traits.linear and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
     return "" if _even(system) else f"no metric with {_who(system)}: one way costs another power than the way back"
 
@@ -61,7 +62,7 @@ def _who(system: System) -> str:
 
 def _even(system: System) -> bool:
     """Whether power is the same for alphadot and -alphadot, at a few shapes that stand for all."""
-    if system.linear:
+    if system.traits.linear:
         return True
     rng = np.random.default_rng(0)
     alpha, alphadot = rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)), connection.directions(2, 8)
@@ -76,18 +77,17 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     if own := system.stored("metric"):
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
-    if system.cost is not None or system.linear:
+    if system.cost is not None or system.traits.linear:
         return metric.fit(system.cost or system.power, grid, degree, progress)
     norm = partial(_norm_of, system)
-    count = TIERS["harmonic"].directions(system, numerics)
+    count = harmonic.directions(system, numerics)
     return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
 
 
 def shared(system: System) -> bool:
     """Whether a metric takes the very velocities of the harmonic table."""
-    return not (system.linear or system.cost is not None or system.stored("connection")) and TIERS["harmonic"].takes(
-        system
-    )
+    of_its_own = system.traits.linear or system.cost is not None or system.stored("connection")
+    return not of_its_own and HARMONIC.is_offered(system)
 
 
 def with_harmonics(
@@ -96,11 +96,11 @@ def with_harmonics(
     """The harmonic table and the metric from the same force balances. ValueError if it has no metric."""
     if reason := why_none(system):
         raise ValueError(reason)
-    seen, tier = _Watched(system), TIERS["harmonic"]
-    found = tier.table(seen, numerics, progress=progress)
+    seen = _Watched(system)
+    found = harmonic.table(seen, numerics).build(progress)
     P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
     P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
-    F = _norm(P, system.power_degree).T.reshape(-1, *map(len, found.axes))
+    F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, found.axes))
     unit = connection.directions(2, len(F))
     return found, metric.of_samples(F, found.axes, unit, found.degree, highest=HIGHEST)
 
@@ -108,10 +108,9 @@ def with_harmonics(
 class _Watched:
     """A system of which powers are kept as its velocities are asked for, shape after shape of a half of the grid."""
 
-    reversible = False
-
     def __init__(self, system: System):
         self.system, self.powers = system, []
+        self.traits = replace(system.traits, reversible=False)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.system, name)
@@ -132,7 +131,7 @@ class _Driven(connection.Telling):
 
 
 def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
-    return _norm(system.power(alpha, alphadot), system.power_degree)
+    return _norm(system.power(alpha, alphadot), system.traits.power_degree)
 
 
 def _norm(power, degree: float) -> np.ndarray:
@@ -155,7 +154,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     number("phases", phases or 8, 8, 1e6, whole=True)
-    phases = max(32 if system.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
+    phases = max(32 if system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
     finer = scene.with_numerics(pieces=min(2 * system.cut, MOST_PIECES)).system if system.cut else None
 
     integral = lambda rates: 2 * np.pi * rates.mean(-1)
@@ -165,7 +164,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         rates = _rates(system, *shapes)
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
-        if system.steps:  # a step rests on the one before: fewer phases are other steps
+        if system.traits.steps:  # a step rests on the one before: fewer phases are other steps
             half, quarter = (integral(_rates(system, *some)) for some in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
@@ -181,7 +180,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
 
 def _rates(system: System, alpha, alphadot) -> np.ndarray:
     """(B, 2, N): what path length and work are the integrals of, nan where there is none."""
-    degree = system.power_degree
+    degree = system.traits.power_degree
     if system.cost is not None:  # a metric, of which there is no work
         square = np.asarray(system.cost(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
@@ -196,7 +195,7 @@ def with_effort(result: Result) -> Result:
     is none."""
     scene, gait = result.subject
     found, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
-    degree, distance = scene.system.power_degree, result["net_distance"].values / scene.system.length
+    degree, distance = scene.system.traits.power_degree, result["net_distance"].values / scene.system.length
     with np.errstate(divide="ignore", invalid="ignore"):
         towed = np.nan * distance if degree is None else distance * (distance / (2 * np.pi)) ** (degree - 1)
         ratios = {"efficiency": distance / found["path_length"], "cost_of_transport": found["work"] / towed}
@@ -212,6 +211,6 @@ def units(system: System) -> dict[str, str]:
     """Return the units of what `with_effort` adds."""
     if system.cost is not None:
         return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
-    length = "BL" if system.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
-    work = "axial drag x BL" if system.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
+    length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
+    work = "axial drag x BL" if system.traits.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
     return {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}

@@ -55,7 +55,9 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
-    one = _direct if scene.system.steps else partial(runner().call, _direct)  # pieces of steps are stored by themselves
+    one = (
+        _direct if scene.system.traits.steps else partial(runner().call, _direct)
+    )  # pieces of steps are stored by themselves
     with named(scene.name):
         return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, some, phases) for some in groups)))
 
@@ -65,7 +67,7 @@ def _direct(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier."""
     phases = max(32, 8 * -(-phases // 8))
-    system, stepping = scene.system, scene.system.steps
+    system, stepping = scene.system, scene.system.traits.steps
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
     every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
@@ -76,7 +78,7 @@ def _direct(
         full = run.net
     error = _left(
         *(apart(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
-        stepping or system.kinks,
+        stepping or not system.traits.smooth,
     )
     error += 2 * np.pi * (np.maximum(run.residual, ROUNDING) * run.speed)[:, None]
     if finer := system.finer():

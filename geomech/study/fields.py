@@ -22,6 +22,7 @@ from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.study.tables import COMPONENTS
+from geomech.systems.base import length_unit, shape_labels
 
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 INTERVAL_OF_CCF = "half width of the interval of ccf"
@@ -33,7 +34,7 @@ def of_study(study: Study) -> Result:
     pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
     something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
     read the file of it."""
-    labels = study.scene.system.shape_labels
+    labels = shape_labels(study.scene.system)
     return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
 
 
@@ -54,7 +55,7 @@ def attributes(study: Study) -> dict:
         "interpolation": int(study.fitted.degree),
         **(
             {}
-            if (degree := scene.system.power_degree) is None or effort.why_none(scene.system)
+            if (degree := scene.system.traits.power_degree) is None or effort.why_none(scene.system)
             else {"power_degree": degree}
         ),
     }
@@ -62,7 +63,7 @@ def attributes(study: Study) -> dict:
 
 def variables(study: Study) -> list[Variable]:
     """Return what a study tells of shape space, without its coordinates."""
-    unit, lookups = study.scene.system.unit, study.lookups
+    unit = length_unit(study.scene.system)
     found = of_connection(study.fitted, study.scene.system.stored("A_error"))
     if isinstance(study.fitted, Tube):
         found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
@@ -77,8 +78,8 @@ def variables(study: Study) -> list[Variable]:
         found += of_metric(
             study.metric, study.scene.system.cost is None
         )  # before the harmonics, whose velocities it may share
-    if "harmonic" in lookups:
-        found += of_harmonics(study.table("harmonic"), unit)
+    if (harmonics := study.harmonics) is not None:
+        found += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:
         units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
@@ -257,7 +258,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": units_of(system.unit),
+        "length_unit": units_of(length_unit(system)),
         **system.about(),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

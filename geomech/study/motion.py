@@ -12,8 +12,9 @@ from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.core.variables import Result, Variable
 from geomech.scene.model import Scene
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, built, direct, price
+from geomech.study.cost import Cost, connection, direct, price
 from geomech.study.question import Allow, Progress, Question
+from geomech.systems.base import length_unit, shape_labels
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -51,10 +52,10 @@ class Motion:
     def columns(self) -> dict[str, str]:
         """Of a table of it: what each is, by name, with its unit."""
         system = self.scene.system
-        unit, ends = system.unit, self.points(slice(0, 1))
+        unit, ends = length_unit(system), self.points(slice(0, 1))
         timed = {} if self.frequency is None else {"time": "s"}
         place = {"phase": "rad", **timed, "x": unit, "y": unit, "theta": "rad"}
-        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(system.shape_labels)}
+        shape = {f"alpha_{k + 1}": unit_of for k, (_, unit_of) in enumerate(shape_labels(system))}
         count = 0 if ends is None else ends.shape[-2]
         return {**place, **shape, **{f"end_{k}_{axis}": unit for k in range(count) for axis in "xy"}}
 
@@ -113,10 +114,10 @@ class Picture(Question):
 
     @property
     def _mapped(self) -> bool:
-        return self.scene.system.joints == 2 and "path" in self.study.methods
+        return self.scene.system.joints == 2 and self.study.has_connection
 
     def cost(self) -> Cost:
-        costs = [cost(self.scene, self.cycles), *([price([built(self.scene, "path")])] if self._mapped else [])]
+        costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
         costs += [self.drawing] if self.drawing else []
         balances, seconds, memory = zip(*costs)
         return Cost(sum(balances), sum(seconds), max(memory))
@@ -154,7 +155,7 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if system.steps and not system.settles:  # each goes on from the one before
+    if system.traits.steps and not system.settles:  # each goes on from the one before
         jobs = [job._replace(count=job.count * cycles) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
     width = 2 * (system.elements + 1) + system.joints + 5

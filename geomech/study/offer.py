@@ -10,14 +10,9 @@ METHODS = tuple(TIERS)  # cheapest look-up first
 
 def tiers(system: System) -> tuple[str, ...]:
     """All that say something of this system."""
-    return tuple(name for name, tier in TIERS.items() if tier.takes(system))
+    return tuple(name for name, tier in TIERS.items() if tier.is_offered(system))
 
 
 def methods(system: System) -> tuple[str, ...]:
     """Those of a plain study: without tables that serve one family of gaits only."""
-    return tuple(name for name in tiers(system) if TIERS[name].plain)
-
-
-def lookups(system: System) -> tuple[str, ...]:
-    """Those that look a precomputed table up; where xi = A alphadot holds exactly, path and harmonic do not."""
-    return tuple(name for name in tiers(system) if not TIERS[name].is_direct(system))
+    return tuple(name for name in tiers(system) if TIERS[name].common)

@@ -15,13 +15,16 @@ from geomech.geometry.plane import Plane
 from geomech.scene.model import Scene
 from geomech.study import effort
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, of_metric, of_planes, price
+from geomech.study.cost import Cost, Job, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
-from geomech.study.offer import methods
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems import Swimmer
-from geomech.tiers.path import around
-from geomech.tiers.path import axes as field_axes
+from geomech.systems.base import System
+from geomech.tiers.area import AREA
+from geomech.tiers.fitted import axes as field_axes
+from geomech.tiers.fitted import is_too_large
+from geomech.tiers.harmonic import HARMONIC
+from geomech.tiers.path import PATH
 
 AMPLITUDES = 10  # or so, in the study that is made of each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
@@ -60,7 +63,7 @@ class Report(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         study, scene, gaits = self.study, self.scene, _gaits(self.scene)
         amplitudes = [reachable(scene, gait) for gait in gaits]
-        mapped = {2: "path", 3: "area"}.get(scene.system.joints) in study.methods  # of more: `geomech ccf --pair`
+        mapped = is_mapped(scene.system)
         if mapped:
             study.compute_field(progress)
         tables = {}
@@ -75,19 +78,24 @@ class Report(Question):
         return replace(first, kind="report", subject=Reported(study, gaits, tables, mapped, planes))
 
 
+def is_mapped(system: System) -> bool:
+    """Return whether there are pictures of all of shape space: of more joints there is `geomech ccf --pair`."""
+    return {2: PATH, 3: AREA}[system.joints].is_offered(system) if system.joints in (2, 3) else False
+
+
 def cost(scene: Scene) -> Cost:
     """Return the cost of a report; SceneError for what it refuses."""
-    gaits = _gaits(scene)
-    counts, tiers = [len(reachable(scene, gait)) for gait in gaits], methods(scene.system)
-    more = of_planes(scene, 3) if scene.system.joints == 3 and "area" in tiers else []
-    field = {"path", "area"} & {*tiers} and scene.system.joints in (2, 3)
-    with_metric = field and not effort.why_none(scene.system)
-    metric = (
-        [job for job in of_metric(scene) if job.what != "balances" or "harmonic" not in tiers] if with_metric else []
-    )
-    return price(
-        more + metric + [job for g, n in zip(gaits, counts) for job in jobs(scene, tiers, n, g, tables=g is gaits[0])]
-    )
+    study, system = Study(scene), scene.system
+    found: list[Job] = []
+    for k, gait in enumerate(_gaits(scene)):
+        amplitudes = reachable(scene, gait)
+        plans = {m: study.plan(m, gait, amplitudes) for m in study.methods}
+        found += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
+    if is_mapped(system):
+        found += of_planes(scene, 3) if system.joints == 3 else []
+        metric = [] if effort.why_none(system) else of_metric(scene)
+        found += [job for job in metric if job.what != "balances" or not HARMONIC.is_offered(system)]
+    return price(found)
 
 
 def _gaits(scene: Scene) -> list[Gait]:
@@ -102,7 +110,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
     is no field, or one with singular shapes, up to its own, which is the last.
     SceneError for a gait that does not move or lies outside."""
     system, n = scene.system, scene.numerics
-    own = "path" not in methods(system) or system.singularity is not None or around(system, n)
+    own = not PATH.is_offered(system) or system.traits.singularity is not None or is_too_large(system, n)
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
@@ -123,7 +131,7 @@ def _near(scene: Scene, gait: Gait) -> list[float]:
     found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
     with named(scene.name):
         scene.system.refuse_singular(gait.cycle(scene.numerics.phases)[0])
-    reached = lambda a: (scene.system.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
+    reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
     return [a for a in found if reached(a)]
 
 

@@ -16,11 +16,12 @@ from geomech.geometry.plane import Plane
 from geomech.scene.model import Scene
 from geomech.study import fields
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, Job, built, of_metric, of_planes, price
+from geomech.study.cost import Cost, Job, harmonics, of_metric, of_planes, price
+from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
-from geomech.tiers import TIERS
-from geomech.tiers.path import fits
+from geomech.systems.base import shape_labels
+from geomech.tiers.fitted import fits
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
 MOST_PAIRS = 10  # of joints in a figure: those of five
@@ -82,7 +83,7 @@ class ShapeSpace(Question):
 
     @property
     def _harmonics(self) -> bool:
-        return self.file and "harmonic" in self.study.lookups
+        return self.file and self.study.has_harmonics
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
@@ -100,7 +101,7 @@ class ShapeSpace(Question):
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
         with named(name):
-            TIERS["path"].refuse(system)
+            self.study.refuse_connection()
             if (self.map or self.planes) and system.joints == 1:
                 raise SceneError(NO_MAP)
             if self.gait:
@@ -120,12 +121,10 @@ class ShapeSpace(Question):
         jobs = of_planes(scene, len(self._at)) if self._at else []
         if not self.field:
             return jobs
-        jobs.append(built(scene, "path"))
+        jobs += fitted(scene)
         if study is self.study:
             jobs += of_metric(scene) if self._costed else []
-            jobs += (
-                [built(scene, "harmonic")] if self._harmonics and not (self._costed and shared(scene.system)) else []
-            )
+            jobs += harmonics(scene) if self._harmonics and not (self._costed and shared(scene.system)) else []
         return jobs
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
@@ -138,7 +137,7 @@ class ShapeSpace(Question):
             return Result(whole.kind, whole.variables, whole.attributes, space)
         if not self.field:
             return Result("shape_space", tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
-        axes = fields.coordinates(study.fitted.axes, self.scene.system.shape_labels)
+        axes = fields.coordinates(study.fitted.axes, shape_labels(self.scene.system))
         return Result("shape_space", (*axes, fields.of_ccf(study.curvature, study.curvature_error)), {}, space)
 
     def _parts(self) -> list[Callable[[Progress], Any]]:
@@ -153,7 +152,7 @@ class ShapeSpace(Question):
             return parts
         parts.append(self.study.compute_field)
         parts += [self.study.compute_metric] if self._costed else []
-        parts += [lambda progress: self.study.table("harmonic", progress=progress)] if self._harmonics else []
+        parts += [self.study.compute_harmonics] if self._harmonics else []
         return parts + ([self.other.compute_field] if self.other and not self._at else [])
 
 

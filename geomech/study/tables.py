@@ -12,6 +12,7 @@ from geomech.gaits import Gait
 from geomech.geometry.field import UNTOLD
 from geomech.io.results import units_of
 from geomech.scene.model import Scene, frequency_of
+from geomech.systems.base import length_unit
 
 COMPONENTS = ("x", "y", "theta")
 ERRORS = ("estimate", "estimate_heading")
@@ -66,7 +67,7 @@ def result(
     choices: (B, 2), the system's unit and rad, of tiers whose answer depends on the surface that a loop of three and more
     joints spans. more: attributes, such as the seconds that parts took."""
     system, tiers = scene.system, tuple(poses)
-    unit, length, frequency = system.unit, system.length, frequency_of(system, gait)
+    unit, length, frequency = length_unit(system), system.length, frequency_of(system, gait)
     stacked = lambda by, width: np.array([by[t] for t in tiers], float).reshape(len(tiers), len(amplitudes), width)
     found = [
         Variable("tier", ("tier",), np.array(tiers, dtype="U")),

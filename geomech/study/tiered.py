@@ -19,7 +19,9 @@ from geomech.study.bench import Study
 from geomech.study.cost import Cost
 from geomech.study.knob import Knob
 from geomech.study.offer import tiers
-from geomech.tiers import TIERS
+from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers.base import Plan
+from geomech.tiers.direct import DIRECT
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096
@@ -71,7 +73,7 @@ class Settings:
     picture: ClassVar[str] = "work_precision_figure"
 
     def __post_init__(self) -> None:
-        if checked_scene(self.scene).system.steps:
+        if checked_scene(self.scene).system.traits.steps:
             object.__setattr__(self, "runs", 1)
 
     @property
@@ -83,7 +85,8 @@ class Settings:
         scene = self.scene
         if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
             raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
-        if any(TIERS[knob.tier].on_grid for knob in self.knobs()):
+        tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
+        if any(table and table.axes for table in tables):
             with named(scene.name):
                 Study(scene).refuse_outside()
 
@@ -98,8 +101,9 @@ class Settings:
     def _jobs(self, knob: Knob, value: Any) -> list[foretold.Job]:
         """Return those of a displacement at a setting."""
         scene = self.at(knob, value)
-        if TIERS[knob.tier].looks_up:
-            return [foretold.built(scene, knob.tier)]
+        plan = _plan(scene, knob.tier)
+        if not plan.exact:
+            return foretold.predicted(scene, plan, len(FRACTIONS))
         return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
 
     def prepared(self) -> Settings:
@@ -160,20 +164,25 @@ class Settings:
 def applies(knob: Knob, scene: Scene) -> bool:
     """Return whether a knob is one of a scene's."""
     system, setting = scene.system, knob.setting or knob.name
-    if system.linear and setting in ("regularisation", "directions"):
+    if system.traits.linear and setting in ("regularisation", "directions"):
         return False
     if setting == "regularisation" and system.solver is None:
         return False
-    of_a_field = setting in (*TIERS["path"].depends_on, *TIERS["harmonic"].depends_on)
+    of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
     if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
         return False
-    if knob.tier != "direct" and TIERS[knob.tier].is_direct(system):
+    if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False
-    return knob.tier in tiers(system) and (setting != "pieces" or system.cut > 0)
+    return setting != "pieces" or system.cut > 0
+
+
+def _plan(scene: Scene, tier: str) -> Plan:
+    """Return how a tier predicts what a knob of it is swept for."""
+    return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
 
 
 def _truth_phases(scene: Scene) -> int:
-    return TRUTH_STEPS if scene.system.steps else TRUTH_PHASES
+    return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
 
 
 def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from geomech.core.errors import check_angle, choose, real_array, short
 from geomech.geometry.connection import Connection, evaluate, fit
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
+from geomech.geometry.traits import NOTHING, Traits
 from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
 
 __all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
@@ -45,11 +46,8 @@ class Cycle(NamedTuple):
 class System(Protocol):
     """What the geometry asks for; `Plain` answers all but ``joints`` and ``velocity`` for a system that needs no more.
 
-    joints: shape variables. length: of the body, in ``unit``, "BL" (body lengths) or "m". frame: the body frame, in
-    words. mirror: left and right are alike, xi(-alpha, -alphadot) = (xi_x, -xi_y, -xi_theta). linear: xi = A alphadot
-    holds exactly. lacks: premises that do not hold; those of SHAPE_ALONE leave no velocity of a single shape, only `run`.
-    singularity: None, or a function of shapes (..., joints) that passes through 0 where the velocity does not exist.
-    shape_labels: (name, unit) of each shape variable. points: None, or a function of shapes (..., joints) and poses of the
+    joints: shape variables. length: of the body. traits: what algorithms may use. points: None, or a function of shapes
+    (..., joints) and poses of the
     frame (..., 3) that gives the ends of the body's links in the world (..., links + 1, 2), tail to head.
     """
 
@@ -60,25 +58,7 @@ class System(Protocol):
     def length(self) -> float: ...
 
     @property
-    def unit(self) -> str: ...
-
-    @property
-    def frame(self) -> str: ...
-
-    @property
-    def mirror(self) -> bool: ...
-
-    @property
-    def linear(self) -> bool: ...
-
-    @property
-    def lacks(self) -> Premise: ...
-
-    @property
-    def singularity(self) -> Callable | None: ...
-
-    @property
-    def shape_labels(self) -> tuple[tuple[str, str], ...]: ...
+    def traits(self) -> Traits: ...
 
     @property
     def points(self) -> Callable | None: ...
@@ -98,56 +78,36 @@ class NoSolver:
 class Plain:
     """Base of systems: what holds of one whose velocity follows from shape alone, at one place at a time.
 
-    odd: the velocity turns round with the rates. halved: it is odd and mirrored, so that half of a symmetric grid tells the
-    other. reversible: head and tail are alike, as `geomech.geometry.images` has it. starts: `run` takes velocities nearby,
+    starts: `run` takes velocities nearby,
     (..., N, 3), to begin from. kinks: the velocity has kinks in shape or direction, so that errors fall with the square of the
     phases only. solver: its own part of [numerics], a dataclass, or None. elements: places of the body at which forces are
     evaluated, for one velocity ``evaluations``, and ``together`` for as many velocities as are solved in one go. held: numbers
     that time stepping remembers for each sample. cut: pieces to a body length, 0 where there are none. settling: change of
     displacement still to come at which its cycles count as repeating, body lengths or rad; 0 without such cycles. near: of
     which gait alone it is known, in words, empty where it is of all. carried: its displacements are those of another frame,
-    carried over. joint_angles: its shape variables are such, so that one beyond a full turn is likely a slip of unit. closed:
+    carried over. closed:
     forces on an element have an exact form, which finer loads come near to. notes: lines on what its user may not expect of
-    how it is computed. frequency: cycles per second, where its forces depend on it. covariance: (n, n), of parameters of its
-    own that are not known for certain, which `varied` changes; None where all are. power_degree: of its power in alphadot, 2
-    in a fluid and 1 in sand; None where it has no power (`driven`), or one of no one degree. cost: None, or a function of
+    how it is computed. covariance: (n, n), of parameters of its
+    own that are not known for certain, which `varied` changes; None where all are. cost: None, or a function of
     alpha and alphadot that gives alphadot^T M(alpha) alphadot where the metric M of `geomech.geometry.metric` is not one of
     drag but, say, of kinetic energy.
     """
 
     kind = "system"
     length = 1.0
-    frequency = covariance = power_degree = None
-    frame = "mean"
-    mirror = reversible = linear = kinks = starts = False
-    odd = True
-    halved = property(lambda self: self.mirror and self.odd)
-    lacks = NONE
+    traits = NOTHING
+    covariance = None
+    starts = False
     solver = None
-    singularity = points = cost = None
+    points = cost = None
     elements = evaluations = 1
     together = 1 << 12
     held = cut = 0
-    closed = joint_angles = carried = False
+    closed = carried = False
     near = ""
     notes: tuple[str, ...] = ()
     settling = 0.0
     engine = "algebraic"
-
-    @property
-    def unit(self) -> str:
-        """Of lengths: body lengths, or metres where the body has a size."""
-        return "BL" if self.length == 1.0 else "m"
-
-    @property
-    def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        """(name, unit) of each shape variable, for axes."""
-        return tuple((f"alpha_{k + 1}", "rad") for k in range(self.joints))
-
-    @property
-    def steps(self) -> bool:
-        """Whether a cycle is run phase after phase: no velocity follows from shape alone."""
-        return bool(self.lacks & SHAPE_ALONE)
 
     @property
     def settles(self) -> bool:
@@ -162,14 +122,14 @@ class Plain:
         """{"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
         alpha, alphadot = (self._one(name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
         self.note_angles(np.abs(alpha).max())
-        if self.singularity is not None and not self.singularity(alpha):
-            raise ValueError(f"the shape is singular: {self.singular}: move a joint")
+        if self.traits.singularity is not None and not self.traits.singularity(alpha):
+            raise ValueError(f"the shape is singular: {self.traits.singular}: move a joint")
         xi = evaluate(self.velocity, alpha, alphadot)
         return {"xi": xi.tolist(), "status": "exact", "residual": 0.0}
 
     def note_angles(self, largest: float) -> None:
         """UnitWarning if the largest of some shape variables is a joint angle beyond a full turn."""
-        if self.joint_angles:
+        if self.traits.joint_angles:
             check_angle("a joint angle", largest)
 
     def _one(self, name: str, x) -> np.ndarray:
@@ -205,13 +165,12 @@ class Plain:
 
     def fitted(self, axes, count: int, degree: int, progress: Callable | None = None) -> Connection:
         """The least-squares connection on a grid, from so many directions; other arguments as in `connection.fit`."""
-        known = {"singularity": self.singularity, "trusted": True, "reversible": self.reversible}
-        known |= {"unit": self.unit, "length": self.length}
-        return fit(self.velocity, axes, count, degree, progress, self.halved, **known)
+        known = {"traits": self.traits, "trusted": True, "unit": length_unit(self), "length": self.length}
+        return fit(self.velocity, axes, count, degree, progress, **known)
 
     def images(self, alpha, alphadot) -> Around:
         """Which phases of gaits, as in `run`, are solved, and how the others follow: all, unless a system says else."""
-        return around(alpha, alphadot, False, False)
+        return around(alpha, alphadot, NOTHING)
 
     def at_once(self, phases: int) -> int:
         """Amplitudes of a gait that are run side by side, at least one: more would take more memory and no less time."""
@@ -256,7 +215,7 @@ class Plain:
 
     def blame(self, premises: Premise) -> str:
         """Who lacks one of these premises, to follow "no connection with"; empty if nobody does."""
-        return f"the {self.kind}, which is {not_so(self.lacks)}" if self.lacks & premises else ""
+        return f"the {self.kind}, which is {not_so(self.traits.lacks)}" if self.traits.lacks & premises else ""
 
     def refuse(self, what: str, premises: Premise, instead: str) -> None:
         """ValueError if there is no such result because a premise of it does not hold."""
@@ -265,14 +224,14 @@ class Plain:
 
     def refuse_singular(self, alpha) -> None:
         """ValueError naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
-        if self.singularity is None:
+        if self.traits.singularity is None:
             return
-        d = self.singularity(alpha)
+        d = self.traits.singularity(alpha)
         met = (d == 0) | (d * np.roll(d, -1, -1) < 0)
         if met.any():
             shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[met][0])
             raise ValueError(
-                f"the gait meets the singular shape near alpha = ({shape}), where {self.singular}: "
+                f"the gait meets the singular shape near alpha = ({shape}), where {self.traits.singular}: "
                 "move its centre, or lower the amplitude"
             )
 
@@ -293,10 +252,20 @@ class Plain:
 
 def checked_system(system) -> System:
     """system, or ValueError if it is nothing of the kind."""
-    if isinstance(system, type) or not all(hasattr(system, x) for x in ("joints", "velocity", "run", "lacks")):
+    if isinstance(system, type) or not all(hasattr(system, x) for x in ("joints", "velocity", "run", "traits")):
         raise ValueError(f"system must be a system such as Swimmer(medium, body), got {short(system)}")
     refuse_mutable(system)
     return system
+
+
+def length_unit(system: System) -> str:
+    """Return the unit of a system's lengths: body lengths, or metres where its body has a size."""
+    return system.traits.unit or ("BL" if system.length == 1.0 else "m")
+
+
+def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
+    """Return (name, unit) of each shape variable of a system, for axes."""
+    return system.traits.labels or tuple((f"alpha_{k + 1}", "rad") for k in range(system.joints))
 
 
 def refuse_mutable(*parts) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose, number
+from geomech.geometry.traits import Traits
 from geomech.systems.base import Plain
 
 
@@ -30,7 +31,7 @@ class DifferentialDrive(Plain):
 
     kind = "differential-drive"
     joints = 2
-    linear = True
+    traits = Traits(linear=True, labels=(("left wheel", "rad"), ("right wheel", "rad")))
 
     def __post_init__(self):
         number("track", self.track, 1e-9, 1e9)
@@ -38,7 +39,6 @@ class DifferentialDrive(Plain):
         choose("frame", self.frame, ["mean"])
 
     length = property(lambda self: self.track)
-    shape_labels = (("left wheel", "rad"), ("right wheel", "rad"))
 
     @property
     def _matrix(self) -> np.ndarray:

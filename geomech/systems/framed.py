@@ -14,7 +14,8 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.coordinates import change_velocity, frame_velocity
 from geomech.geometry.minimum_perturbation import Frame, minimum_perturbation
-from geomech.systems.base import SHAPE_ALONE, Cycle, System
+from geomech.geometry.traits import Traits
+from geomech.systems.base import SHAPE_ALONE, Cycle, System, length_unit
 from rft import se2
 
 NAME = "minimum-perturbation"
@@ -31,11 +32,11 @@ class Framed:
     directions: int
     degree: int
 
-    frame, carried, starts, reversible = NAME, True, False, False
+    carried, starts = True, False
 
     def __post_init__(self):
         self.inner.refuse("minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
-        if self.inner.singularity is not None:
+        if self.inner.traits.singularity is not None:
             raise ValueError(
                 f"no minimum-perturbation frame of the {self.inner.kind}, which has singular shapes: drop frame"
             )
@@ -47,6 +48,10 @@ class Framed:
             raise AttributeError(name)
         return getattr(self.inner, name)
 
+    @property
+    def traits(self) -> Traits:
+        return dataclasses.replace(self.inner.traits, frame=NAME, reversible=False)
+
     @cached_property
     def _made(self) -> tuple[Frame, Connection]:
         return self._make(None)
@@ -56,10 +61,9 @@ class Framed:
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         keep = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
-        alike = {"mirror": self.inner.halved, "reversible": self.inner.reversible}
-        A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, **alike)
+        A, xi = connection.sampled(self.inner.velocity, axes, unit, keep, self.degree, progress, self.inner.traits)
         nothing = np.zeros_like(A[:, 0])
-        size = {"unit": self.unit, "length": self.length}
+        size = {"unit": length_unit(self), "length": self.length}
         frame = minimum_perturbation(Connection(axes, A, nothing, nothing, self.degree, **size))
         h, dh = np.moveaxis(frame.field.values, 0, -1), frame.grid_slopes
         seen = np.stack([change_velocity(np.moveaxis(x, 0, -1), h, dh @ u) for x, u in zip(xi, unit)])

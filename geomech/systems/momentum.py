@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import real_array, short
+from geomech.geometry.traits import Traits
 from geomech.systems.base import Plain
 from rft.balance.newton import carried
 from rft.bodies import Chain
@@ -47,8 +48,6 @@ class Momentum(Plain):
     length: float = 1.0
     frame: str = "mean"
 
-    mirror = linear = joint_angles = True
-
     def __post_init__(self):
         object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
@@ -66,6 +65,10 @@ class Momentum(Plain):
         """Masses of the links, and [along, across, about the centre] of each: the mass that it moves, in any one unit and
         body lengths, of its own or of the fluid. number: `float`, or `geomech.symbolic.connections.exact` for formulas."""
         raise NotImplementedError
+
+    @property
+    def traits(self) -> Traits:
+        return Traits(linear=True, mirror=True, joint_angles=True, frame=self.frame)
 
     @property
     def joints(self) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from geomech.geometry.traits import Traits
 from geomech.systems.base import Plain
 from rft.bodies import Chain
 
@@ -32,13 +33,16 @@ class NoSlipSnake(Plain):
 
     kind = "no-slip-snake"
     joints = 2
-    mirror = linear = joint_angles = True
-    singular = "the wheels' axles meet in one point"
 
     def __post_init__(self):
         object.__setattr__(self, "lengths", self._chain.lengths)
         if len(self.lengths) != 3:
             raise ValueError(f"lengths must be those of three links, got {len(self.lengths)}")
+
+    @property
+    def traits(self) -> Traits:
+        where = {"singularity": self._determinant, "singular": "the wheels' axles meet in one point"}
+        return Traits(linear=True, mirror=True, joint_angles=True, frame=self.frame, **where)
 
     @property
     def _chain(self) -> Chain:
@@ -56,9 +60,11 @@ class NoSlipSnake(Plain):
         return rows.reshape(*shape, 3, 3), m.v[1].T.reshape(*shape, 3)
 
     def about(self) -> dict:
-        return {"singular_shapes": f"nan, where {self.singular}, and where they lie between a grid point and the next"}
+        return {
+            "singular_shapes": f"nan, where {self.traits.singular}, and where they lie between a grid point and the next"
+        }
 
-    def singularity(self, alpha) -> np.ndarray:
+    def _determinant(self, alpha) -> np.ndarray:
         """The determinant of the three equations (...,), 0 at singular shapes; no unit."""
         det = np.linalg.det(self._rolling(alpha, np.zeros(2))[0])
         return np.where(np.abs(det) < 1e-14, 0.0, det)

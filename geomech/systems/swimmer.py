@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from geomech.core.errors import real_array, short
 from geomech.core.work import iterate
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
+from geomech.geometry.traits import MEAN, Traits
 from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
 from geomech.systems.said import Said
 from geomech.systems.solver import Solver
@@ -68,6 +69,9 @@ class Swimmer(Said, Plain):
             except ValueError as error:
                 raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
 
+    def __getstate__(self) -> dict:
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # not what is cached
+
     def _agree(self) -> None:
         """ValueError if effects, or the body, say different things of the same swimmer."""
         sized = self.body.length != 1.0
@@ -81,17 +85,28 @@ class Swimmer(Said, Plain):
 
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
-    frame = property(lambda self: getattr(self.body, "frame", "mean"))
     points = property(lambda self: getattr(self.body, "points", None))
-    shape_labels = property(lambda self: getattr(self.body, "shape_labels", super().shape_labels))
-    mirror = property(lambda self: is_mirror(self.medium))
-    odd = property(lambda self: is_central(self.medium) and all(e.odd for e in self.effects))
-    reversible = property(lambda self: not self.effects and is_central(self.medium) and is_reversible(self.body))
-    kinks = property(lambda self: not is_linear(self.medium))
     closed = property(lambda self: is_closed(self.medium))
-    power_degree = property(lambda self: None if self.lacks & RATES else power_of(self.medium) + 1.0)
     held = property(lambda self: sum(e.held for e in self.effects))
-    frequency = property(lambda self: next((e.frequency for e in self.effects if hasattr(e, "frequency")), None))
+
+    @cached_property
+    def traits(self) -> Traits:
+        medium, body, effects = self.medium, self.body, self.effects
+        lawful, central = is_rate_independent(medium), is_central(medium)
+        lacks = rft.effects.broken(effects) | (NONE if lawful else RATES)
+        return Traits(
+            linear=is_linear(medium) and not effects,
+            odd=central and all(e.odd for e in effects),
+            mirror=is_mirror(medium),
+            reversible=not effects and central and is_reversible(body),
+            smooth=is_linear(medium),
+            power_degree=None if lacks & RATES else power_of(medium) + 1.0,
+            lacks=lacks,
+            joint_angles=_has_joint_angles(body),
+            frame=getattr(body, "frame", MEAN),
+            labels=getattr(body, "shape_labels", ()),
+            frequency=next((e.frequency for e in effects if hasattr(e, "frequency")), None),
+        )
 
     @property
     def covariance(self) -> tuple | None:
@@ -110,26 +125,9 @@ class Swimmer(Said, Plain):
             ) from None
 
     @property
-    def lacks(self) -> Premise:
-        """What the effects break, and the medium where its drag is not of one power of the speed."""
-        return rft.effects.broken(self.effects) | (
-            NONE if is_rate_independent(self.medium) else Premise.RATE_INDEPENDENT
-        )
-
-    @property
     def three_link(self) -> bool:
         """Whether the body is the three-link swimmer, for which the published gaits were made."""
         return isinstance(self.body, rft.Chain) and len(self.body.lengths) == 3 and self.body.modes is None
-
-    @property
-    def joint_angles(self) -> bool:
-        """Bodies of a few shape variables have amplitudes of bends, or of modes, in their place."""
-        plain = isinstance(self.body, (rft.Chain, rft.Backbone)) and getattr(self.body, "bends", None) is None
-        return plain and getattr(self.body, "modes", None) is None
-
-    @property
-    def linear(self) -> bool:
-        return is_linear(self.medium) and not self.effects
 
     @property
     def engine(self) -> str:
@@ -138,8 +136,8 @@ class Swimmer(Said, Plain):
 
     @property
     def settling(self) -> float:
-        place_matters = self.lacks & Premise.SE2_SYMMETRIC
-        runs_on = self.steps and self.solver.cycles is None and not place_matters
+        place_matters = self.traits.lacks & Premise.SE2_SYMMETRIC
+        runs_on = self.traits.steps and self.solver.cycles is None and not place_matters
         return max(e.settles for e in self.effects) if runs_on else 0.0
 
     @property
@@ -203,7 +201,7 @@ class Swimmer(Said, Plain):
         from geomech.symbolic import connections
 
         plain = type(self.body) is rft.Chain and self.body.modes is None
-        if not (self.linear and plain and type(self.medium) is rft.Viscous):
+        if not (self.traits.linear and plain and type(self.medium) is rft.Viscous):
             raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
         return connections.in_units_of(self.body.length, A), alpha
@@ -229,7 +227,7 @@ class Swimmer(Said, Plain):
         balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
         speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
-        if not self.steps:
+        if not self.traits.steps:
             images = self.images(alpha, alphadot)
             asked = (images.some(x) for x in (alpha, alphadot, start))
             solution = self._of_gaits(speed.size, images.count).solve(*asked).checked()
@@ -243,7 +241,7 @@ class Swimmer(Said, Plain):
 
     def images(self, alpha, alphadot) -> Around:
         """Which phases of gaits, as in `run`, are solved where balances are, and how the others follow."""
-        return around(alpha, alphadot, self.halved, self.reversible)
+        return around(alpha, alphadot, self.traits)
 
     def _of_gaits(self, count: int, phases: int) -> Swimmer:
         """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
@@ -254,14 +252,14 @@ class Swimmer(Said, Plain):
     def _repeats(self, steps: rft.TimeSteps) -> bool:
         """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series
         through it."""
-        return not self.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
+        return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
         """Of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
-        if not self.steps:
+        if not self.traits.steps:
             return super().path(alpha, alphadot, cycles)
         before = (self.solver.cycles or 1) - 1
-        if not self.lacks & Premise.SE2_SYMMETRIC:
+        if not self.traits.lacks & Premise.SE2_SYMMETRIC:
             steps = self.time_steps(alpha, alphadot, self.solver.cycles).checked()
             if self._repeats(steps):
                 return repeated(poses(steps.xi), cycles)
@@ -274,12 +272,18 @@ class Swimmer(Said, Plain):
         if any(map(np.ndim, batched)):
             return sys.maxsize  # a parameter for each amplitude: they belong together
         # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-        stepped = 4 * self.elements + self.held // 8 if self.steps else 0
+        stepped = 4 * self.elements + self.held // 8 if self.traits.steps else 0
         return max(1, VALUES_TOGETHER // max(phases * (self.joints + 6), stepped))
 
     def finer(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)
         finer = {} if rule == "exact" else {"loads": "exact" if self.closed else f"{rule}:{min(2 * count, 1000)}"}
-        if not self.linear:
+        if not self.traits.linear:
             finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
         return self.with_solver(**finer) if finer else None
+
+
+def _has_joint_angles(body: rft.Body) -> bool:
+    """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""
+    plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
+    return plain and getattr(body, "modes", None) is None

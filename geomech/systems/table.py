@@ -16,6 +16,7 @@ import numpy as np
 from geomech.core.errors import number, short
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, trajectory
+from geomech.geometry.traits import Traits
 from geomech.geometry.tube import BEYOND, Tube
 from geomech.io import tables
 from geomech.systems.base import Plain
@@ -48,7 +49,6 @@ class Table(Plain):
     sha256: str = ""
 
     kind = "table"
-    kinks = True
     together = 1 << 16
 
     def __post_init__(self):
@@ -80,35 +80,36 @@ class Table(Plain):
     near = property(lambda self: f"the mean gait that {self.file} was measured at" if self.tube else "")
     joints = property(lambda self: len(self.held.connection.axes))
     length = property(lambda self: self.held.length)
-    unit = property(lambda self: self.held.unit)
-    frame = property(lambda self: self.held.frame)
-    mirror = property(lambda self: self.held.mirror)
-    linear = property(lambda self: self.held.harmonics is None)
-    shape_labels = property(lambda self: tuple((name, "rad") for name in self.held.shapes))
-    power_degree = property(lambda self: self.held.power_degree)
+
+    @property
+    def traits(self) -> Traits:
+        held = self.held
+        near = {"singularity": self._beyond, "singular": "the data of the log do not reach"} if self.tube else {}
+        return Traits(
+            linear=held.harmonics is None, mirror=held.mirror, smooth=False, power_degree=held.power_degree,
+            frame=held.frame, unit=held.unit, labels=tuple((name, "rad") for name in held.shapes), **near,
+        )  # fmt: skip
 
     @property
     def cost(self) -> Callable | None:
         """As `Plain.cost`, where the file has a metric that is not one of drag."""
         told = self.held.metric
-        if told is None or self.power_degree is not None:
+        if told is None or self.held.power_degree is not None:
             return None
         return lambda alpha, alphadot: told.norm(alpha, alphadot) ** 2
 
-    singular = "the data of the log do not reach"
-
-    @property
-    def singularity(self) -> Callable | None:
-        """Passes through 0 where the data of a measured gait end."""
-        tube = self.tube
-        return None if tube is None else (lambda alpha: 1 - tube.reach(alpha))
+    def _beyond(self, alpha) -> np.ndarray:
+        """Return (...), which passes through 0 where the data of a measured gait end."""
+        return 1 - self.tube.reach(alpha)
 
     def refuse_singular(self, alpha) -> None:
         if self.tube is not None:
             self.tube.checked(alpha)
 
     def in_frame(self, frame: str) -> Table:
-        raise ValueError(f"a table has the frame it was made in, {self.frame!r}: make it anew in the frame {frame!r}")
+        raise ValueError(
+            f"a table has the frame it was made in, {self.held.frame!r}: make it anew in the frame {frame!r}"
+        )
 
     def stored(self, name: str):
         held = self.held
@@ -129,9 +130,9 @@ class Table(Plain):
 
     def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
         """As `Plain.driven`, where the file tells what moving costs."""
-        if self.held.metric is None or self.power_degree is None:
+        if self.held.metric is None or self.held.power_degree is None:
             raise ValueError(f"no power with this table: {self.file} does not tell it; make it anew from its scene")
-        return self.velocity(alpha, alphadot), self.held.metric.norm(alpha, alphadot) ** self.power_degree
+        return self.velocity(alpha, alphadot), self.held.metric.norm(alpha, alphadot) ** self.held.power_degree
 
     def single(self, alpha, alphadot) -> dict:
         """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, None if unknown."""

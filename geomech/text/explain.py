@@ -33,7 +33,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     phases = scene.numerics.phases
     if (count := solved(system, scene.gait, phases)) < phases:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
-    by_name = [name for name, tier in TIERS.items() if _by_name(tier, system)]
+    by_name = [m for m, tier in TIERS.items() if tier.is_possible(system) and not tier.is_offered(system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
     return plain("\n".join([*lines, *_lost(system)]))
 
@@ -41,23 +41,17 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
 def _lost(system) -> list[str]:
     """A line of the results that are not to be had for each reason there is."""
     reasons: dict[str, list[str]] = {}
-    if system.lacks & ALL:
+    if system.traits.lacks & ALL:
         first = reasons[f"{system.blames} takes away what they rest on"] = ["connection", "CCF"]
-        first += ["velocity at a single shape"] if system.steps else []
+        first += ["velocity at a single shape"] if system.traits.steps else []
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
     elif system.joints > MOST_JOINTS:
         reasons[f"of {system.joints} joints there are slices, pair by pair (geomech ccf --pair)"] = ["CCF maps"]
     for tier in TIERS.values():
-        if not (tier.takes(system) or _by_name(tier, system)):
+        if not tier.is_possible(system):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
     return [f"not available: {_listed(lost)}: {why}" for why, lost in reasons.items()]
-
-
-def _by_name(tier, system) -> bool:
-    """Whether a tier says something of a system that no plain study asks for, as it takes long."""
-    possible = system.joints in tier.joints and not system.lacks & tier.rests_on
-    return possible and system.joints not in tier.offered and not (tier.whole and system.singularity is not None)
 
 
 def _listed(lost: list[str]) -> str:
@@ -70,12 +64,12 @@ def _listed(lost: list[str]) -> str:
 
 def _why(tier, system) -> str:
     """Why a tier says nothing of a system."""
-    if system.lacks & tier.rests_on:
+    if system.traits.lacks & tier.rests_on:
         return f"{system.blames} takes away what they rest on"
     if system.joints not in tier.joints:
         return _joints(system, tier.joints)
     return (
-        f"the field has singular shapes, where {system.singular}; maps and files leave these out, and gaits that meet "
+        f"the field has singular shapes, where {system.traits.singular}; maps and files leave these out, and gaits that meet "
         "one are refused"
     )
 

@@ -9,6 +9,7 @@ from geomech.core.variables import Result
 from geomech.optimise import Optimum
 from geomech.scene.write import toml
 from geomech.study.effort import METRIC
+from geomech.systems.base import length_unit
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 
@@ -27,7 +28,7 @@ def told(optimum: Optimum) -> str:
     """Return what was found, in lines."""
     aim, best, system = optimum.request.aim, optimum.best, optimum.scene.system
     towards = f" along {aim.direction}" if aim.direction else ""
-    (x, y, theta), unit = best.displacement, system.unit
+    (x, y, theta), unit = best.displacement, length_unit(system)
     lines = [
         f"{optimum.scene.name}: {aim.name}{towards} {best.value:.6g} {aim.unit}, error {best.error:.1g} "
         f"(the scene's gait: {optimum.start.value:.6g})",

@@ -1,12 +1,12 @@
 """Tiers: ways to predict the displacement of a gait, one a file, each nearer to the truth and dearer than the one before."""
 
-from geomech.tiers.adapted import Adapted
-from geomech.tiers.area import Area
-from geomech.tiers.base import Numerics, Tier
-from geomech.tiers.direct import Direct
-from geomech.tiers.harmonic import Harmonic
-from geomech.tiers.path import Path
+from geomech.tiers.adapted import ADAPTED
+from geomech.tiers.area import AREA
+from geomech.tiers.base import Numerics, Plan, Table, Tier
+from geomech.tiers.direct import DIRECT
+from geomech.tiers.harmonic import HARMONIC
+from geomech.tiers.path import PATH
 
-TIERS = {tier.name: tier for tier in (Area(), Adapted(), Path(), Harmonic(), Direct())}  # cheapest look-up first
+TIERS = {tier.name: tier for tier in (AREA, ADAPTED, PATH, HARMONIC, DIRECT)}  # cheapest look-up first
 
-__all__ = ["TIERS", "Adapted", "Area", "Direct", "Harmonic", "Numerics", "Path", "Tier"]
+__all__ = ["TIERS", "Numerics", "Plan", "Table", "Tier"]

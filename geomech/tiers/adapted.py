@@ -2,48 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from geomech.core.errors import real_array
 from geomech.geometry import family
+from geomech.geometry.family import Family
 from geomech.systems.base import SHAPE_ALONE
-from geomech.tiers.base import Tier, solved
+from geomech.tiers.base import Plan, Table, Tier, solved
 
 
-class Adapted(Tier):
-    """Asked for by name only: its table serves the scaled copies of one gait and no other."""
+def table(system, numerics, gait, amplitudes) -> Table:
+    """Return the scaled copies of a gait that reach so far, and no other, as a table to build."""
+    a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
+    least, largest = float(a.min(initial=0.0)), float(a.max(initial=0.0))
+    count, phases = numerics.curves, numerics.phases // 2
+    sides = np.array([a for a in (least, largest) if a])
+    return Table(
+        "family",
+        (numerics.curves, numerics.phases, gait, least, largest),
+        len(sides) * count * solved(system, gait, phases),
+        len(sides) * count * phases * 3,
+        partial(_build, system, gait, least, largest, count, phases),
+        amplitudes=np.outer(sides, np.arange(1, count + 1) / count).ravel(),
+    )
 
-    name, label = "adapted", "area integral, adapted CCF"
-    style = {"color": "#CC79A7", "linestyle": (0, (5, 1))}
-    rests_on = SHAPE_ALONE
-    needs = "adapted tier"
-    looks_up = "family"
-    plain = False
-    depends_on = ("curves", "phases")
 
-    def reach(self, gait, amplitudes) -> tuple:
-        """(gait, least <= 0, largest >= 0)."""
-        a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
-        return gait, float(a.min(initial=0.0)), float(a.max(initial=0.0))
-
-    def table(self, system, numerics, gait, least, largest, progress=None) -> Any:
-        if least == largest:  # rest, and nothing else
-            return family.Family(gait, np.zeros(1), np.zeros((1, numerics.phases // 2, 3)))
-        count, phases = numerics.curves, numerics.phases // 2
-        return family.fit(partial(_run, system), gait, largest, count, phases, progress, least=least)
-
-    def solves(self, system, numerics, gait, count, phases) -> int:
-        return numerics.curves * solved(system, gait, numerics.phases // 2)
-
-    def size(self, system, numerics) -> int:
-        return numerics.curves * (numerics.phases // 2) * 3
-
-    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
-        return table.area(np.asarray(gait.amplitude if amplitudes is None else amplitudes, float))
+def _build(system, gait, least, largest, count, phases, progress: Callable | None) -> Family:
+    if least == largest:  # rest, and nothing else
+        return Family(gait, np.zeros(1), np.zeros((1, phases, 3)))
+    return family.fit(partial(_run, system), gait, largest, count, phases, progress, least=least)
 
 
 def _run(system, alpha, alphadot) -> np.ndarray:
     return system.run(alpha, alphadot).xi
+
+
+def _plan(system, numerics, gait, amplitudes) -> Plan:
+    area = lambda held, some: held.area(np.asarray(gait.amplitude if some is None else some, float))
+    return Plan(area, table(system, numerics, gait, amplitudes))
+
+
+ADAPTED = Tier(
+    "adapted",
+    "area integral, adapted CCF",
+    {"color": "#CC79A7", "linestyle": (0, (5, 1))},
+    _plan,
+    rests_on=SHAPE_ALONE,
+    result="adapted tier",
+    common=False,  # its table serves one family of gaits
+)

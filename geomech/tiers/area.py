@@ -1,9 +1,7 @@
 """The area tier: exp of the CCF's integral over the area enclosed; winding numbers count, so figure-eights cancel. A loop of
-three and more joints encloses no area but spans surfaces, and what hangs on their choice is told."""
+three and more joints encloses no area but spans surfaces, and what depends on their choice is told."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
@@ -14,8 +12,8 @@ from geomech.geometry.curvature import ccf
 from geomech.geometry.field import Field
 from geomech.geometry.gait import checked_gait
 from geomech.geometry.two_form import RADII, spanned, spanned_by, two_form
-from geomech.tiers.base import in_groups
-from geomech.tiers.path import Path, zeros
+from geomech.tiers import fitted
+from geomech.tiers.base import Plan, Tier, in_groups
 from rft import se2
 
 TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one where there is no field
@@ -42,44 +40,44 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
     return in_groups(enclosed, gait.amplitude if amplitudes is None else amplitudes, SAMPLES_TOGETHER // phases)
 
 
-class Area(Path):
-    """Shares the connection of the path tier. Of more than two joints it integrates the two-form over one of the surfaces that
-    the loop spans (`geomech.geometry.two_form`), and tells how far others are from it."""
+def _plan(system, numerics, gait, amplitudes) -> Plan:
+    d, phases = system.joints, numerics.phases
+    read = 3 * (d * (d - 1) // 2) * (numerics.interpolation + 1) ** d * (1 if d == 2 else RADII)
+    held = {"numbers": 3 * (d * (d - 1) // 2) * numerics.grid**d, "read": read}
+    if d == 2:
+        enclosed = lambda table, some: area(ccf(table), gait, some, phases)
+        return Plan(enclosed, fitted.table(system, numerics), **held)
+    if not fitted.is_too_large(system, numerics):
+        surfaces = lambda table, some, tips: spanned(two_form(table), gait, some, phases, tips)
+        return _of_surfaces(surfaces, gait, table=fitted.table(system, numerics), **held)
+    A = fitted.at_shapes(system, numerics)
 
-    name, label = "area", "area integral of the CCF"
-    style = {"color": "#D55E00", "linestyle": "--"}
-    joints, offered = range(2, 10_001), range(2, 6)
-    takes_joints, instead = "takes two joints and more, of which a loop encloses area", "use path or direct"
-    whole = True
-
-    def is_direct(self, system) -> bool:
-        return False
-
-    def size(self, system, numerics) -> int:
-        d = system.joints
-        return super().size(system, numerics) + 3 * (d * (d - 1) // 2) * numerics.grid**d
-
-    def sample(self, system, numerics) -> Callable | None:
-        d, nodes = system.joints, 1 if system.joints == 2 else RADII
-        field = zeros(system, numerics, (d * (d - 1) // 2, 3))
-        return lambda n: field(np.zeros((n * nodes, d)))
-
-    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
-        if system.joints == 2:
-            return area(ccf(table), gait, amplitudes, numerics.phases)
-        shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
-        return self._spanned(table, system, gait, amplitudes, numerics, 0).net.reshape(*shape, 3)
-
-    def choice(self, table, system, gait, amplitudes, numerics) -> np.ndarray | None:
-        if system.joints == 2:
-            return None
-        return self._spanned(table, system, gait, amplitudes, numerics, TIPS).spread
-
-    def along(self, system, numerics, count, phases) -> int:
+    def balances(count, phases):
         shapes = 2 * phases + (2 + TIPS) * RADII * AROUND  # for the displacement, and once more with its spread
-        return count * shapes * (system.joints if system.linear else self.directions(system, numerics))
+        return count * shapes * fitted.solved_at(system, numerics)
 
-    def _spanned(self, table, system, gait, amplitudes, numerics, tips: int):
-        if table is None:
-            return spanned_by(self.A(system, numerics), gait, amplitudes, numerics.phases, tips, AROUND)
-        return spanned(two_form(table), gait, amplitudes, numerics.phases, tips)
+    surfaces = lambda table, some, tips: spanned_by(A, gait, some, phases, tips, AROUND)
+    return _of_surfaces(surfaces, gait, balances=balances)
+
+
+def _of_surfaces(surfaces, gait, **plan) -> Plan:
+    """Return the plan of a loop of three and more joints. surfaces: of (table, amplitudes, tips)."""
+
+    def net(table, amplitudes):
+        shape = np.shape(gait.amplitude if amplitudes is None else amplitudes)
+        return surfaces(table, amplitudes, 0).net.reshape(*shape, 3)
+
+    return Plan(net, spread=lambda table, some: surfaces(table, some, TIPS).spread, **plan)
+
+
+AREA = Tier(
+    "area",
+    "area integral of the CCF",
+    {"color": "#D55E00", "linestyle": "--"},
+    _plan,
+    joints=range(2, 10_001),
+    offered=range(2, 6),
+    takes="takes two joints and more, of which a loop encloses area",
+    instead="use path or direct",
+    regular=True,
+)

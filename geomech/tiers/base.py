@@ -1,8 +1,11 @@
-"""What a tier is: a way to predict the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start."""
+"""What a tier is: a way to predict the net pose (..., 3) of a gait's cycle from phase t = 0, in the frame at the start.
+
+A tier is one expression, `Tier(...)`. Its plan says for one system and gait what is computed once and looked up, what is
+solved besides, and how both give the displacement."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +13,7 @@ import numpy as np
 
 from geomech.core.errors import number, real_array
 from geomech.gaits import Gait
-from geomech.systems.base import ALL, System
+from geomech.systems.base import ALL, Premise, System
 
 WHOLE = {  # numbers of [numerics], from and to
     "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
@@ -50,92 +53,112 @@ class Numerics:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
 
 
-class Tier:
-    """Base of all tiers. name: in scenes, options and tables. label: for legends. style: of its line. rests_on: premises
-    without which it says nothing. needs: what these are lost for. joints: shape variables that it takes; offered: those
-    for which a plain study asks for it; takes_joints, instead: in words, and what to do with others. looks_up: its table's
-    name, of which tiers may share one, "" for none. depends_on: entries of [numerics] that the table depends on, beside the
-    system and `reach`. on_grid: the table is a field on the scene's grid. whole: it must have no singular shapes. plain: a
-    plain study asks for it.
+@dataclass(frozen=True)
+class Table:
+    """What is computed once for a system, and looked up from then on.
+
+    name: of its kind. key: all that it depends on beside the system. balances: velocities that building it takes. numbers:
+    that it holds. build: table(progress), which calls progress with the fraction done. axes: of a field of shapes, which
+    gaits must not leave, ValueError for one too large; None for no field. amplitudes: of the gait whose cycles it is built
+    of, None for those of no gait.
     """
 
-    name = "tier"
-    label = ""
-    style: dict = {}
-    rests_on = ALL
-    needs = "connection or CCF"
-    joints = offered = range(1, 10_001)
-    looks_up = ""
-    depends_on: tuple[str, ...] = ()
-    takes_joints, instead = "takes a body of joints", "use direct"
-    on_grid = False
-    whole = False
-    plain = True
+    name: str
+    key: tuple
+    balances: int
+    numbers: int
+    build: Callable[[Callable | None], Any]
+    axes: Callable[[], tuple[np.ndarray, ...]] | None = None
+    amplitudes: np.ndarray | None = None
+
+
+def nothing(count: int, phases: int) -> int:
+    """Return 0, the balances of a prediction that looks all up."""
+    return 0
+
+
+def undecided(table: Any, amplitudes) -> None:
+    """Return None, the spread of a prediction that leaves no choice."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a tier predicts displacements of one gait of one system.
+
+    predict: net poses (..., 3) by the table, or None, for amplitudes (...,) or the gait's own, None. table: None where
+    nothing is looked up. balances: velocities of a prediction at ``count`` amplitudes and so many phases, beside the
+    table's. exact: the system runs the gait itself, so that refining it tells the error. spread: (B, 2), the system's unit
+    and rad, for a table and amplitudes (B,): how far positions and headings depend on what is no part of the question, such
+    as a spanning surface; None for no such choice. numbers: held beside the table's. read: numbers that a look-up sums for
+    each phase.
+    """
+
+    predict: Callable[[Any, Any], np.ndarray]
+    table: Table | None = None
+    balances: Callable[[int, int], int] = nothing
+    exact: bool = False
+    spread: Callable[[Any, Any], np.ndarray | None] = undecided
+    numbers: int = 0
+    read: int = 0
+
+
+@dataclass(frozen=True)
+class Tier:
+    """A way to predict displacements.
+
+    name: in scenes, options and tables. label: for legends. style: of its line. plan: of (system, numerics, gait,
+    amplitudes). rests_on: premises without which it says nothing, and no ``result`` exists. joints: shape variables that it
+    takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
+    named. regular: there must be no singular shapes. common: a plain study takes it.
+    markers: their colour, that of the line if left out.
+    """
+
+    name: str
+    label: str
+    style: Mapping[str, Any]
+    plan: Callable[[System, Numerics, Gait, Any], Plan]
+    rests_on: Premise = ALL
+    result: str = "connection or CCF"
+    joints: range = range(1, 10_001)
+    offered: range = range(1, 10_001)
+    takes: str = "takes a body of joints"
+    instead: str = "use direct"
+    regular: bool = False
+    common: bool = True
+    markers: str = ""
 
     @property
     def colour(self) -> str:
-        """Of its markers."""
-        return self.style["color"]
+        """Of its markers and error bars."""
+        return self.markers or self.style["color"]
 
     def refuse(self, system: System) -> None:
         """ValueError if it says nothing of this system."""
-        system.refuse(self.needs, self.rests_on, "use the direct tier")
+        system.refuse(self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
-            raise ValueError(f"the {self.name} tier {self.takes_joints}, this body has {system.joints}: {self.instead}")
-        if self.whole and system.singularity is not None:
+            raise ValueError(f"the {self.name} tier {self.takes}, this body has {system.joints}: {self.instead}")
+        if self.meets_singular_shapes(system):
             near = getattr(system, "near", "")
             why = f"A is known near {near} alone" if near else f"the {system.kind} has singular shapes"
             raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
 
-    def takes(self, system: System) -> bool:
-        """Whether it says something of this system, and is worth asking."""
-        if system.joints not in self.offered or system.lacks & self.rests_on:
-            return False
-        return not (self.whole and system.singularity is not None)
+    def meets_singular_shapes(self, system: System) -> bool:
+        """Return whether singular shapes keep it from saying anything of this system."""
+        return self.regular and system.traits.singularity is not None
 
-    def is_direct(self, system: System) -> bool:
-        """Whether it is the direct tier, for want of anything to look up."""
-        return not self.looks_up
+    def is_possible(self, system: System) -> bool:
+        """Return whether it says something of this system."""
+        possible = system.joints in self.joints and not system.traits.lacks & self.rests_on
+        return possible and not self.meets_singular_shapes(system)
 
-    def reach(self, gait: Gait, amplitudes) -> tuple:
-        """What of a gait the table depends on: nothing."""
-        return ()
-
-    def around(self, system: System, numerics: Numerics) -> bool:
-        """Whether it has no table of so many joints, and asks for velocities at shapes around the gait instead."""
-        return False
-
-    def along(self, system: System, numerics: Numerics, count: int, phases: int) -> int:
-        """How many, where it does."""
-        return 0
-
-    def table(self, system: System, numerics: Numerics, *reach, progress: Callable | None = None) -> Any:
-        """What is computed once for a system; None for nothing."""
-
-    def solves(self, system: System, numerics: Numerics, gait: Gait, count: int, phases: int) -> int:
-        """Velocities that it asks for in all, for ``count`` amplitudes of a gait: its cost, look-ups being cheap beside it."""
-        raise NotImplementedError
-
-    def size(self, system: System, numerics: Numerics) -> int:
-        """Numbers that the table holds."""
-        return 0
-
-    def sample(self, system: System, numerics: Numerics) -> Callable | None:
-        """Looks n shapes up in a table of zeros, as large as a shape touches, to be timed; None if that costs nothing."""
-        return None
-
-    def predict(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray:
-        """Net poses (..., 3) for amplitudes (...,), or the gait's own."""
-        raise NotImplementedError
-
-    def choice(self, table, system: System, gait: Gait, amplitudes, numerics: Numerics) -> np.ndarray | None:
-        """(B, 2), the system's unit and rad: how far positions and headings at amplitudes (B,) hang on what is no part of the
-        question, as a spanning surface; None where there is nothing to choose."""
+    def is_offered(self, system: System) -> bool:
+        """Return whether it says something of this system, and takes no longer than others that say more."""
+        return system.joints in self.offered and self.is_possible(system)
 
 
 def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
-    if system.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
+    if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
     return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
 

@@ -10,7 +10,7 @@ from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
 from geomech.systems.base import NONE
-from geomech.tiers.base import Tier, in_groups, solved
+from geomech.tiers.base import Plan, Tier, in_groups, solved
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -28,18 +28,30 @@ def _cycle(velocity: Velocity, gait: Gait, amplitudes, phases: int) -> np.ndarra
     return displacement(np.concatenate([evaluate(velocity, alpha[:, p], alphadot[:, p]) for p in parts], -2))
 
 
-class Direct(Tier):
-    """No table: the system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
+def itself(system, numerics, gait: Gait) -> Plan:
+    """Return the plan of a tier that integrates the system's own velocity, and looks nothing up."""
+    predict = lambda table, some: direct(system.velocity, gait, some, numerics.phases)
+    return Plan(predict, balances=_balances(system, gait), exact=True)
 
-    name, label = "direct", "force balance"
-    style = {"color": "0.72", "linestyle": "-", "linewidth": 4.0, "zorder": 1}  # the others lie on it, or do not
-    colour = "black"
-    rests_on = NONE
 
-    def solves(self, system, numerics, gait, count, phases) -> int:
-        return count * solved(system, gait, phases)
+def _balances(system, gait: Gait):
+    return lambda count, phases: count * solved(system, gait, phases)
 
-    def predict(self, table, system, gait, amplitudes, numerics) -> np.ndarray:
-        phases = numerics.phases
-        run = lambda some: system.run(*gait.cycle(phases, some)).net
-        return run(None) if amplitudes is None else in_groups(run, amplitudes, system.at_once(phases))
+
+def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
+    """The system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
+    phases = numerics.phases
+    run = lambda some: system.run(*gait.cycle(phases, some)).net
+    predict = lambda table, some: run(None) if some is None else in_groups(run, some, system.at_once(phases))
+    return Plan(predict, balances=_balances(system, gait), exact=True)
+
+
+DIRECT = Tier(
+    "direct",
+    "force balance",
+    # The others lie on its line, or do not.
+    {"color": "0.72", "linestyle": "-", "linewidth": 4.0, "zorder": 1},
+    _plan,
+    rests_on=NONE,
+    markers="black",
+)

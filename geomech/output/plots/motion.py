@@ -11,6 +11,7 @@ from geomech.geometry.field import Field
 from geomech.output.plots.maps import ccf_map, draw_gait, has, shape_space
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.study.motion import Motion
+from geomech.systems.base import length_unit, shape_labels
 
 BODY, HEAD = "#1b4965", "#d1495b"
 LINES = 8  # shape variables beyond which they are a map along the body, not a line each
@@ -42,7 +43,7 @@ def world(ax, motion: Motion, rows, limits=None) -> Callable:
     """The track of the frame's origin on an Axes to the scale of the body; a function of row that puts the body there and
     gives the artists it has moved."""
     low, high = reach(motion, rows) if limits is None else limits
-    unit = motion.scene.system.unit
+    unit = length_unit(motion.scene.system)
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.plot(*motion.pose[:, :2].T, color="0.6", lw=0.6)
     (behind,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
@@ -69,21 +70,21 @@ def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = 
     if system.joints == 2:
         if field is not None:
             component = next((k for k in range(3) if has(field, k)), 0)
-            ccf_map(field, component, [scene.gait], ax=ax, error=error, labels=system.shape_labels)
+            ccf_map(field, component, [scene.gait], ax=ax, error=error, labels=shape_labels(system))
         else:
             draw_gait(scene.gait, ax)
             low, high = motion.alpha.min(0), motion.alpha.max(0)
             room = 0.15 * max(high - low) + 1e-9
-            shape_space(ax, [np.array(x) for x in zip(low - room, high + room)], system.shape_labels)
+            shape_space(ax, [np.array(x) for x in zip(low - room, high + room)], shape_labels(system))
         (dot,) = ax.plot([], [], "o", color=HEAD, ms=7, mec="white", mew=0.8)
         return _moving(dot, lambda row: ([motion.alpha[row, 0]], [motion.alpha[row, 1]]))
     turns = motion.phase / (2 * np.pi)
     once = turns <= 1 + 1e-9
     ax.set(xlabel="phase (cycles)", xlim=(0, 1))
     if system.joints <= LINES:
-        for k, (name, _) in enumerate(system.shape_labels):
+        for k, (name, _) in enumerate(shape_labels(system)):
             ax.plot(turns[once], motion.alpha[once, k], label=quantity(name))
-        ax.set_ylabel(quantity("shape variable", system.shape_labels[0][1]))
+        ax.set_ylabel(quantity("shape variable", shape_labels(system)[0][1]))
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4)
     else:
         _bends(ax, motion, turns[once])
@@ -100,7 +101,7 @@ def _bends(ax, motion: Motion, turns) -> None:
     if ends is not None and ends.shape[-2] == len(values) + 2:
         parts = np.hypot(*np.diff(ends[0], axis=0).T)
         values, place = values / ((parts[1:] + parts[:-1]) / 2)[:, None], np.cumsum(parts[:-1]) / parts.sum()
-        name = f"curvature (rad/{motion.scene.system.unit})"
+        name = f"curvature (rad/{length_unit(motion.scene.system)})"
     top = np.abs(values).max() or 1.0
     image = ax.pcolormesh(turns, place, values, cmap=cm.vik, vmin=-top, vmax=top, shading="gouraud", rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.85).set_label(name)

@@ -17,6 +17,7 @@ from geomech.output.plots.maps import ccf_map, drawable, shape_space
 from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
 from geomech.study.bench import Study
+from geomech.systems.base import shape_labels
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
 NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is held by them
@@ -64,7 +65,7 @@ def held(optimum: Optimum, field: Field | None) -> np.ndarray:
         )  # beside singular shapes it is any
         out = np.where(value <= NEAR_ZERO * top, "zero", out)
     if "singular shapes" in optimum.active:
-        away = np.abs(optimum.scene.system.singularity(alpha))
+        away = np.abs(optimum.scene.system.traits.singularity(alpha))
         out = np.where(away <= away.min() * (1 + NEAR_SINGULAR), "singular", out)
     box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
     near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
@@ -86,12 +87,12 @@ def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
     """The best loop on the map of `along`, coloured by what holds it; the start dashed. Where the velocity does not follow
     from shape alone there is no CCF, and the map has the loop alone."""
     ax, system = axes_of(ax), optimum.scene.system
-    if system.steps:
-        shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, system.shape_labels)
+    if system.traits.steps:
+        shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
         ax.set_title("no CCF: the velocity does not follow\nfrom shape alone")
     else:
         field = drawable(along(optimum) if field is None else field)
-        ccf_map(field, ax=ax, labels=system.shape_labels)
+        ccf_map(field, ax=ax, labels=shape_labels(system))
         frame = f"frame {optimum.scene.frame}" if field.masked else "minimum-perturbation frame"
         ax.set_title(f"CCF of the {gain(optimum)},\n{frame}")
         bar = ax.collections[0].colorbar
@@ -106,8 +107,8 @@ def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, stu
     """`optimum_map` on shape space redrawn so that equal lengths cost equal effort. ValueError for what has no metric."""
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
     field, plane = along(optimum, study) if field is None else field, stretch(study.metric)
-    effort = "BL" if system.power_degree == 1 else "path length"
-    stretched_map(field, plane, ax=ax, labels=system.shape_labels, effort=effort)
+    effort = "BL" if system.traits.power_degree == 1 else "path length"
+    stretched_map(field, plane, ax=ax, labels=shape_labels(system), effort=effort)
     ax.set_title(f"the same, stretched to its cost\n(lengths off by {100 * plane.rms:.2g} % rms)")
     bar = ax.collections[0].colorbar
     bar.set_label(bar.ax.get_ylabel().replace("$_{x}$", ""))
@@ -124,7 +125,7 @@ def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> Non
     """Both loops, each shape where ``place`` puts it."""
     t = np.linspace(0, 2 * np.pi, PHASES)
     ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
-    left = field is not None and not optimum.scene.system.linear
+    left = field is not None and not optimum.scene.system.traits.linear
     draw_held(ax, place(optimum.gait.shape(t)), held(optimum, field), left)
 
 
@@ -146,7 +147,7 @@ def angles(optimum: Optimum, ax=None):
     """Shape variables of the best gait over a cycle, and the limits."""
     ax, gait = axes_of(ax), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
-    names = optimum.scene.system.shape_labels
+    names = shape_labels(optimum.scene.system)
     every = max(1, gait.joints // 6)
     for k, curve in list(enumerate(gait.shape(t).T))[every // 2 :: every]:
         ax.plot(t, curve, label=quantity(names[k][0]))
@@ -173,7 +174,7 @@ def optimum_figure(optimum: Optimum, stretched: bool = False):
         angles(optimum, axes[0, 0])
         return fig
     fig, axes = figure(11.8 if stretched else 7.6, 3.9, 3 if stretched else 2)
-    field = None if system.steps else along(optimum, study)
+    field = None if system.traits.steps else along(optimum, study)
     optimum_map(optimum, axes[0, 0], field)
     if stretched:
         stretched_optimum(optimum, axes[0, 1], field, study)

@@ -1,0 +1,125 @@
+"""The fitted connection: on a grid of shapes, on a plane, or at shapes where it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from geomech.geometry import connection
+from geomech.geometry.connection import Connection
+from geomech.geometry.field import inside
+from geomech.geometry.images import images, to_solve
+from geomech.geometry.plane import Plane, looked_up
+from geomech.geometry.plane import plane as fit_plane
+from geomech.geometry.traits import Traits
+from geomech.systems.base import ALL, System, length_unit, shape_labels
+from geomech.tiers.base import Numerics, Table
+
+INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
+
+LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
+FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
+DEPENDS_ON = ("grid", "extent", "directions", "interpolation")  # of [numerics]
+
+
+def refuse(system: System) -> None:
+    """ValueError if the system has no connection."""
+    system.refuse("connection or CCF", ALL, "use the direct tier")
+
+
+def directions(system: System, numerics: Numerics) -> int:
+    """Return the number of directions of alphadot at each shape."""
+    return numerics.directions or (8 if system.joints <= 2 else (4 if system.traits.linear else 16) * system.joints)
+
+
+def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
+    """Return the axes of the field; ValueError if there is none, or one too large."""
+    refuse(system)
+    if own := system.stored("connection"):
+        return own.axes
+    d, n = system.joints, numerics.grid
+    if n**d > LARGEST_GRID:
+        few = 4**d <= LARGEST_GRID
+        cost = f" ({24e-9 * d * n**d:.3g} GB for A)" if few else ""
+        lower = f"lower [numerics] grid, to {fits(d)} or less, " if few else "give a chain two [body] modes, "
+        raise ValueError(f"a field of {n}^{d} shapes is too large{cost}: {lower}{INSTEAD}")
+    return connection.grid(system.joints, numerics.grid, numerics.extent)
+
+
+def fits(joints: int) -> int:
+    """Return the finest grid, odd, of which a field of so many joints is quick."""
+    return max(4, next((n for n in range(31, 4, -2) if n**joints <= FIELD), 4))
+
+
+def is_too_large(system: System, numerics: Numerics) -> bool:
+    """Return whether tiers do without the field of so many shapes, and solve for A at those of the gait and of the surfaces
+    that it spans."""
+    return system.joints > 3 and not system.stored("connection") and numerics.grid**system.joints > FIELD
+
+
+def table(system: System, numerics: Numerics) -> Table:
+    """Return the connection on the scene's grid, as a table to build."""
+    count, d = directions(system, numerics), system.joints
+    return Table(
+        "connection",
+        key(numerics, DEPENDS_ON),
+        solved_shapes(system, numerics, count) * count,
+        (d + 3) * 3 * numerics.grid**d,
+        partial(_build, system, numerics),
+        partial(axes, system, numerics),
+    )
+
+
+def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
+    """Return the values of some entries of [numerics]."""
+    return tuple(getattr(numerics, name) for name in names)
+
+
+def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
+    if own := system.stored("connection"):
+        return own if own.length else replace(own, unit=length_unit(system), length=system.length)
+    return system.fitted(axes(system, numerics), directions(system, numerics), numerics.interpolation, progress)
+
+
+def at_shapes(system: System, numerics: Numerics) -> Callable:
+    """Return the connection as a function of shapes (..., d), without a field."""
+    return connection.fitted_at(system.velocity, system.joints, directions(system, numerics), system.traits.linear)
+
+
+def solved_at(system: System, numerics: Numerics) -> int:
+    """Return the velocities that `at_shapes` takes for each shape."""
+    return system.joints if system.traits.linear else directions(system, numerics)
+
+
+def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progress: Callable | None = None) -> Plane:
+    """Return the plane of shape space on which two joints move (`geomech.geometry.plane`), looked up in a stored field.
+
+    ValueError if there is no connection, or if the plane lies outside the field."""
+    refuse(system)
+    if own := system.stored("connection"):
+        return looked_up(own, pair, at)
+    axis = connection.grid(1, numerics.grid, numerics.extent)[0]
+    at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
+    count = directions(system, numerics)
+    known = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
+    return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **known)
+
+
+def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
+    """Return the number of shapes of the field that are solved, each for ``count`` directions of alphadot; 0 of one that is
+    stored."""
+    if system.stored("connection"):
+        return 0
+    return _solved_shapes(system.joints, numerics.grid, count, system.traits.halved, system.traits.reversible)
+
+
+@lru_cache
+def _solved_shapes(joints: int, points: int, count: int, mirror: bool, reversible: bool) -> int:
+    if points**joints > LARGEST_GRID:  # which is refused before it is solved
+        return points**joints // (2 if mirror else 1)
+    grid, unit = connection.grid(joints, points), connection.directions(joints, count)
+    alike = images(grid, unit, Traits(mirror=mirror, reversible=reversible))
+    return int(to_solve(alike, points**joints).sum())
