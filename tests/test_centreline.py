@@ -272,14 +272,14 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
 
 
 def test_sweeps_are_taken_up_only_with_the_same_file(tmp_path, monkeypatch):
-    from geomech.study import sweep
+    from geomech.study import cycles, sweep
 
     toml, partial = scene_in(tmp_path, 12), tmp_path / "partial"
     write(tmp_path / "data", "points", count=12, places=20)
     over = {"body.length": [1.0, 2.0]}
     sweep.sweep(scenes.load(toml), over, partial)
-    calls, solve = [], sweep._rows
-    monkeypatch.setattr(sweep, "_rows", lambda *some: calls.append(some) or solve(*some))
+    calls, solve = [], cycles._rows
+    monkeypatch.setattr(cycles, "_rows", lambda *some: calls.append(some) or solve(*some))
     sweep.sweep(scenes.load(toml), over, partial)
     assert calls == []
     write(tmp_path / "data", "points", count=12, places=20, amplitude=0.11)

@@ -458,7 +458,7 @@ def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
     f = measured.fit_log(log_of(made), harmonics=1 if spread else None)
     assert f.combined == {}
     if joints < 5:  # of which 24 cycles tell less
-        along = f"{told.ALONG}: its cycles do not vary enough to tell A across it"
+        along = f"{results.ALONG}: its cycles do not vary enough to tell A across it"
         assert results.status(f) == ("fitted" if spread else along)
 
 

@@ -253,5 +253,8 @@ def test_sweeps_have_it(tmp_path):
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (pytest.approx((net - medium).min()), pytest.approx((net + medium).max()))
     assert "medium_error" not in sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
-    more = sweep.cost(sand, over).balances - sweep.cost(sand.changed(medium=Granular(1.49, 0.22)), over).balances
+    more = (
+        sweep.Sweep(sand, over).cost().balances
+        - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances
+    )
     assert more == 6 * 4 * uncertainty.PHASES

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from geomech.core.face import Faced
 from geomech.core.variables import Result
+from geomech.gaits import Gait
+from geomech.scene.model import Scene
 from geomech.study import tables
 
 
@@ -17,11 +19,11 @@ class Displacements(Faced, dict):
         self.result = result
 
     @property
-    def scene(self):
+    def scene(self) -> Scene:
         return self.result.subject[0]
 
     @property
-    def gait(self):
+    def gait(self) -> Gait:
         return self.result.subject[1]
 
     @property
