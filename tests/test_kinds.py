@@ -20,8 +20,9 @@ from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
-from geomech.scene.keys import schema, text
+from geomech.scene.keys import text
 from geomech.scene.kinds import FAMILIES, load_file, register
+from geomech.scene.schema import schema
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.systems import Plain, Premise, Solver, Swimmer
@@ -233,7 +234,7 @@ class Slick(Effect):
     cost = "one multiplication"
 
     def apply(self, problem, site=None, past=None):
-        return problem._replace(sides=problem.sides.multiplied(self.by, self.by, 1.0))
+        return problem._replace(sides=problem.sides.with_factors(self.by, self.by, 1.0))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.core.errors import SceneError
 from geomech.core.variables import Result, Variable
-from geomech.scene.intruder import load_medium
+from geomech.scene.stress import load_medium
 from geomech.study.question import Allow, Progress, Question
 from rft.plates import survey
 

@@ -7,7 +7,6 @@ import dataclasses
 import itertools
 import math
 import time
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
@@ -20,7 +19,6 @@ from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
 from geomech.scene import write as written
-from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
 from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.grid import Grid
@@ -211,9 +209,7 @@ class Walks:
 
     def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
         """Return the grid; SceneError if one of some 200 of its points makes no scene, or one that nothing here computes."""
-        read = tomllib.loads(scene.text)
-        same = read and from_tables(read, scene.name, scene.text) == scene
-        grid = Grid(scene, over, read if same else scene.tables())
+        grid = Grid(scene, over, written.tables(scene))
         last = grid.total - 1
         for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
             there = grid.at(grid.points[k])

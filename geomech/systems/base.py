@@ -14,9 +14,9 @@ from geomech.geometry.connection import Connection, evaluate, fit
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import NOTHING, Traits
-from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, not_so
+from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, negated
 
-__all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "not_so"]
+__all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "negated"]
 
 VALUES_TOGETHER = 1 << 22  # of gaits run side by side, angles and velocities: some 500 MB with what is made of them
 
@@ -215,7 +215,7 @@ class Plain:
 
     def blame(self, premises: Premise) -> str:
         """Who lacks one of these premises, to follow "no connection with"; empty if nobody does."""
-        return f"the {self.kind}, which is {not_so(self.traits.lacks)}" if self.traits.lacks & premises else ""
+        return f"the {self.kind}, which is {negated(self.traits.lacks)}" if self.traits.lacks & premises else ""
 
     def refuse(self, what: str, premises: Premise, instead: str) -> None:
         """ValueError if there is no such result because a premise of it does not hold."""

@@ -19,7 +19,7 @@ import numpy as np
 from geomech.core.errors import real_array, short
 from geomech.geometry.traits import Traits
 from geomech.systems.base import Plain
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements
 
@@ -30,7 +30,7 @@ class Linkage(Chain):
 
     masses: tuple[float, ...] = ()
 
-    def _of_link(self, x: np.ndarray, link: int | None) -> np.ndarray:
+    def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
         masses = np.asarray(self.masses)
         return x[link] if link is not None else masses @ x / masses.sum()
 
@@ -122,7 +122,7 @@ class Momentum(Plain):
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
         return (
-            (weights * (motion.v + np.stack(np.broadcast_arrays(*carried(motion, *xi)))) ** 2)
+            (weights * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi)))) ** 2)
             .sum((0, 1))
             .reshape(shape)
         )

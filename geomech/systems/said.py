@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from geomech.core.errors import short
-from geomech.systems.base import SHAPE_ALONE, Premise, not_so
+from geomech.systems.base import SHAPE_ALONE, Premise, negated
 from rft.bodies import KINDS as BODIES
 from rft.effects import ENGINES
 from rft.effects import KINDS as EFFECTS
@@ -27,7 +27,7 @@ class Said:
             return f"the law {name_in(LAWS, self.medium)}, whose drag is of no one power of the speed"
         for effect in self.effects:
             if effect.breaks & premises:
-                return f"the effect {effect.kind}, which is {not_so(effect.breaks)}"
+                return f"the effect {effect.kind}, which is {negated(effect.breaks)}"
         return ""
 
     def refuse(self, what: str, premises: Premise, instead: str) -> None:
@@ -59,7 +59,7 @@ class Said:
         for effect in self.effects:
             cost = f"; costs {effect.cost}" if effect.cost else ""
             gone = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
-            premises = not_so(effect.breaks) or "keeps every premise"
+            premises = negated(effect.breaks) or "keeps every premise"
             lines.append(f"on:  {said(effect.kind, effect)}; {premises}{cost}{gone}")
             if assumed := effect.assumes(self.medium):
                 lines.append(f"     assumes {assumed}")
@@ -71,7 +71,7 @@ class Said:
     @property
     def because(self) -> str:
         broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in self.effects if e.breaks & SHAPE_ALONE]
-        reasons = [f"with {kind} the scene is {not_so(lost)}" for kind, lost in broken]
+        reasons = [f"with {kind} the scene is {negated(lost)}" for kind, lost in broken]
         return f"({ENGINES[self.engine]}): " + ("; ".join(reasons) or "nothing remembers, places are alike, no mass")
 
 

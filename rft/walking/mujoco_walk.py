@@ -142,7 +142,7 @@ class Course:
             if ended:
                 break
             moves.append(_moved(first, rows[-1]))
-            cycles = limit_cycle.light(cycles, np.full((3, 1), moves[-1][0]))
+            cycles = limit_cycle.after_massless_cycle(cycles, np.full((3, 1), moves[-1][0]))
             drift = float(cycles.drift[0])
             here = self.section()
             change, last = np.abs(here - last).max(), here
