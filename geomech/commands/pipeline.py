@@ -16,7 +16,7 @@ from geomech.io.files import note, refuse_inputs, whole_file, whole_folder
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result
-    from geomech.study.cost import Cost
+    from geomech.run.cost import Cost
     from geomech.study.question import Question
 
 
@@ -63,15 +63,21 @@ def show(lines: Iterable[str]) -> None:
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
     """Say what is to come if it takes long or otherwise than expected; SceneError, which says what to do else, if it takes
-    too long to be begun without --yes. From here on "auto" is the back end for that many balances."""
+    too long to be begun without --yes: here, or in its first second (`geomech.run.cost.decide`). From here on "auto" is the
+    back end for that many balances."""
     from geomech.run.backend import prefer_for
+    from geomech.run.cost import decide
 
     scene = question.scene
-    cost.check(scene.name, yes, question.less)
+
+    def judge(cost: Cost) -> None:
+        cost.check(scene.name, yes, question.less)
+        if not cost.small or cost.seconds >= question.worth_saying:
+            terminal.tell(f"{scene.name}: {cost}")
+
     prefer_for(cost.as_balances)
+    decide(cost, judge)
     _note(scene)
-    if not cost.small or cost.seconds >= question.worth_saying:
-        terminal.tell(f"{scene.name}: {cost}")
 
 
 def _note(scene: Any) -> None:

@@ -30,7 +30,7 @@ def walk(
     """How a robot walks on grains: mean speed with its error, and its way from rest. SI units, pitch in rad, nose down."""
     from geomech.output import animate as film
     from geomech.output import walks
-    from geomech.study.cost import LONGEST
+    from geomech.run.cost import LONGEST
     from geomech.study.walking import Walking
 
     question = Walking(loaded_walker(name), engine, math.inf if yes else LONGEST)

@@ -10,8 +10,8 @@ from geomech.core.variables import Result, Variable
 from geomech.optimise.limits import Asked
 from geomech.optimise.request import Request, checked
 from geomech.optimise.search import search
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
-from geomech.study.cost import Cost
 from geomech.study.effort import why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit

@@ -14,10 +14,10 @@ from geomech.core.variables import Result
 from geomech.io.files import whole_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
+from geomech.run.cost import Cost
 from geomech.run.progress import progress as shown
 from geomech.run.progress import told
 from geomech.scene.model import Scene
-from geomech.study.cost import Cost
 from geomech.study.motion import Motion, Picture
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
@@ -50,7 +50,7 @@ def rows(phases: int, cycles: int) -> np.ndarray:
 def cost(phases: int, cycles: int) -> Cost:
     """Of a film."""
     frames = len(rows(phases, cycles))
-    return Cost(0, DRAWING * frames, FRAME * frames)
+    return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
 
 def picture(scene: Scene, path: Path, cycles: int | None) -> Picture:

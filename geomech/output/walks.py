@@ -79,7 +79,7 @@ def _frames(scene: WalkerScene, found: Walked) -> Iterator[np.ndarray]:
     last = min(w.t[-1], FRAMES / animate.RATE)
     times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES)) if last else np.zeros(1)
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
-    pictures = w.more and walking.view(scene).pictures(w.more["states"][rows])
+    pictures = w.spatial and walking.view(scene).pictures(w.spatial["states"][rows])
     return pictures or _drawn(scene, found, rows)
 
 
@@ -99,7 +99,7 @@ def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray) -> Iterator[np.n
 
 def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray):
     """Ground and axes that hold the robot at these rows of its walk; a function that puts it there at one."""
-    shown = _Solid(scene, found) if found.walk.more else _Flat(scene, found)
+    shown = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
     room, reach = shown.room * 1.1, shown.reach
     x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
@@ -125,14 +125,14 @@ class _Flat:
         self.room = max(away)
 
     def on(self, ax):
-        legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.apart]
+        legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.hip_phases]
         lines = [ax.plot([], [], color=TRIPODS[int((k + 2 * at) % 2)], lw=1.2)[0] for k, at in legs]
         box = ax.plot([], [], color="black", lw=1.2)[0]
 
         def draw(row):
             pose, t = self.walk.pose[row], self.walk.t[row]
             for line, (k, at) in zip(lines, legs):
-                phase = self.gait.frequency * t + (k * self.robot.apart[-1] + at) % 1.0
+                phase = self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
                 hip = _turned(np.array([self.hips[k]]), pose[2]) + pose[:2]
                 line.set_data(*(_turned(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
             if self.belly is not None:
@@ -146,18 +146,18 @@ class _Solid:
 
     def __init__(self, scene: WalkerScene, found: Walked):
         self.view, self.walk = walking.view(scene), found.walk
-        first = self.view.triangles(self.walk.more["states"][0]).reshape(-1, 3)
+        first = self.view.triangles(self.walk.spatial["states"][0]).reshape(-1, 3)
         self.room = float(np.abs(first[:, [0, 1]] - [self.walk.pose[0, 0], 0.0]).max())
         self.reach = max(float(np.ptp(first[:, 2])), self.room / 4) / 2
 
     def on(self, ax):
         from matplotlib.collections import PolyCollection
 
-        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.of]
+        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.groups]
         drawn = ax.add_collection(PolyCollection([], lw=1.0))  # sheets are seen by their edges
 
         def draw(row):
-            triangles = self.view.triangles(self.walk.more["states"][row])
+            triangles = self.view.triangles(self.walk.spatial["states"][row])
             order = np.argsort(-triangles[..., 1].mean(1), kind="stable")  # what is farther off first
             drawn.set_verts(triangles[order][..., [0, 2]])
             drawn.set_facecolor(colours[order])

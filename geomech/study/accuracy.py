@@ -16,8 +16,8 @@ from typing import Any, ClassVar, Protocol, Self
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.run.cost import Cost
 from geomech.run.jobs import runner
-from geomech.study.cost import Cost
 from geomech.study.knob import ROUNDING, Knob
 from geomech.study.question import Allow, Progress, Question
 

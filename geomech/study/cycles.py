@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -12,18 +11,17 @@ import numpy as np
 from geomech.core.summary import poses
 from geomech.core.variables import Result, Variable
 from geomech.io.results import units_of
-from geomech.run.backend import suiting
-from geomech.run.jobs import unaided
+from geomech.run.cost import Cost
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import estimate, tables, uncertainty
 from geomech.study.batch import beside, kind
-from geomech.study.cost import Cost, direct, of_medium, price
+from geomech.study.cost import direct, of_medium, price
 from geomech.study.grid import Grid, at_points
 from geomech.systems.base import length_unit
 
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
-MOST_BATCHES = 10  # that are taken for nothing in a forecast
+MAKING = 3e-4  # s that a scene takes to be made of its tables; assumed
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
@@ -60,25 +58,15 @@ class Cycles:
     def cost(self, grid: Grid) -> Cost:
         """Forecast from some of the points."""
         points, at, total = grid.points, grid.at, grid.total
-        start, first = time.process_time(), [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
-        seconds = (time.process_time() - start) / len(first) * points.total
+        first = [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
         together = max(1, min(SAMPLES_TOGETHER, total // points.total * len(first) // len(set(map(kind, first)))))
         some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
-        jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
-        balances, each, _ = np.array(list(map(price, jobs))).T
-        if not grid.scene.system.traits.steps and total > MOST_BATCHES * together:
-            with suiting(balances.mean()):
-                seconds += total / together * self._seconds_of_a_batch(first[0], (grid.beside or [])[:1] or None)
+        asked = [(s, s.gait, total, s.numerics.phases) for s in some]
+        jobs = [direct(*one, together) + of_medium(*one[:3], together) for one in asked]
+        balances, seconds, _, besides = np.mean(list(map(price, jobs)), 0).tolist()
         held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
-        return Cost(round(balances.mean()), float(each.mean()) + seconds, max(held) + HELD * total)
-
-    def _seconds_of_a_batch(self, scene: Scene, amplitudes: list[float] | None) -> float:
-        """Return the seconds that a batch takes, however small it is."""
-        with unaided():
-            self.rows([scene], amplitudes)  # loads what the first one loads
-            start = time.process_time()
-            self.rows([scene], amplitudes)
-            return time.process_time() - start
+        making = MAKING * points.total
+        return Cost(round(balances), seconds + making, max(held) + HELD * total, besides + making)
 
     def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
         """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""

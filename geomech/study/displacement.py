@@ -8,11 +8,11 @@ from functools import cached_property
 
 from geomech.core.errors import SceneError, choose
 from geomech.core.variables import Result
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import cost
 from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
-from geomech.study.cost import Cost
 from geomech.study.effort import refuse_costless, with_effort
 from geomech.study.question import Allow, Progress, Question
 

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.variables import Result, Variable
+from geomech.run.cost import BASE, Cost
 from geomech.scene.intruding import Intruding
-from geomech.study.cost import BASE, Cost
 from geomech.study.knob import ROUNDING, Knob
 from geomech.study.question import Allow, Progress, Question
 
@@ -154,4 +154,5 @@ def price(scene: Intruding, count: int | None = None) -> Elements:
     """Of runs with so many parts in all, or of one with the scene's own."""
     parts = scene.motion.samples * (count or scene.count)
     kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
-    return kind(parts, parts * scene.per_part, BASE)
+    seconds = parts * scene.per_part
+    return kind(parts, seconds, BASE, seconds)

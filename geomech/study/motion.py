@@ -10,11 +10,12 @@ import numpy as np
 
 from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.core.variables import Result, Variable
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, connection, direct, price
+from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import Premise, length_unit, shape_labels
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -119,8 +120,8 @@ class Picture(Question):
     def cost(self) -> Cost:
         costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
         costs += [self.drawing] if self.drawing else []
-        balances, seconds, memory = zip(*costs)
-        return Cost(sum(balances), sum(seconds), max(memory))
+        balances, seconds, memory, besides = zip(*costs)
+        return Cost(sum(balances), sum(seconds), max(memory), sum(besides))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         found = of_motion(motion(self.scene, self.cycles))
@@ -155,9 +156,14 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if system.traits.steps and not system.settles:  # each goes on from the one before
-        jobs = [job._replace(count=job.count * cycles) for job in jobs]
+    if (
+        system.traits.steps and not system.settles
+    ):  # each goes on from the one before; cycles that are alike are run first
+        alike = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
+        times = (alike + cycles_of(system) - 1 + cycles) / cycles_of(system)
+        jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
     width = 2 * (system.elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
-    return Cost(found.balances, found.seconds + WORDS * rows * width, found.memory + memory)
+    words = WORDS * rows * width
+    return Cost(found.balances, found.seconds + words, found.memory + memory, found.besides + words)

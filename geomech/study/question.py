@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from geomech.core.variables import Result
-from geomech.study.cost import WORTH_SAYING, Cost
+from geomech.run.cost import WORTH_SAYING, Cost
 
 Progress = Callable[[float], None]
 Allow = Callable[[Cost], None]

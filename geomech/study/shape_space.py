@@ -13,10 +13,11 @@ import numpy as np
 from geomech.core.errors import SceneError, named
 from geomech.core.variables import Result, Variable
 from geomech.geometry.plane import Plane
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import fields
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, Job, harmonics, of_metric, of_planes, price
+from geomech.study.cost import Job, frame, harmonics, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
@@ -118,12 +119,13 @@ class ShapeSpace(Question):
 
     def _jobs(self, study: Study) -> list[Job]:
         scene = study.scene
-        jobs = of_planes(scene, len(self._at)) if self._at else []
+        jobs = [*of_planes(scene, *zip(*self._at)), *frame(scene)] if self._at else []
         if not self.field:
             return jobs
         jobs += fitted(scene)
         if study is self.study:
             jobs += of_metric(scene) if self._costed else []
+            jobs += of_even_part(scene) if self.file else []
             jobs += harmonics(scene) if self._harmonics and not (self._costed and shared(scene.system)) else []
         return jobs
 

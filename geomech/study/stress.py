@@ -38,7 +38,7 @@ class Stress(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         law = load_medium(self.medium)
         whole = survey(law)
-        told = f"{self.medium} {whole.told()}" + (", which is cut" if law.tension == "cut" else "")
+        told = f"{self.medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
         facts, angles = {"told": told, "notes": [told] if whole.pushing else []}, None
         if self.beta is None:
             found = [Variable(name, (), getattr(whole, name), "1") for name in ("pulling", "pushing")]

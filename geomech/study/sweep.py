@@ -16,9 +16,9 @@ from geomech.core.errors import SceneError, plain, short
 from geomech.core.face import Faced
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
+from geomech.run.cost import Cost
 from geomech.run.jobs import context_of, runner, storing
 from geomech.scene.read import inputs
-from geomech.study.cost import Cost
 from geomech.study.grid import Grid, listed
 from geomech.study.question import Allow, Progress, Question
 

@@ -12,11 +12,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.study.cost import Cost
 from geomech.study.knob import Knob
 from geomech.study.offer import tiers
 from geomech.tiers import TIERS, fitted, harmonic

@@ -18,9 +18,9 @@ from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
+from geomech.run.cost import BASE, Cost
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
-from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.grid import Grid
 from geomech.study.knob import Knob
 from geomech.study.question import Allow, Progress, Question
@@ -29,6 +29,7 @@ from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
 
+PILOT = 0.05  # s of time steps that tell how long others take
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
@@ -81,26 +82,26 @@ def walked(
     changes = []
     for k, (name, other) in enumerate(others):
         finer = dataclasses.replace(numerics, **{name: other})
-        there = how.again(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
+        there = how.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
         changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(there, walks)]))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
     half, most, finer = changes
     error = np.maximum(half, most) + TO_COME * finer
-    error[:, 0] += [w.drift + w.off for w in walks]
+    error[:, 0] += [w.drift + w.unsolved_error for w in walks]
     return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
     """What is told of a walk with an error."""
-    return walk.speed, walk.aside, walk.turning
+    return walk.speed, walk.lateral_speed, walk.yaw_rate
 
 
 def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
     """Work of the motors over weight times way, from rest to the end; the way is in the chords of the cycles. inf of one that
     makes none."""
     at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
-    y = walk.more["y"] if walk.more else np.zeros_like(walk.t)
+    y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
     way = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
     return float(walk.work[-1] / (scene.robot.mass * GRAVITY * way)) if way > 0.0 else math.inf
 
@@ -150,13 +151,13 @@ class Walking(Question):
 def of_walk(scene: WalkerScene, found: Walked) -> Result:
     """Return the table of a walk, and its speed, drift and turning with their errors."""
     w, over = found.walk, ("t",)
-    more = {name: values for name, values in (w.more or {}).items() if values.ndim == 1}
+    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
     columns = dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
     table = [Variable(name, over, values, UNITS.get(name, "")) for name, values in columns.items()]
     table += [
         Variable("speed", (), w.speed, "m/s", "mean speed", found.estimate),
-        Variable("aside", (), w.aside, "m/s", "to the left of its heading", found.aside),
-        Variable("turning", (), w.turning, "rad/s", "to the left", found.turning),
+        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", found.aside),
+        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", found.turning),
     ]
     return Result("walk", tuple(table), {"name": scene.name}, (scene, found))
 
@@ -186,13 +187,13 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     with named(scene.name), suiting(STEP * least if planar else 0.0):
         per_step, more = PER_STEP[preferred()], MORE[preferred()]
         usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
-        pace, tries = engine(how).pace(scene.walker, numerics, PILOT)
+        pace, tries = engine(how).step_cost(scene.walker, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
     seconds = each * steps * (batches + (count - batches) * more)
-    return Steps(round(steps * count), seconds, BASE)
+    return Steps(round(steps * count), seconds, BASE, seconds)
 
 
 def _speeding_up(scene: WalkerScene) -> float:
@@ -281,7 +282,8 @@ class Settings:
         shares = sum(v / self.scene.numerics.steps for v in finest["steps"])
         shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (len(finest["rounding"]) - 1)
         one = price(self.scene, settling=True)
-        return Steps(round(one.balances * shares / 2), one.seconds * shares / 2, BASE)
+        seconds = one.seconds * shares / 2
+        return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
 
     def prepared(self) -> Settings:
         (walk,) = engine(self.scene.engine).walk([self.scene.walker], self.scene.numerics, SETTLING)
@@ -294,7 +296,7 @@ class Settings:
         """Return the speed with one knob at another value."""
         value = FINEST[knob.name] if value is None else value
         numerics = dataclasses.replace(self.scene.numerics, **{knob.name: value})
-        (found,) = engine(self.scene.engine).again([self.scene.walker], numerics, [self.near], SETTLING)
+        (found,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
         return [np.array(found.speed)]
 
     def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:

@@ -16,7 +16,7 @@ from geomech.core.work import iterate
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
+from geomech.systems.base import NONE, SHAPE_ALONE, Cycle, Plain, Premise, refuse_mutable
 from geomech.systems.said import Said
 from geomech.systems.solver import Solver
 from rft.balance.solver import ELEMENTS_TOGETHER
@@ -31,6 +31,7 @@ from rft.stepping import Row, State, Stepping
 
 PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
+STEPPED_TOGETHER = 1 << 22  # as VALUES_TOGETHER, of time steps, each of which takes its time however few gaits take it
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
 
 
@@ -271,9 +272,10 @@ class Swimmer(Said, Plain):
         batched = [getattr(e, name) for e in self.effects for name in e.batched]
         if any(map(np.ndim, batched)):
             return sys.maxsize  # a parameter for each amplitude: they belong together
+        if not self.traits.steps:
+            return super().at_once(phases)
         # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-        stepped = 4 * self.elements + self.held // 8 if self.traits.steps else 0
-        return max(1, VALUES_TOGETHER // max(phases * (self.joints + 6), stepped))
+        return max(1, STEPPED_TOGETHER // max(phases * (self.joints + 6), 4 * self.elements + self.held // 8))
 
     def finer(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)

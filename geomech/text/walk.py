@@ -20,7 +20,8 @@ def numbers(result: Result) -> dict[str, Any]:
     series = {name: result[name].values.tolist() for name in SERIES}
     told = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
     told |= {"residual": w.residual, "unaccounted": w.unaccounted}
-    told |= {"settled": w.settled if np.isfinite(w.settled) else None, "aside": w.aside, "turning": w.turning}
+    told |= {"settled": w.settling_time if np.isfinite(w.settling_time) else None}
+    told |= {"aside": w.lateral_speed, "turning": w.yaw_rate}
     told |= {"estimate_aside": found.aside, "estimate_turning": found.turning, "estimate_elements": found.elements}
     return {"speed": w.speed, "status": w.status, **series, **told}
 
@@ -54,34 +55,36 @@ def _regular(walk) -> str:
 
 def _settled(walk) -> str:
     """When a robot that starts from rest goes on as the limit cycle does."""
-    if np.isnan(walk.settled):
+    if np.isnan(walk.settling_time):
         return ""
     within = f"within {100 * walking.NEAR:g} % of it"
-    if np.isinf(walk.settled):
+    if np.isinf(walk.settling_time):
         return f"; from rest it does not come {within}"
-    return f"; from rest {within} after {walk.settled:.2g} s" if walk.settled else f"; {within} from the start"
+    return (
+        f"; from rest {within} after {walk.settling_time:.2g} s" if walk.settling_time else f"; {within} from the start"
+    )
 
 
 def _turning(found: Walked) -> list[str]:
     """How a robot of three dimensions leaves its heading."""
     w = found.walk
-    if not w.more:
+    if not w.spatial:
         return []
-    turning, error = np.degrees([w.turning, found.turning])
-    aside = f"drifting aside at {w.aside:.2g} +- {found.aside:.1g} m/s"
+    turning, error = np.degrees([w.yaw_rate, found.turning])
+    aside = f"drifting aside at {w.lateral_speed:.2g} +- {found.aside:.1g} m/s"
     return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {aside} (positive: to the left of its heading)"]
 
 
 def _unsolved(walk) -> str:
-    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.off:.1g} m/s"
+    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.unsolved_error:.1g} m/s"
     return f"{walk.unsolved} steps were taken unsolved, {off}: raise [numerics] steps or rounding"
 
 
 def _aside(walk) -> list[str]:
     """What a walk of three dimensions does besides."""
-    if not walk.more:
+    if not walk.spatial:
         return []
-    y, roll, yaw = (walk.more[name] for name in ("y", "roll", "yaw"))
+    y, roll, yaw = (walk.spatial[name] for name in ("y", "roll", "yaw"))
     angles = ", ".join(
         f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}" for name, a in (("roll", roll), ("yaw", yaw))
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from rft.balance import arrays
 from rft.balance.backend import compiles
+from rft.balance.listening import listener
 from rft.balance.newton import Descent, Limits
 from rft.balance.path import follow
 from rft.contact import Problem
@@ -71,7 +72,7 @@ def solve(
     problem_at(index): the `Problem` of the samples ``index``. scale: (B,), sizes of their velocities. law: its record.
     n_law_points: `Assembly.n_law_points`, by which the sizes of batches are chosen. backend: as in
     `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
-    size = scale.size
+    size, tell = scale.size, listener()
     batch = max(1, ELEMENTS_TOGETHER // n_law_points)
     driver, worth = arrays, 2 * batch  # samples that pay for a thread
     if compiles(backend, law):
@@ -94,9 +95,12 @@ def solve(
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
+            new = int(np.count_nonzero(iterations[index] == 0))
             index = slice(None) if index.size == size else index  # a slice is quicker
             first = guess[:, index] if method is WARM else None
             store(index, driver.solve(problem, _begin(method, problem, limits), limits, first), limits, problem.linear)
+            if new:
+                tell(new, n_law_points, problem.linear)
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / batch)):
