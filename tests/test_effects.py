@@ -13,8 +13,8 @@ from registry import EFFECTS
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
-from geomech.output.explain import explain
 from geomech.study.bench import Study
+from geomech.text.explain import explain
 from rft import (
     CATALOGUE,
     Backbone,

@@ -19,11 +19,11 @@ from geomech.core.errors import SceneError, UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
-from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.systems import NoSlipSnake, Swimmer
+from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
-from geomech.output import walk_sweeps
-from geomech.study.sweep import changed
+from geomech.output import plots
+from geomech.study.grid import changed
 from rft.plates import StressMap
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise
 from rft.walking.craft import PER_SQUARE
@@ -134,7 +134,7 @@ def test_sizes_of_screws_are_swept():
         with pytest.raises(SceneError, match="name a parameter such as"):
             changed(tables, wrong, 1.0)
     results = {"over": {"robot.screw.pitch": [0.04, 0.06]}, "speed": np.ones(2), "estimate": np.zeros(2)}
-    (ax,) = walk_sweeps.draw(SCENE, results | {"status": np.full(2, "walking")}).axes
+    (ax,) = plots.sweep_figure(SCENE, results | {"status": np.full(2, "walking")}).axes
     assert ax.get_xlabel() == "pitch (m)"
 
 
