@@ -109,7 +109,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
-            raise SceneError(f"{place}: the table [{within}] is missing: add it, 'geomech keys {path}' has its keys")
+            raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
     if variant.columns:
         table = _from_columns(place, table, variant)
     return build(place, table, variant.kind, inner, label)
