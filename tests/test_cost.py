@@ -330,6 +330,7 @@ def test_pieces_change_no_numbers(monkeypatch):
 
     whole = everything()
     monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
     monkeypatch.setattr("geomech.systems.swimmer.STEPPED_TOGETHER", 1)
     for module in (
         connection,
