@@ -11,7 +11,7 @@ import numpy as np
 from geomech.core.errors import named, short
 from geomech.systems.said import said
 from rft.checks import check_numbers
-from rft.ground import KINDS, GroundEffect, checked, weight
+from rft.ground import KINDS, GroundEffect, checked_effects, weight
 from rft.premise import negated
 
 
@@ -36,7 +36,7 @@ class Intruding:
             raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
         check_numbers(self)
         with named("[[effects]]"):
-            object.__setattr__(self, "effects", checked(self.effects))
+            object.__setattr__(self, "effects", checked_effects(self.effects))
 
     @property
     def count(self) -> int:

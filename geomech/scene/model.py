@@ -31,7 +31,7 @@ _kinds = {part: kinds for part, (_, kinds) in PARTS.items()}
 SWIMMER = {
     "medium": OneOf(_kinds["medium"], "law", otherwise=(NamedMedium, MediumFile)),
     "body": OneOf(_kinds["body"], sized=True),
-    "effects": Each(OneOf(_kinds["effects"], sized=True)),
+    "effects": Each(_kinds["effects"], sized=True),
 }
 
 

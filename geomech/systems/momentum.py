@@ -21,7 +21,8 @@ from geomech.geometry.traits import Traits
 from geomech.systems.base import Plain
 from rft.balance.newton import to_element
 from rft.bodies import Chain
-from rft.bodies.base import Elements
+from rft.bodies.base import Elements, Length
+from rft.checks import check_numbers
 
 
 @dataclass(frozen=True)
@@ -39,16 +40,16 @@ class Linkage(Chain):
 class Momentum(Plain):
     """Base of chains without momentum.
 
-    lengths (-): relative link lengths, tail to head, all > 0, at least two. length (m): the whole body, in the unit wanted
-    for displacement; 1 for body lengths. frame (-): "mean", centre of mass and mass-weighted mean heading, or "link-1",
-    "link-2" ..., those of that link.
+    lengths (-): relative link lengths, tail to head, all > 0, at least two. frame (-): "mean", centre of mass and
+    mass-weighted mean heading, or "link-1", "link-2" ..., those of that link.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
-    length: float = 1.0
+    length: Length = 1.0
     frame: str = "mean"
 
     def __post_init__(self):
+        check_numbers(self)
         object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
     def of_links(self, name: str, least: float, most: float) -> None:

@@ -33,7 +33,6 @@ class DepthProfile(Effect):
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
     batched = ("slope", "towards")
-    angles = ("towards",)
     varies_along = True
 
     def __post_init__(self):

@@ -43,7 +43,6 @@ class Slope(Effect):
     limit = "angle = 0"
     cost = "two dozen operations an element; a step at a time in place of all phases at once"
     batched = ("angle", "towards", "repose", "weight")
-    angles = ("angle", "towards", "repose")
     varies_along = True
 
     def __post_init__(self):

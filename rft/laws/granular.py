@@ -28,7 +28,6 @@ class Granular(TermLaw):
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
     k: Annotated[float | None, Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above")] = None
     covariance: tuple[tuple[float, ...], ...] | None = None
-    angles = ("gamma0",)
 
     def __post_init__(self):
         check_numbers(self)

@@ -27,7 +27,6 @@ class Surface(TermLaw):
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
     across: Annotated[float, Number(1e-6, 1e6, "-", "strength of the drag across, A of that fit, over the axial drag")]
     covariance: tuple[tuple[float, ...], ...] | None = None
-    angles = ("gamma0",)
     uncertain = ("C", "gamma0", "across")
 
     def __post_init__(self):

@@ -32,7 +32,6 @@ class Table:
     psi: tuple[float, ...]
     f_t: tuple[float, ...]
     f_n: tuple[float, ...]
-    angles = ("psi",)
     dry = None
     viscous = None
     mirror = True
