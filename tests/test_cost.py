@@ -29,6 +29,7 @@ from geomech.study.bench import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
 from rft.effects import SkinFriction, Slope
+from rft.threads import run_shares
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -157,8 +158,11 @@ class Clock:
     def solve(self, seconds, samples=1000, count=1):
         """Batches that take so long each."""
         for _ in range(count):
-            self.now += seconds
-            listener()(samples, 3, False)
+            self.take(seconds, listener(), samples)
+
+    def take(self, seconds, tell, samples=1000):
+        self.now += seconds
+        tell(samples, 3, False)
 
 
 @pytest.fixture
@@ -184,6 +188,22 @@ def test_the_first_batches_tell_what_the_others_take(factor, clock):
     (told,) = judged
     assert told.seconds == pytest.approx(1 + factor * 30) and not run_cost.is_undecided()
     assert (told.balances, told.memory) == (10**6, 1e8)
+
+
+def test_threads_of_the_solver_tell_by_the_back_end_of_the_request(clock):
+    judged = []
+    run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), judged.append)
+    tell = listener()
+    run_shares(lambda share, stop: [clock.take(2 * BATCH, tell) for _ in range(500)], [0, 1])
+    assert judged[0].seconds == pytest.approx(60.0) and len(judged) == 1
+
+
+def test_what_is_decided_next_is_not_told_by_what_was_to_be_before(clock):
+    judged = []
+    run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), lambda told: judged.append("first"))
+    run_cost.decide(run_cost.Cost(10, 1e-3, 1e8), lambda told: judged.append("second"))
+    clock.solve(1.0, count=99)
+    assert judged == ["second"]
 
 
 @pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 700.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
