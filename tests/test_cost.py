@@ -19,7 +19,7 @@ from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.run import cost as run_cost
-from geomech.study import estimate, sweep
+from geomech.study import cycles, estimate, sweep
 from geomech.study.bench import Study
 
 GLASS = scenes.load("three-link-glass")
@@ -91,7 +91,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.commands.asked.WORTH_SAYING", 0.0)
+    monkeypatch.setattr("geomech.study.shape_space.ShapeSpace.worth_saying", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
     assert err.startswith("five.toml: 8,704 force balances, about 1 s of computing and 16")
@@ -142,8 +142,8 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     """Many amplitudes are many batches: a stop keeps those that are done, in the middle of a row too."""
     over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist()}
     whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 3)
-    rows, calls = sweep._rows, []
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
+    rows, calls = cycles._rows, []
 
     def stopping(at, amplitudes):
         calls.append((at[0].system.medium.ratio, len(amplitudes)))
@@ -151,7 +151,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
             raise terminal.Stopped(signal.SIGTERM)
         return rows(at, amplitudes)
 
-    monkeypatch.setattr(sweep, "_rows", stopping)
+    monkeypatch.setattr(cycles, "_rows", stopping)
     with pytest.raises(terminal.Stopped):
         sweep.sweep(VISCOUS, over, kept)
     again = sweep.sweep(VISCOUS, over, kept)

@@ -100,12 +100,12 @@ def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
-    foretold = accuracy.cost(scene).balances
+    foretold = accuracy.Accuracy(scene).cost().balances
     accuracy.study(scene)
     assert foretold == sum(solved)
     media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
     for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
-        foretold = sweep.cost(scene, over).balances
+        foretold = sweep.Sweep(scene, over).cost().balances
         solved.clear()
         sweep.sweep(scene, over)
         assert foretold == sum(solved)

@@ -45,9 +45,6 @@ class MediumFile:
     file: str
     law: Annotated[str | None, Word(("table",), "where the file is CSV")] = None
 
-    def to_part(self, place: str, given) -> Any:
-        raise NotImplementedError
-
 
 def with_files(tables: Mapping, name: str) -> tuple[Mapping, tuple[str, ...]]:
     """(tables of a scene whose media stand there and not in files, these files). name: of the scene's file, from whose folder

@@ -11,7 +11,8 @@ A scene is a dataclass whose fields say so in their annotations:
 
 `reader`, `write`, `keys` and `schema` walk over these declarations. The keys of a section are the fields of a class, whose
 units, bounds and meanings stand there (`geomech.scene.key`). A class that is not itself the part, but a form of its keys,
-has a method ``to_part(place, given)`` that returns the part; given: the fields that the file gives.
+has a method ``to_part(place, given)`` that returns the part, or a dict of several fields of the scene; given: the fields that
+the file gives. makes: the class that it can be written from.
 """
 
 from __future__ import annotations
@@ -38,16 +39,11 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True)
 class Keys:
-    """A section whose keys are the fields of a class.
-
-    owner: whose section it is, for lists of keys, where scenes of several kinds have one. spread: it makes a mapping of
-    several fields of the scene. within: its keys are fields of the scene itself.
-    """
+    """A section whose keys are the fields of a class. owner: whose section it is, for lists of keys, where scenes of several
+    kinds have one."""
 
     kind: type
     owner: str = ""
-    spread: bool = False
-    within: bool = False
 
 
 @dataclass(frozen=True)
@@ -180,10 +176,10 @@ def sections_of(scene: type) -> dict[str, Declared]:
             elif isinstance(mark, Within):
                 within.setdefault(mark, []).append((part.name, hints[part.name], part.default))
     for (name, owner), keys in within.items():
-        methods = {"to_part": lambda self, place, given: vars(self)}
-        kind = dataclasses.make_dataclass(name.title(), keys, namespace=methods)
+        form = {"makes": scene, "to_part": lambda self, place, given: vars(self)}
+        kind = dataclasses.make_dataclass(name.title(), keys, namespace=form)
         kind.__doc__ = ""  # in place of a signature
-        declared[name] = Declared(Keys(kind, owner, spread=True, within=True))
+        declared[name] = Declared(Keys(kind, owner))
     return declared
 
 

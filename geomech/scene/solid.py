@@ -70,7 +70,7 @@ class MeshScene(Intruding):
     """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
     the medium's strength was taken from, where it was told by a name of the vertical plane."""
 
-    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh", spread=True)]
+    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh")]
     intruder: Annotated[Solid, OneOf(KINDS)]
     motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, owner="a mesh")]
     triangles: Annotated[

@@ -119,12 +119,11 @@ def section_tables(part: Any, section: Section) -> dict | list[dict]:
 
 def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
-        kind = getattr(variant.kind, "makes", variant.kind)
-        of_file = variant.columns and not variant.columns.rows
-        if (type(part) is kind and not of_file) or (isinstance(section, Keys) and section.within):
+        is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
+        if is_one and not (variant.columns and not variant.columns.rows):
             inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
-            return {**variant.named, **_fields(part, kind, inner), **inner}
-        if type(part) is kind or isinstance(section, Keys):
+            return {**variant.named, **_fields(part, variant.kind, inner), **inner}
+        if is_one or isinstance(section, Keys):
             raise ValueError(
                 f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
             )
@@ -159,7 +158,7 @@ def _numerics(scene: Scene) -> dict:
 def _fields(part: Any, kind: type, but: Collection[str] = ()) -> dict:
     """Return the fields of a class, as a file has them, that are told at construction and have a value."""
     names = [f.name for f in dataclasses.fields(kind) if f.init and f.name not in {*but, "solver"}]
-    return {name: _plain(getattr(part, name)) for name in names if getattr(part, name) is not None}
+    return {name: _plain(value) for name in names if (value := getattr(part, name, None)) is not None}
 
 
 def _plain(value):
