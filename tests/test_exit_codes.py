@@ -158,7 +158,7 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
 
 
 def failing(monkeypatch, how):
-    """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the third,
+    """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the second,
     when there is something in its folder."""
     solve, calls = rft.body_velocity, []
 
@@ -167,7 +167,7 @@ def failing(monkeypatch, how):
         if how == "unconverged":
             found = solve(*args, **kwargs)
             return found._replace(status=np.full(found.status.shape, "unconverged"))
-        if len(calls) == (3 if "run" in sys.argv and how is interrupt else 1):
+        if len(calls) == (2 if "run" in sys.argv and how is interrupt else 1):
             how()
         return solve(*args, **kwargs)
 
