@@ -7,13 +7,17 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
+from geomech.core.errors import SceneError, choose, named
+from geomech.core.variables import Result, Variable
 from geomech.scene import drag
 from geomech.scene.write import table
-from geomech.study.stress_calibration import OfPenetration, OfPlates, of_penetration, of_plates
+from geomech.study.question import Allow, Progress, Question
+from geomech.study.stress_calibration import OfPenetration, OfPlates, law_of, of_penetration, of_plates
 from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
 
@@ -165,3 +169,33 @@ CALIBRATIONS: dict[str, Callable[..., OfDrag | OfPlates | OfPenetration]] = {
     "stress-map": of_plates,
     "zeta": of_penetration,
 }
+
+
+@dataclass(frozen=True)
+class Calibration(Question):
+    """A law fitted to measurements. law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod or
+    plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
+
+    source: str
+    law: str | None = None
+    sizes: tuple[tuple[str, float], ...] = ()
+    end_caps: float | str = 0.0
+
+    def inputs(self) -> list[Path]:
+        return [Path(self.source)]
+
+    @cached_property
+    def chosen(self) -> str:
+        return choose("--law", law_of(self.source) if self.law is None else self.law, CALIBRATIONS)
+
+    def check(self) -> None:
+        _ = self.chosen
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        found = CALIBRATIONS[self.chosen](self.chosen, self.source, dict(self.sizes), self.end_caps)
+        told = found.numbers()
+        names = told["parameters"]
+        deviations = np.sqrt(np.diag(np.reshape(told["covariance"], (len(names), len(names)))))
+        over = ("parameter",)
+        variables = Variable("parameter", over, np.array(names)), Variable("standard_error", over, deviations)
+        return Result("calibration", variables, {"notes": found.notes()}, found)
