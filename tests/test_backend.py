@@ -19,8 +19,8 @@ from test_hard_cases import GLASS, STRANGE_BODIES, hard
 
 from geomech import scene as scenes
 from geomech.gaits import Ellipse
-from geomech.output.explain import explain
 from geomech.systems import solver
+from geomech.text.explain import explain
 from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
 from rft.balance import backend
 from rft.balance import solver as balance

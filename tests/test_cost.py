@@ -24,7 +24,7 @@ from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.run import cost as run_cost
 from geomech.run import jobs
-from geomech.study import accuracy, cost, effort, estimate, motion, sweep
+from geomech.study import accuracy, cost, cycles, effort, estimate, motion, sweep
 from geomech.study.bench import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
@@ -122,12 +122,12 @@ def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
-    foretold = accuracy.cost(scene).balances
+    foretold = accuracy.Accuracy(scene).cost().balances
     accuracy.study(scene)
     assert foretold == sum(solved)
     media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
     for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
-        foretold = sweep.cost(scene, over).balances
+        foretold = sweep.Sweep(scene, over).cost().balances
         solved.clear()
         sweep.sweep(scene, over)
         assert foretold == sum(solved)
@@ -142,9 +142,11 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
         assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
         assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
     few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (100, 1000))  # each medium is a batch
-    assert sweep.cost(VISCOUS, many).seconds == pytest.approx(10 * sweep.cost(VISCOUS, few).seconds, rel=0.01)
+    assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
+        10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
+    )
     together = {"medium.ratio": many["medium.ratio"][:100], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
-    assert sweep.cost(VISCOUS, together).seconds < 0.4 * sweep.cost(VISCOUS, many).seconds
+    assert sweep.Sweep(VISCOUS, together).cost().seconds < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
 
 
 class Clock:
@@ -291,7 +293,7 @@ def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
 
 def test_a_field_of_four_joints_is_written(large, monkeypatch):
     """Said before it begins once it takes a second; least squares over the same directions at one of its shapes."""
-    monkeypatch.setattr("geomech.commands.asked.WORTH_SAYING", 0.0)
+    monkeypatch.setattr("geomech.study.shape_space.ShapeSpace.worth_saying", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
     assert err.startswith("five.toml: 8,704 force balances, about 1 s of computing and 16")
@@ -353,8 +355,8 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
     """Many amplitudes are many batches: a stop keeps those that are done, in the middle of a row too."""
     over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": np.linspace(0.2, 1.5, 7).tolist()}
     whole, kept = sweep.sweep(VISCOUS, over), tmp_path / ".s.partial"
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 3)
-    rows, calls = sweep._rows, []
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 3)
+    rows, calls = cycles._rows, []
 
     def stopping(at, amplitudes):
         calls.append((at[0].system.medium.ratio, len(amplitudes)))
@@ -362,7 +364,7 @@ def test_a_sweep_over_amplitude_goes_in_groups(tmp_path, monkeypatch):
             raise terminal.Stopped(signal.SIGTERM)
         return rows(at, amplitudes)
 
-    monkeypatch.setattr(sweep, "_rows", stopping)
+    monkeypatch.setattr(cycles, "_rows", stopping)
     with pytest.raises(terminal.Stopped):
         sweep.sweep(VISCOUS, over, kept)
     again = sweep.sweep(VISCOUS, over, kept)

@@ -302,7 +302,7 @@ REFUSED = [
     ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder]: cannot read"),
     ("width = 0.03", "width = 0.03\nfile = 'b.csv'", "give either 'file' or 'points'"),
     ("width = 0.03", "width = 30", "width must be a number from 1e-06 to 10 m, got 30"),
-    ("width = 0.03", "", "[intruder] Object missing required field `width`"),
+    ("width = 0.03", "", "[intruder] has no `width`: add"),
     ('kind = "drag"', 'kind = "dragg"', "[motion] kind: 'dragg' is unknown; did you mean 'drag'"),
     ("depth = 0.01", "depth = nan", "depth must be a number"),
     ("direction_deg = 30", "direction_deg = 30\ndirection = 1", "direction is given twice"),

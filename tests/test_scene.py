@@ -88,7 +88,7 @@ BAD = [
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
     (GOOD.replace('law = "granular"', 'name = "glass"'), r"'C' is unknown; use one of name \(no 'law'\)"),
     (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),
-    (GOOD.replace("C = 1.8", ""), r"\[medium\] .*missing required field `C`"),
+    (GOOD.replace("C = 1.8", ""), r"\[medium\] has no `C`: add C = "),
     (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),
     (GOOD.replace("C = 1.8", "C = nan"), r"\[medium\] C must be a number from 0"),
     (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 90"), "gamma0 must lie between 0 and 90 degrees, got 90 degrees"),

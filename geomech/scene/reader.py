@@ -108,7 +108,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
-            raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
+            raise SceneError(f"{place}: the table [{within}] is missing: add it, 'geomech keys {path}' has its keys")
     if variant.file:
         table = _from_file(place, table, variant)
     return build(source, place, table, variant.kind, inner, label)
@@ -182,7 +182,8 @@ def build(
         raise
     except (ValueError, OverflowError) as error:
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        raise SceneError(f"{place} {reason}{slips.cure_of_value(reason, table, kind)}") from None
+        told = reason.replace("Object missing required field", "has no")  # msgspec's words
+        raise SceneError(f"{place} {told}{slips.cure_of_value(reason, table, kind)}") from None
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:

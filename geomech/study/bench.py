@@ -281,9 +281,8 @@ class Study(Faced):
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        told = tables.of_choices({m: spreads[m] for m in methods if m in spreads})
-        table = tables.table(self.scene, gait, amplitudes, poses, errors, medium, **told, seconds=seconds, kept=kept)
-        return Displacements(table, self.scene, gait)
+        told = {"seconds": seconds, "kept": kept}
+        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **told))
 
     def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
         """Build the tables of tiers; return the seconds that each took, whenever that was, and the names of those that were

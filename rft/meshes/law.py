@@ -142,6 +142,7 @@ class Spatial:
         return _by_rows(self._stress, n, v)
 
     def _stress(self, n: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return `stress` (3, N) for n and v (3, N)."""
         speed = np.sqrt(np.einsum("iN,iN->N", v, v))
         v = v / np.where(speed > 0, speed, 1.0)
         return self.traction(n, v) * (self.lead(np.einsum("iN,iN->N", n, v), self.grazing_sine) * (speed > 0))

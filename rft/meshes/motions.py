@@ -60,6 +60,7 @@ class Drag(Motion):
         _set_attitude(self)
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
+        """Return the motion of a mesh in time."""
         return _straight(self, -self.depth, self.distance)
 
 
@@ -83,6 +84,7 @@ class Penetrate(Motion):
         _set_attitude(self)
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
+        """Return the motion of a mesh in time."""
         lowest = float((mesh.vertices @ _matrix(self.attitude)[2]).min())
         return _straight(self, -lowest, self.depth / math.sin(self.direction))
 
@@ -119,6 +121,7 @@ class Rotate(Motion):
         _set_attitude(self)
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
+        """Return the motion of a mesh in time."""
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
@@ -172,6 +175,7 @@ class Path(Motion):
         return rotations(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
 
     def trajectory(self, mesh: Mesh) -> Trajectory:
+        """Return the motion of a mesh in time."""
         t, place, rotation = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
         velocity = np.gradient(place, t, axis=0, edge_order=2)
         return Trajectory(t, place, rotation.as_matrix(), velocity, _spins(t, rotation), np.zeros_like(t))

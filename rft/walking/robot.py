@@ -191,8 +191,8 @@ class Rhex(Robot):
 
 @dataclass(frozen=True)
 class Roller(Robot):
-    """A wheel, or any other rotating shape, on an axle that is kept level: a mass that moves forwards and up and down under
-    its own weight."""
+    """A wheel, or another rotating shape, on an axle kept level: a mass that moves forwards and up and down under its own
+    weight."""
 
     mass: Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own")]
     legs: Shape

@@ -127,7 +127,7 @@ def cruise(
     floating = steady.floating()
     for sideways, above in itertools.product((0.0,) if mirrored else (0.1, on_cores), ABOVE):
         start = np.array([floating + above, 0.0, NOSE_UP, EASY, -craft.screw.sense * sideways, 0.0])
-        x, residual = _zero(lambda x: steady.residual(full(x))[equations], start[free])
+        x, residual = _solve(lambda x: steady.residual(full(x))[equations], start[free])
         if residual < BALANCED:
             break
     else:
@@ -183,7 +183,7 @@ class _Steady:
         return (low + high) / 2
 
 
-def _zero(function, x: np.ndarray) -> tuple[np.ndarray, float]:
+def _solve(function, x: np.ndarray) -> tuple[np.ndarray, float]:
     """Return a zero of a function and the residual there, by Newton's method with differences and shortened steps."""
     f = function(x)
     for _ in range(STEPS):
