@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from geomech.core.errors import SceneError, choose, short
 from geomech.io.files import note, read_text
 from geomech.scene import reader, slips, swimming
-from geomech.scene.medium import with_files
-from geomech.scene.model import SWIMMER, Scene, checked_scene
+from geomech.scene.medium import MEDIUM
+from geomech.scene.model import Scene, checked_scene
 from geomech.systems.swimmer import Swimmer
 
 if TYPE_CHECKING:
@@ -89,11 +89,8 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
-    tables, files = with_files({"medium": table}, scene.name)
-    medium = reader.read_section(
-        reader.Source(scene.name, scene.example), "medium", tables["medium"], SWIMMER["medium"]
-    )
-    return scene.changed(medium=medium, files=files)
+    source = reader.Source(scene.name)
+    return scene.changed(medium=reader.read_section(source, "medium", table, MEDIUM), files=tuple(source.files))
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:

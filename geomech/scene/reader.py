@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
-import numpy as np
 
-from geomech.core.errors import SceneError, UnitWarning, choose, named
+from geomech.core.errors import SceneError, UnitWarning, choose, named, short
 from geomech.scene import slips
-from geomech.scene.columns import columns
 from geomech.scene.key import Key, spellings, words_of
 from geomech.scene.kinds import choose_kind
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
@@ -28,12 +26,13 @@ Built = TypeVar("Built")
 @dataclass
 class Source:
     """A scene file as it is read. name: its own. example: a built-in scene that has all that is needed. files: those that it
-    names, which reading adds. sizes: given once for all its parts."""
+    names, which reading adds. sizes: given once for all its parts. folder: in which files are looked for, its own if none."""
 
     name: str
-    example: str
+    example: str = "NAME"
     files: list[str] = dataclasses.field(default_factory=list)
     sizes: Sizes | None = None
+    folder: Path | None = None
 
     @property
     def cure(self) -> str:
@@ -44,7 +43,7 @@ class Source:
         table = dict(table)
         for key in FILES:
             if isinstance(table.get(key), str):
-                table[key] = str(Path(self.name).absolute().parent / table[key])
+                table[key] = str((self.folder or Path(self.name).absolute().parent) / table[key])
                 self.files.append(table[key])
         return table
 
@@ -134,23 +133,27 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
     raise SceneError(f"{place} has no {section.key!r}: add {section.key} = one of {', '.join(section.kinds)}{instead}")
 
 
-def _from_columns(place: str, table: dict, variant: Variant) -> dict:
-    """Return the keys of a section with columns of its file in place of the file."""
-    wanted, meaning, optional, rows = variant.columns
-    if not rows and {*table} != {"file"}:
-        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {meaning}")
+def _from_file(place: str, table: dict, variant: Variant) -> dict:
+    """Return the keys of a section with what its file has in place of the file."""
+    if not variant.file.keys and {*table} != {"file"}:
+        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {variant.file.meaning}")
     if "file" not in table:
         return table
-    if rows in table:
-        raise SceneError(f"{place}: {rows} are given twice: keep one of {rows} and file")
-    numbers = columns(place, table.pop("file"), wanted, optional)
-    if rows:
-        return table | {rows: np.stack([*numbers.values()], -1).tolist()}
-    return {key: values.tolist() for key, values in numbers.items()}
+    if variant.file.keys:
+        variant.alternatives.check(place, [spellings(variant.kind).get(key, (key,))[0] for key in table])
+    file = table.pop("file")
+    if not isinstance(file, str):
+        raise SceneError(f"{place} file must be the name of a file, got {short(file)}")
+    return table | variant.file.read(place, file)
 
 
 def build(
-    place: str, table: Mapping, kind: type[Built], inner: Mapping[str, Any] | None = None, label: str = ""
+    source: Source,
+    place: str,
+    table: Mapping,
+    kind: type[Built],
+    inner: Mapping[str, Any] | None = None,
+    label: str = "",
 ) -> Built:
     """Return a part of a class, or what a form of its keys makes, from a table of keys; else SceneError.
 
@@ -165,16 +168,16 @@ def build(
         values[field] = _radians(value) if in_degrees else value
         if key == "gamma0_deg":
             _check_degrees(f"{place} {key}", value)
+    if alternatives := getattr(kind, "alternatives", None):
+        alternatives.check(place, values)
     for field, word in words_of(kind).items():
         if field in values:
             choose(f"{place} {field}", values[field], word.known)
-    if alternatives := getattr(kind, "alternatives", None):
-        alternatives.check(place, values)
     if inner and {f.name for f in dataclasses.fields(kind) if f.default is f.default_factory} <= {*inner}:
         return kind(**inner | values)  # a swimmer, of types that msgspec does not know
     try:
         part = msgspec.convert({**values, **(inner or {})}, kind)
-        return part.to_part(place, {*values}) if hasattr(kind, "to_part") else part
+        return part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
     except SceneError:
         raise
     except (ValueError, OverflowError) as error:
