@@ -109,9 +109,9 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
             raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
-    if variant.columns:
-        table = _from_columns(place, table, variant)
-    return build(place, table, variant.kind, inner, label)
+    if variant.file:
+        table = _from_file(place, table, variant)
+    return build(source, place, table, variant.kind, inner, label)
 
 
 def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
