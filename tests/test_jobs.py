@@ -29,6 +29,7 @@ from geomech.run.workers import using
 from geomech.scene import kinds
 from geomech.study import accuracy, cost, estimate, intrusion, motion, walking
 from geomech.study.bench import Study
+from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
 from rft.balance import backend
@@ -253,7 +254,7 @@ def march(effects, cycles=None):
     """All of a run of two gaits."""
     body = Backbone(elements=5, length=0.3)
     system = dataclasses.replace(VISCOUS.system, medium=Granular(C=1.6, gamma0=0.3), body=body, effects=tuple(effects))
-    system, size = system.with_solver(**SOLVER, cycles=cycles), np.array([0.5, -0.7])[:, None, None]
+    system, size = with_solver(system, {**SOLVER, "cycles": cycles}), np.array([0.5, -0.7])[:, None, None]
     turns = T[:, None] - 0.9 * np.arange(body.joints)
     return tuple(system.time_steps(np.cos(turns) * size + 0.05, -np.sin(turns) * size, cycles, work=True, path=True))
 

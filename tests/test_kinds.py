@@ -20,12 +20,13 @@ from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
 from geomech.output.explain import explain
+from geomech.output.system import notes
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
 from geomech.scene.keys import schema, text
 from geomech.scene.kinds import FAMILIES, load_file, register
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.systems import Plain, Premise, Solver, Swimmer
+from geomech.systems import Premise, Solver, Swimmer
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent
@@ -132,10 +133,10 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
     assert fine.evaluations == 24 * exact.evaluations
     assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
-    assert fine.finer().solver.loads == "gauss:48"
+    assert fine.refined().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"
-    told_otherwise = fine.with_solver(loads="midpoint:10")
-    assert (told_otherwise.notes, told_otherwise.finer().solver.loads) == ((), "midpoint:20")
+    told_otherwise = fine.with_solver(Solver(loads="midpoint:10"))
+    assert (notes(told_otherwise), told_otherwise.refined().solver.loads) == ((), "midpoint:20")
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])
@@ -237,7 +238,7 @@ class Slick(Effect):
 
 
 @dataclass(frozen=True)
-class Car(Plain):
+class Car:
     """base (m): between the axles."""
 
     base: float = 0.4

@@ -24,9 +24,11 @@ from geomech.geometry.connection import Connection
 from geomech.io import tables
 from geomech.output import mat, netcdf, plots
 from geomech.output.explain import explain
+from geomech.output.system import described
 from geomech.scene import Numerics, Scene
 from geomech.study import accuracy, choose, estimate
 from geomech.study.bench import Study
+from geomech.study.single import single
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
@@ -152,7 +154,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
         path.write_bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
     else:
         plain_mat(path, s.fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+", "level": 0.9}))
-        halves = Table(path, body_length=2.0).stored("A_error")
+        halves = Table(path, body_length=2.0).table("A_error")
         np.testing.assert_allclose(halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1))
     table = Study(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(table.to_xarray().A_error, error)
@@ -355,7 +357,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
 def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
     plain_mat(tmp_path / "a.mat", made[1].fitted)
     bare = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
-    assert bare.scene.system.single([0.2, 0.3], [1, 0])["residual"] is None
+    assert single(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
     netcdf.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
@@ -444,13 +446,13 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in bare.told()
+        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
         for length in (1.0, 3.0):
             said = Table(file, body_length=length)
-            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in said.told()
+            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in described(said)
             np.testing.assert_allclose(said.held.connection.A[0] * length, bare.held.connection.A[0], rtol=1e-13)
     for file in ("a.nc", "a.mat"):
         whole = Table(folder / file)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from geomech import terminal
 from geomech.commands.options import check_outputs
 from geomech.core.errors import Note, SceneError, check_angle, named
+from geomech.systems.capabilities import stored
 
 if TYPE_CHECKING:
     from geomech.scene import Scene
@@ -22,11 +23,12 @@ NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it
 def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
     """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError, which says what to do
     else, if it takes too long to be begun without --yes. From here on "auto" is the back end for that many balances."""
+    from geomech.output.system import notes
     from geomech.run.backend import prefer_for
 
     cost.check(scene.name, yes, less)
     prefer_for(cost.as_balances)
-    for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
+    for line in notes(scene.system) if hasattr(scene, "system") else ():  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
     if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
         terminal.tell(f"{scene.name}: {cost}")
@@ -52,7 +54,7 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     from geomech.scene import in_medium
 
     scene = scene_with_gait(name)
-    own = scene.system.stored("connection")
+    own = stored(scene.system, "connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
     if scene.system.traits.joint_angles and not own:
@@ -191,7 +193,7 @@ def _held(scene, pair: tuple[int, int], angles: list[float] | None, alone: bool)
     if angles is None:
         return at
     extent = scene.numerics.extent
-    if not (scene.system.stored("connection") or all(abs(a) <= extent for a in angles)):
+    if not (stored(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise SceneError(
             f"--slice: the angles must lie within the field's {extent:g} rad: give others, or raise --extent"
         )

@@ -18,9 +18,10 @@ def symbolic(
 ):
     """The connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
     from geomech.output.formulas import formulas
+    from geomech.systems.framed import formula
 
     scene = loaded(name)
     with named(scene.name):
-        A, alpha = scene.system.symbolic()
+        A, alpha = formula(scene.system)
     for line in formulas(A, alpha, ccf, latex):
         print(line, flush=True)

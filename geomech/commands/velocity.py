@@ -20,13 +20,15 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
+    from geomech.output.system import notes
+    from geomech.study.single import single
     from geomech.systems.base import length_unit
 
     scene, asked = scene_with_gait(name), (("--alpha", alpha), ("--alphadot", alphadot))
-    for line in scene.system.notes:
+    for line in notes(scene.system):
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
     with named(scene.name):
-        out = scene.system.single(*(numbers(*x, angle=None) for x in asked))
+        out = single(scene.system, *(numbers(*x, angle=None) for x in asked))
     unit = length_unit(scene.system)
     if as_json:
         told = {k: v for k, v in out.items() if k != "iterations"}

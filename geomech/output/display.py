@@ -13,6 +13,7 @@ from geomech.core.errors import plain
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.output import plots, sweeps
+from geomech.output.system import described
 from geomech.study.bench import Study
 from geomech.study.results import Displacements, Swept
 from geomech.systems.base import length_unit
@@ -62,7 +63,7 @@ def study(bench: Study) -> str:
     """Its scene, tiers and, where it is computed already, the CCF with the scene's gait."""
     scene, held = bench.scene, {key[0] for key in bench.computed}
     rows = [
-        ("system", scene.system.told()[0]),
+        ("system", described(scene.system)[0]),
         ("gait", repr(scene.gait)),
         ("numerics", repr(scene.numerics)),
         ("tiers", ", ".join(bench.tiers)),

@@ -22,6 +22,8 @@ from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored
+from geomech.systems.framed import Framed
 
 COMPONENTS = ("x", "y", "theta")
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -67,7 +69,9 @@ def write(path: str | Path, told: Mapping, axes, labels, found: Sequence[Variabl
 def attributes(study: Study) -> dict:
     """Of a file of the scene's connection: what it is, what it rests on, and the scene's text."""
     scene = study.scene
-    numerics = repr(scene.numerics) if scene.system.solver is None else f"{scene.numerics}, {scene.system.solver}"
+    numerics = (
+        repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
+    )
     return {
         "title": f"Local connection and curvature constraint function of the scene {scene.name}",
         **about(scene),
@@ -86,7 +90,7 @@ def variables(study: Study) -> list[Variable]:
     """Of a file of the scene's connection, without its coordinates."""
     unit = length_unit(study.scene.system)
     found = of_connection(study.fitted)
-    if (error := study.scene.system.stored("A_error")) is not None:
+    if (error := stored(study.scene.system, "A_error")) is not None:
         found.append(of_error(error, unit))
     if isinstance(study.fitted, Tube):
         found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
@@ -96,11 +100,11 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature_error, "ccf_error", what))
     elif len(study.fitted.axes) > 2:
         found += of_pairs(study.two_form, two_form.error(study.fitted))
-    if study.scene.system.carried:
+    if isinstance(study.scene.system, Framed):
         found.append(of_frame(study.scene.system.field.field))
     if not effort.why_none(study.scene.system):
         found += of_metric(
-            study.metric, study.scene.system.cost is None
+            study.metric, capability(study.scene.system, OwnMetric) is None
         )  # before the harmonics, whose velocities it may share
     if (harmonics := study.harmonics) is not None:
         found += of_harmonics(harmonics, unit)
@@ -262,12 +266,17 @@ def about(scene: Scene) -> dict:
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
         "length_unit": units_of(length_unit(system)),
-        **system.about(),
+        **recorded(system),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
     }
+
+
+def recorded(system) -> dict:
+    recorded = capability(system, Recorded)
+    return {} if recorded is None else recorded.about()
 
 
 def attribute(text: str) -> bytes:

@@ -24,7 +24,9 @@ from geomech.study.bench import Study
 from geomech.study.cost import Cost, Job, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.systems import Swimmer
-from geomech.systems.base import System, length_unit, shape_labels
+from geomech.systems.base import System, length_unit, refuse_singular, shape_labels
+from geomech.systems.capabilities import near
+from geomech.systems.framed import Framed
 from geomech.tiers import TIERS
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
@@ -88,7 +90,7 @@ def _maps(study: Study, folder: Path, gaits: list[Gait]) -> None:
         _save(plots.planes_figure(planes, scene.gait, labels=labels), folder / "ccf")
         return
     _save(plots.connection_figure(study.fitted, labels=labels), folder / "connection")
-    if scene.system.carried:
+    if isinstance(scene.system, Framed):
         _save(plots.frame_figure(scene.system.field.field, labels=labels), folder / "frame")
     maps = plots.ccf_figure(study.curvature, gaits, error=study.curvature_error, labels=labels)
     _save(maps, folder / "ccf")
@@ -127,7 +129,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if own:
         size = abs(gait.amplitude)
-        if scene.system.near:
+        if near(scene.system):
             return _near(scene, gait)
         found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in found]
@@ -141,7 +143,7 @@ def _near(scene: Scene, gait: Gait) -> list[float]:
     """Amplitudes about the gait's own, as far as what is known of the system reaches; SceneError where that is nowhere."""
     found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
     with named(scene.name):
-        scene.system.refuse_singular(gait.cycle(scene.numerics.phases)[0])
+        refuse_singular(scene.system, gait.cycle(scene.numerics.phases)[0])
     reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
     return [a for a in found if reached(a)]
 

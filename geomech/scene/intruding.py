@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.errors import SceneError, choose, named, short
+from geomech.core.summary import part
 from geomech.scene.parts import build_kind
-from geomech.systems.said import said
 from rft.ground import KINDS, GroundEffect, checked, weight
 from rft.premise import not_so
 
@@ -67,7 +67,7 @@ class Intruding:
 
     def told(self) -> list[str]:
         """Lines about the law, the body and its motion, and which effects are on and off."""
-        medium, body, motion = (said(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
+        medium, body, motion = (part(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
         lines = [f"{self.name}: {body} of {self.count:,} {self.parts}", f"motion: {motion}", f"medium: {medium}"]
         lines += self.effects_told()
         off = [kind for kind in KINDS if kind not in [e.kind for e in self.effects]]
@@ -106,7 +106,7 @@ def of_effects(effects) -> list[str]:
     lines = []
     for effect in effects:
         lines.append(
-            f"on:  {said(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"on:  {part(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
             f"gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:

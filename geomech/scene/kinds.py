@@ -25,7 +25,6 @@ from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.io.files import read_text
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems import Plain
 from geomech.systems.swimmer import PARTS
 from rft.effects import Effect
 
@@ -48,12 +47,12 @@ class Family(NamedTuple):
 FAMILIES = {  # by the group of entry points
     "geomech.effects": Family(*PARTS["effects"], Effect, "apply", "an effect"),
     "geomech.gaits": Family("kind", GAITS, Gait, "unit", "a gait"),
-    "geomech.systems": Family("kind", SYSTEMS, Plain, "velocity", "a system"),
+    "geomech.systems": Family("kind", SYSTEMS, None, "velocity", "a system"),
     "geomech.media": Family(*PARTS["medium"], None, "traction", "a law"),
     "geomech.bodies": Family(*PARTS["body"], None, "motion", "a body"),
 }
 BUILT_IN = {group: frozenset(family.kinds) for group, family in FAMILIES.items()}
-NAMELESS = {Effect.kind, Plain.kind}
+NAMELESS = {Effect.kind}
 _code: dict[str, str] = {}  # digests of sources, by module
 _files: dict[str, str] = {}  # file of one's own: its text
 INSTALLED = tuple({sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib", "purelib", "platlib")})
@@ -74,8 +73,8 @@ def _group(part) -> str:
             return group
     raise ValueError(
         f"{short(part)} is no part of a scene: a law is a class with `traction`, a body one with `motion`, `joints` and "
-        "`length`; a gait is derived from geomech.gaits.Gait, an effect from rft.effects.Effect, a system from "
-        "geomech.systems.Plain"
+        "`length`, a system one with `velocity`, `joints`, `length` and `traits`; a gait is derived from geomech.gaits.Gait, "
+        "an effect from rft.effects.Effect"
     )
 
 

@@ -11,7 +11,8 @@ from geomech.core.errors import choose, named, plain, short
 from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scene.frames import reframed
-from geomech.systems.base import Cycle, System, checked_system
+from geomech.systems.base import Cycle, System, as_system, kind_of, note_angles
+from geomech.systems.capabilities import solver_of, with_solver
 from geomech.tiers.base import Numerics
 
 
@@ -39,25 +40,27 @@ class Scene(Told):
             for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
                 if not isinstance(getattr(self, what), kind):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
-            _check_joints(checked_system(self.system), checked_gait(self.gait))
+            gait = checked_gait(self.gait)
+            object.__setattr__(self, "system", as_system(self.system, gait.joints))
+            _check_joints(self.system, gait)
             frequency_of(self.system, self.gait)
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:
         """UnitWarning if a gait turns a joint by more than a full turn."""
-        if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
-            self.system.note_angles(gait.largest(amplitudes))
+        if hasattr(gait, "largest"):
+            note_angles(self.system, gait.largest(amplitudes))
 
     frame = property(lambda self: self.system.traits.frame, doc="The body frame of all velocities and displacements.")
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed, the system's own among them; None keeps a value."""
-        own = {f.name for f in dataclasses.fields(self.system.solver)} if self.system.solver else set()
+        own = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with named(self.name):
-            system = self.system.with_solver(**{k: v for k, v in changes.items() if k in own})
+            system = with_solver(self.system, {k: v for k, v in changes.items() if k in own})
             rest = {k: v for k, v in changes.items() if k not in own}
             for name in rest:
                 choose("numerics", name, [*own, *self.numerics.__dataclass_fields__])
@@ -68,7 +71,7 @@ class Scene(Told):
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
-            parts = [f.name for f in dataclasses.fields(checked_system(own.get("system", self.system)))]
+            parts = [f.name for f in _fields(own.get("system", self.system))]
             for name in of_system:
                 choose("part", name, ["system", "gait", "numerics", "name", *parts])
             if of_system:
@@ -81,6 +84,10 @@ class Scene(Told):
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
 
 
+def _fields(thing) -> tuple:
+    return dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
+
+
 def _check_joints(system: System, gait: Gait) -> None:
     if gait.joints != system.joints:
         whose, cure = (
@@ -88,7 +95,7 @@ def _check_joints(system: System, gait: Gait) -> None:
             "give the body one link more than the gait has joints, or as many modes, or another gait",
         )
         if not hasattr(system, "body"):
-            whose, cure = f"the {system.kind}", "give it another gait"
+            whose, cure = f"the {kind_of(system)}", "give it another gait"
         told = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {whose} has {system.joints}"
         raise ValueError(f"{told}: {cure}")
 
@@ -107,6 +114,6 @@ def frequency_of(system: System, gait: Gait) -> float | None:
     if own is None or others is None:
         return others if own is None else own
     if np.any(np.asarray(others) != own):
-        told = f"[gait] frequency = {own:g}, but the effects of the {system.kind} have {short(others)}"
+        told = f"[gait] frequency = {own:g}, but the effects of the {kind_of(system)} have {short(others)}"
         raise ValueError(f"{told}: it is one swimmer, keep one")
     return own

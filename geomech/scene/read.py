@@ -19,6 +19,7 @@ from geomech.scene.model import Numerics, Scene, checked_scene
 from geomech.scene.parts import LARGEST, build, build_kind, kind_in
 from geomech.scene.sizes import Sizes
 from geomech.systems import KINDS as SYSTEMS
+from geomech.systems.base import kind_of
 from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
 
@@ -97,7 +98,7 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     """The scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name ends in .csv;
     relative to the current folder. SceneError if that holds none, or the scene's system takes none."""
     if not isinstance(scene.system, Swimmer):
-        raise SceneError(f"{scene.name}: a {scene.system.kind} takes no medium")
+        raise SceneError(f"{scene.name}: a {kind_of(scene.system)} takes no medium")
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
@@ -149,14 +150,15 @@ def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | An
     sizes = Sizes(name, tables)
     gait = build_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
     kind, parts = _system(tables, name, sizes)
-    own = {f.name for f in dataclasses.fields(kind.solver)} if kind.solver else set()
+    solver = getattr(kind, "solver", None)
+    own = {f.name for f in dataclasses.fields(solver)} if solver else set()
     numerics = tables.get("numerics", {})
     for key in numerics:
         plain = key.removesuffix("_deg") if key.removesuffix("_deg") in Numerics.angles else key
         choose(f"{name}: [numerics] key", plain, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
     if own:
-        solver = {k: v for k, v in numerics.items() if k in own}
-        parts["solver"] = build(f"{name}: [numerics]", solver, type(kind.solver))
+        keys = {k: v for k, v in numerics.items() if k in own}
+        parts["solver"] = build(f"{name}: [numerics]", keys, type(solver))
     finely = build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics)
     with named(name):
         system = kind(**parts)

@@ -17,8 +17,10 @@ from geomech.scene.medium import with_files
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.said import name_in
-from geomech.systems.swimmer import PARTS, Swimmer
+from geomech.systems.base import Given
+from geomech.systems.capabilities import solver_of
+from geomech.systems.framed import Framed
+from geomech.systems.swimmer import PARTS, Swimmer, name_in
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -93,7 +95,7 @@ def spelled_out(tables: dict, scene: Scene) -> dict:
 
 
 def _anew(scene: Scene) -> dict:
-    system, out = getattr(scene.system, "inner", scene.system), {}
+    system, out = _named(scene.system), {}
     if isinstance(system, Swimmer):
         out["medium"] = _of_kind(system.medium, *PARTS["medium"])
         out["body"] = _of_kind(system.body, *PARTS["body"])
@@ -118,8 +120,15 @@ def _anew(scene: Scene) -> dict:
     return out
 
 
+def _named(system):
+    """Return the object inside a system that a scene file can name."""
+    if isinstance(system, Framed):
+        return _named(system.inner)
+    return system.given if isinstance(system, Given) else system
+
+
 def _numerics(scene: Scene) -> dict:
-    return _fields(scene.numerics) | (_fields(scene.system.solver) if scene.system.solver else {})
+    return _fields(scene.numerics) | (_fields(solver_of(scene.system)) if solver_of(scene.system) else {})
 
 
 def _of_kind(thing, key: str, kinds: dict) -> dict:

@@ -22,6 +22,7 @@ from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.cost import Cost
 from geomech.study.offer import tiers
+from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -60,14 +61,14 @@ class Knob:
         system = scene.system
         if system.traits.linear and self.setting in ("regularisation", "directions"):
             return False
-        if self.setting == "regularisation" and system.solver is None:
+        if self.setting == "regularisation" and solver_of(system) is None:
             return False
         of_a_field = self.setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-        if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+        if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
             return False
         if self.tier not in tiers(system) or (self.tier != DIRECT.name and _plan(scene, self.tier).exact):
             return False
-        return self.setting != "pieces" or system.cut > 0
+        return self.setting != "pieces" or pieces_of(system) > 0
 
 
 KNOBS = (
@@ -110,7 +111,7 @@ def study(scene: Scene, progress: Callable | None = None, runs: int = 2) -> dict
     for knob in knobs:
         truth = next(found)[0] if knob.against == "limit" else true
         lines.append(_line(scene, knob, truth, [next(found) for _ in knob.values]))
-    own = float(scene.system.own_error(*scene.gait.cycle(scene.numerics.phases, amplitudes))[..., 0].max())
+    own = float(own_error(scene.system, *scene.gait.cycle(scene.numerics.phases, amplitudes))[..., 0].max())
     return {
         "scene": scene.name,
         "amplitudes": amplitudes.tolist(),
@@ -154,7 +155,7 @@ def _truth_phases(scene: Scene) -> int:
 
 
 def _knobs(scene: Scene) -> list[Knob]:
-    return [k for k in KNOBS if k.applies(scene) and not (k.rule and not scene.system.closed)]
+    return [k for k in KNOBS if k.applies(scene) and not (k.rule and not is_closed(scene.system))]
 
 
 def _runs(scene: Scene, runs: int) -> int:
@@ -182,8 +183,8 @@ def _answer(amplitudes, asked: Asked) -> tuple[np.ndarray, float]:
 
 def _finest(scene: Scene) -> Scene:
     """The scene as the truth has it."""
-    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
-    finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
+    finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
+    finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
     return finest.with_numerics(phases=_truth_phases(scene))
 
 

@@ -22,6 +22,8 @@ from geomech.run.backend import suiting
 from geomech.run.jobs import unaided
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
+from geomech.systems.capabilities import Dissipative, at_once, capability, costed, pieces_of, refined, stored
+from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
 
@@ -86,7 +88,7 @@ class Job(NamedTuple):
     @property
     def kind(self) -> str:
         """The same for jobs whose balances, steps or look-ups take the same time."""
-        return repr((self.what, self.scene.system.costs_as, self.gait, self.group, self.read))
+        return repr((self.what, costed(self.scene.system).cost_key, self.gait, self.group, self.read))
 
     @property
     def balances(self) -> int:
@@ -168,7 +170,7 @@ def _looked_up(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
 
 def frame(scene: Scene) -> list[Job]:
     """The field that a frame is made of which is one itself, as "minimum-perturbation" is: of two joints a trifle."""
-    return connection(scene) if scene.system.carried and scene.system.joints > 2 else []
+    return connection(scene) if isinstance(scene.system, Framed) and scene.system.joints > 2 else []
 
 
 def of_medium(scene: Scene, gait: Gait, count: int) -> list[Job]:
@@ -188,8 +190,8 @@ def direct(
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, system.at_once(phases))
-    held = group * (60 * system.elements + system.held) if stepping else 0
+    group = min(max(1, count), together, at_once(system, phases))
+    held = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
     solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
     asked = _refined(scene, solves, phases) if checked else solves(phases)
@@ -204,8 +206,8 @@ def _refined(scene: Scene, solves: Callable, phases: int) -> float:
     quarter, and halved and quartered at all phases: as much as half and a quarter."""
     full, quarter = solves(phases), solves(phases // 4)
     again = solves(phases // 2) + quarter + solves(phases // 8) if scene.system.traits.steps else 0
-    again += 2 * quarter + 0.75 * full if scene.system.cut else 0
-    return full + again + (quarter if scene.system.finer() else 0)
+    again += 2 * quarter + 0.75 * full if pieces_of(scene.system) else 0
+    return full + again + (quarter if refined(scene.system) else 0)
 
 
 def connection(scene: Scene) -> list[Job]:
@@ -229,7 +231,7 @@ def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
 
 def of_planes(scene: Scene, count: int) -> list[Job]:
     """So many planes of two joints (`Study.plane`)."""
-    if scene.system.stored("connection"):
+    if stored(scene.system, "connection"):
         return []
     solves = count * scene.numerics.grid**2 * fitted.directions(scene.system, scene.numerics)
     return [Job("balances", scene, None, float(solves)), *frame(scene)]
@@ -238,7 +240,7 @@ def of_planes(scene: Scene, count: int) -> list[Job]:
 def of_metric(scene: Scene) -> list[Job]:
     """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics
-    if system.stored("metric"):
+    if stored(system, "metric"):
         return []
     if effort.shared(system):
         (table,) = harmonics(scene)
@@ -251,7 +253,7 @@ def of_metric(scene: Scene) -> list[Job]:
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     """Path length and work of ``count`` amplitudes (`effort.effort`): steps of time again at half and a quarter of the
     phases, and a quarter of the phases with twice the pieces."""
-    times = 1.0 + 0.75 * bool(scene.system.traits.steps) + 0.5 * bool(scene.system.cut)
+    times = 1.0 + 0.75 * bool(scene.system.traits.steps) + 0.5 * bool(pieces_of(scene.system))
     jobs = direct(scene, gait or scene.gait, count, scene.numerics.phases, checked=False)
     return [job._replace(count=times * job.count) for job in jobs]
 
@@ -261,7 +263,8 @@ def _per_sample(job: Job, count: float) -> float:
     scene = job.scene
     if job.what == "look-ups":
         return READ * job.read
-    prior = SLOW * scene.system.evaluations
+    solver = costed(scene.system)
+    prior = SLOW * solver.evaluations
     if prior * count < FREE:
         return prior / 2
     rng, joints, extent = np.random.default_rng(0), scene.system.joints, scene.numerics.extent
@@ -270,17 +273,17 @@ def _per_sample(job: Job, count: float) -> float:
         if job.gait is None:
             alpha, alphadot = rng.uniform(-extent, extent, (samples, joints)), rng.normal(size=(samples, joints))
             if job.what == "powers":
-                return scene.system.work(alpha, alphadot, np.zeros((samples, 3)))
-            return scene.system.sample(alpha, alphadot)
+                return capability(scene.system, Dissipative).power(alpha, alphadot, np.zeros((samples, 3)))
+            return solver.solve(alpha, alphadot)
         phases = max(8, 2 * job.gait.harmonics + 2)
-        return scene.system.sample(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
+        return solver.solve(*job.gait.cycle(phases, np.full(-(-samples // phases), job.gait.amplitude)))
 
-    return _grown(solve, max(8, 3072 // scene.system.elements), count)
+    return _grown(solve, max(8, 3072 // solver.elements), count)
 
 
 def _per_step(job: Job, count: float) -> tuple[float, int]:
     """(seconds a time step takes, cycles until they are periodic)."""
-    system, gait = job.scene.system, job.gait
+    system, gait = costed(job.scene.system), job.gait
     prior, cycles = STEP + NEXT * system.evaluations * job.group, system.solver.cycles or CYCLES
     if prior * count * cycles < FREE:
         return prior / 2, cycles

@@ -24,6 +24,7 @@ from geomech.study.cost import Cost, direct, of_medium, price
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
 from geomech.systems.base import length_unit
+from geomech.systems.capabilities import at_once
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
@@ -263,7 +264,7 @@ def _parts(at: _At, points: Points, amplitudes: list[float] | None) -> Iterator[
     while done < total:
         k, j = divmod(done, count)  # points, of which amplitudes run fastest
         first = at(points[k])
-        most = min(SAMPLES_TOGETHER, first.system.at_once(first.numerics.phases))
+        most = min(SAMPLES_TOGETHER, at_once(first.system, first.numerics.phases))
         here = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
         some = amplitudes[j : j + most] if amplitudes else None
         batch = [points[i] for i in here]

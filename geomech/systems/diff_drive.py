@@ -14,11 +14,11 @@ import numpy as np
 
 from geomech.core.errors import choose, number
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Plain
+from geomech.systems.base import integrated
 
 
 @dataclass(frozen=True)
-class DifferentialDrive(Plain):
+class DifferentialDrive:
     """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
 
     wheel_radius (m): of both, in the unit of track. track (m): between the wheels, in the unit wanted for displacement;
@@ -31,6 +31,7 @@ class DifferentialDrive(Plain):
 
     kind = "differential-drive"
     joints = 2
+    run = integrated
     traits = Traits(linear=True, labels=(("left wheel", "rad"), ("right wheel", "rad")))
 
     def __post_init__(self):

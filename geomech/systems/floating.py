@@ -40,7 +40,3 @@ class FloatingChain(Momentum):
         body, whole = sum(lengths), sum(masses)
         masses = [m / whole for m in masses]
         return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, about, lengths)]
-
-    @property
-    def because(self) -> str:
-        return "(the velocity at every shape, all shapes at once): momentum is zero, so that nothing coasts"

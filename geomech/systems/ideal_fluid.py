@@ -50,7 +50,3 @@ class IdealFluidSwimmer(Momentum):
         return masses, [
             [m + y**2, m + x**2, k * m * 4 * x**2 + (x**2 - y**2) ** 2 / 8] for m, k, x, y in zip(masses, about, a, b)
         ]
-
-    @property
-    def because(self) -> str:
-        return "(the velocity at every shape, all shapes at once): momentum is zero, so that nothing coasts"

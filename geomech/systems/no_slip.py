@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Plain
+from geomech.systems.base import integrated
 from rft.bodies import Chain
 
 
 @dataclass(frozen=True)
-class NoSlipSnake(Plain):
+class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
     lengths (-): relative. length (m): the whole body, in the unit wanted for displacement; 1 for body lengths. frame (-):
@@ -33,6 +33,7 @@ class NoSlipSnake(Plain):
 
     kind = "no-slip-snake"
     joints = 2
+    run = integrated
 
     def __post_init__(self):
         object.__setattr__(self, "lengths", self._chain.lengths)

@@ -13,7 +13,10 @@ import numpy as np
 
 from geomech.core.errors import number, real_array
 from geomech.gaits import Gait
-from geomech.systems.base import ALL, Premise, System
+from geomech.systems.base import System, kind_of
+from geomech.systems.capabilities import costed, near
+from geomech.systems.premises import refuse
+from rft.premise import ALL, Premise
 
 WHOLE = {  # numbers of [numerics], from and to
     "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
@@ -134,12 +137,12 @@ class Tier:
 
     def refuse(self, system: System) -> None:
         """ValueError if it says nothing of this system."""
-        system.refuse(self.result, self.rests_on, "use the direct tier")
+        refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise ValueError(f"the {self.name} tier {self.takes}, this body has {system.joints}: {self.instead}")
         if self.meets_singular_shapes(system):
-            near = getattr(system, "near", "")
-            why = f"A is known near {near} alone" if near else f"the {system.kind} has singular shapes"
+            gait = near(system)
+            why = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
             raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
 
     def meets_singular_shapes(self, system: System) -> bool:
@@ -160,7 +163,7 @@ def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
+    return costed(system).solved(*gait.cycle(phases, gait.amplitude or 1.0))
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:
