@@ -50,7 +50,7 @@ BOX = {"mass": 0.2, "length": 0.2, "width": 0.2, "height": 0.1}
 BESIDE = {  # what is asked for before
     ("intruder", "mesh"): {"file": "wedge.stl"}, ("robot", "rhex"): BOX | {"hips": [0.0, 0.1], "legs": LEGS},
     ("robot", "wheel"): {"mass": 1.0, "legs": LEGS}, ("robot", "screws"): BOX | {"track": 0.1, "screw": SCREW},
-    ("robot", None): {"mjcf": "cart.xml", "geoms": ["fl", "trunk"]},
+    ("robot", "mjcf"): {"mjcf": "cart.xml", "geoms": ["fl", "trunk"]},
 }  # fmt: skip
 OTHERWISE = {"internal_friction": "friction"}  # what is named in place of a key
 KEY = re.compile(r"key (\[+(\w*)\]+(.*)): (\w+) \|.*")

@@ -13,7 +13,8 @@ from test_fuzz import VALUES, mutated
 import geomech.scene as scenes
 from geomech.core.errors import SceneError
 from geomech.output import plots
-from geomech.scene.intruder import IntruderScene, load_medium
+from geomech.scene.intruder import IntruderScene
+from geomech.scene.stress import load_medium
 from geomech.study.bench import Study
 from geomech.study.intrusion import estimate
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
@@ -269,7 +270,7 @@ def test_what_is_written_reads_the_same():
     for k, shape in enumerate(OUTLINES.values()):
         scene = IntruderScene(stress, shape, motions[k % 3], elements=31)
         assert scenes.parse(scenes.toml(scene)) == scene
-    with pytest.raises(SceneError, match="plate drags and paths are CSV files"):
+    with pytest.raises(SceneError, match="has a CSV file of its own"):
         scenes.toml(IntruderScene(STRESSES["measured"], shape, motions[0]))
 
 
@@ -282,9 +283,9 @@ REFUSED = [
     ("[medium]", "[media]", "table: 'media' is unknown; did you mean 'medium'"),
     ('name = "poppy-seeds-close"', 'name = "poppy"', "[medium] name: 'poppy' is unknown"),
     ('name = "poppy-seeds-close"', 'name = "glass-0.3mm-loose"', "[medium] name: 'glass-0.3mm-loose' is unknown"),
-    ('name = "poppy-seeds-close"', "A00 = 0.1", "has no A10, B11, B01, Bm11, C11, C01, Cm11, D10: give all nine"),
+    ('name = "poppy-seeds-close"', "A00 = 0.1", "has no A10, B01, B11, Bm11, C01, C11, Cm11, D10: keep one of"),
     ('name = "poppy-seeds-close"', 'name = "generic"\nA00 = 0.1', "keep one of 'name', 'file' and the nine"),
-    ("zeta = 0.5", "zeta = -0.5", "[medium]: zeta must be a number above 0, got -0.5"),
+    ("zeta = 0.5", "zeta = -0.5", "[medium] zeta must be a number from 0 to 1e+06, got -0.5"),
     ("zeta = 0.5", 'zeta = "a"', "[medium] Expected `float`, got `str`"),
     ("zeta = 0.5", "zetta = 0.5", "[medium] key: 'zetta' is unknown; did you mean 'zeta'"),
     ("zeta = 0.5", 'tension = "pull"', "tension must be 'keep' or 'cut', got 'pull'"),

@@ -14,62 +14,54 @@ from geomech.core.errors import SceneError
 from geomech.scene import (
     builtin_names,
     from_tables,
-    intruder_keys,
     intruder_names,
     kinds,
     load,
     parse,
     solid,
-    walker_keys,
     walker_names,
 )
-from geomech.scene.keys import Key, keys_of, meanings, schema, sections, text
-from geomech.scene.read import TABLES
-from rft import CATALOGUE, meshes, plates
-from rft.ground import KINDS as GROUND_EFFECTS
+from geomech.scene.key import Key, aliases, keys_of, meanings
+from geomech.scene.keys import SCENES, all_variants, sections, text, worded
+from geomech.scene.model import Scene
+from geomech.scene.schema import schema
+from geomech.scene.sections import file_sections, keys_in
+from rft import CATALOGUE
 from rft.plates import VERTICAL
-from rft.walking import ROBOTS, Fineness, Tripod
 
-EVERY = [(table, name, kind) for table, parts in sections().items() for _, name, kind in parts]
-OF_INTRUDERS = {
-    "outline": plates.SHAPES,
-    "motion": plates.MOTIONS,
-    "mesh": solid.KINDS,
-    "motion-of-mesh": meshes.MOTIONS,
-    "medium-of-mesh": {"": meshes.Spatial},
-    "ground": GROUND_EFFECTS,
-    "robot": ROBOTS,
-    "clock": {"": Tripod},
-    "numerics-of-walk": {"": Fineness},
+TABLES = file_sections(Scene)
+EVERY = {  # section and name of every class that a scene may name, by kind of scene
+    f"{group}-{section}-{variant.told or variant.kind.__name__}": (section, variant)
+    for group, scene in SCENES.items()
+    for section, (how, *_) in file_sections(scene).items()
+    if not isinstance(how, Key)
+    for variant in all_variants(getattr(how, "one", how))
 }
-EVERY_CLASS = [*EVERY, *((table, name, kind) for table, kinds in OF_INTRUDERS.items() for name, kind in kinds.items())]
 ROOT = pathlib.Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize(
-    ("table", "name", "kind"), EVERY_CLASS, ids=[f"{t}-{n or k.__name__}" for t, n, k in EVERY_CLASS]
-)
-def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(table, name, kind):
-    """In the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
-    part = getattr(kind, "part", "")  # a table of its own
-    keys = [k for k in keys_of(kind) if k.name != part]
-    assert [k.name for k in keys] == [
-        f.name for f in dataclasses.fields(kind) if f.init and f.name not in ("solver", part)
-    ]
-    for key in keys:
-        place = f"{kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
+@pytest.mark.parametrize("name", EVERY)
+def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(name):
+    """In the annotation or the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
+    _, variant = EVERY[name]
+    fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
+    if not variant.columns:
+        assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
+    for key in keys_in(variant):
+        place = (
+            f"{variant.kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
+        )
         assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
         assert 0 < len(key.unit) < 25, place
         assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
-        assert key.type != "value", f"{kind.__name__}.{key.name}: of a type that no scene file has"
-        assert key.degrees == (key.name in getattr(kind, "angles", ()))
-        assert key.unit == "rad" or not key.degrees
+        assert worded(key.schema) != "value", f"{variant.kind.__name__}.{key.name}: of a type that no scene file has"
+        assert key.degrees == (key.unit == "rad")
 
 
 def test_keys_are_told_as_they_are():
     @dataclasses.dataclass(frozen=True)
     class Base:
-        """first (rad): of the base. second, third (m): of both."""
+        """first (rad): of the base. second, third (rad): of both."""
 
         first: float
         second: float | None = None
@@ -87,14 +79,13 @@ def test_keys_are_told_as_they_are():
 
         fourth: str = "x"
         fifth: bool = True
-        angles = ("third",)
 
     assert meanings(Derived) == {
-        "first": ("1/s", "its own, on two lines; (in brackets)"), "second": ("m", "of both"), "third": ("m", "of both"),
+        "first": ("1/s", "its own, on two lines; (in brackets)"), "second": ("rad", "of both"), "third": ("rad", "of both"),
         "fourth": ("-", '"text"'),
     }  # fmt: skip
     keys = {k.name: k for k in keys_of(Derived)}
-    assert [(k.type, k.value) for k in keys.values()] == [
+    assert [(worded(k.schema), k.value) for k in keys.values()] == [
         ("number", "required"), ("number", "none"), ("list of lists of whole numbers", "[]"), ("text", '"x"'),
         ("true or false", "true"),
     ]  # fmt: skip
@@ -111,10 +102,10 @@ def run(capsys, *argv):
 def test_the_command_prints_them_all_or_a_section(capsys):
     code, out, err = run(capsys, "keys")
     assert (code, err) == (0, "")
-    for table, name, kind in EVERY:
-        assert (f'"{name}"' if name else f"[{table}]") in out
-        for key in keys_of(kind):
-            assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} ", out, re.M), key.name
+    for table, variant in EVERY.values():
+        assert variant.implied or (variant.told or f"[{table}]") in out
+        for key in keys_in(variant):
+            assert re.search(rf"^  {key.name} +{worded(key.schema)} +{re.escape(key.unit)} ", out, re.M), key.name
     assert max(map(len, out.splitlines())) <= 120
     assert [run(capsys, "keys", table)[0] for table in TABLES] == [0] * len(TABLES)
     body = run(capsys, "keys", "body")[1]
@@ -122,7 +113,7 @@ def test_the_command_prints_them_all_or_a_section(capsys):
     assert re.search(r'^  frame +text +-  "mean" ', body, re.M)
     by_name = "[medium]\nBy name, with no key beside it.\n  name  text  -  required  a medium of the catalogue: glass-"
     assert [section for section in TABLES if by_name in text(section)] == ["medium"]
-    assert '[system] kind = "swimmer"\nA body in a medium: ' in text("system")
+    assert '[system] kind = "swimmer"\nA body in a medium' in text("system")
     granular = text("medium").partition('law = "granular"')[2].partition("\n\n")[0]
     assert re.search(r"\n +C +number +- +required +the extra normal force", granular)
     assert re.search(r"\n +gamma0 +number +rad +required [^:]*as\s+gamma0_deg", granular)
@@ -319,20 +310,22 @@ def test_the_schema_agrees_with_the_reader_of_meshes(medium, intruder, motion, m
     test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion, more, good, valid)
 
 
-def test_keys_of_intruders_are_told(capsys):
+def test_keys_of_all_scenes_are_told(capsys):
     """Each with a type, a unit and a meaning, in the section that it has in a scene file."""
     whole = run(capsys, "keys")[1]
-    for section, parts in intruder_keys.sections().items():
+    for section, parts in sections().items():
         code, out, err = run(capsys, "keys", section)
         assert (code, err) == (0, "")
         for part in parts:
             assert part.title in out and part.title in whole
-            block = out.partition(part.title + "\n")[2].partition("\n\n")[0]
+            block = out.partition(f"{part.title}\n{part.about[:20]}")[2].partition("\n\n")[0]
             for key in part.keys:
-                assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} +\S+ +.*[a-z]", block, re.M), (
-                    key.name
+                assert re.search(
+                    rf"^  {key.name} +{worded(key.schema)} +{re.escape(key.unit)} +\S+ +.*[a-z]", block, re.M
+                ), key.name
+                assert worded(key.schema) != "value" and key.unit, (
+                    f"{part.title} {key.name}: say it as name (unit): meaning"
                 )
-                assert key.type != "value" and key.unit, f"{part.title} {key.name}: say it as name (unit): meaning"
     assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
     assert re.search(r"\n  B-11 +number +N/cm\^3 +none +coefficient of a sine of alpha_z", whole)
     assert re.search(r"\n  elements +whole number +- +100 ", run(capsys, "keys", "numerics")[1])
@@ -415,15 +408,6 @@ def test_the_schema_agrees_with_the_reader_of_mjcf_robots(old, new, good, valid,
 
 
 def test_keys_of_robots_are_told(capsys):
-    for section, parts in walker_keys.sections().items():
-        out = run(capsys, "keys", section)[1]
-        for part in parts:
-            block = out.partition(part.title + "\n")[2].partition("\n\n")[0]
-            for key in part.keys:
-                assert re.search(rf"^  {key.name} +{key.type} +{re.escape(key.unit)} +\S+ +.*[a-z]", block, re.M), (
-                    key.name
-                )
-                assert key.type != "value" and key.unit and key.name != "legs"
     robots = run(capsys, "keys", "robot")[1]
     assert "[robot.screw]" in robots
     assert (

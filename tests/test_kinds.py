@@ -22,8 +22,9 @@ from geomech.geometry.traits import Traits
 from geomech.output.explain import explain
 from geomech.output.system import notes
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
-from geomech.scene.keys import schema, text
+from geomech.scene.keys import text
 from geomech.scene.kinds import FAMILIES, load_file, register
+from geomech.scene.schema import schema
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.systems import Premise, Solver, Swimmer

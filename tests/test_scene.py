@@ -75,7 +75,7 @@ def test_every_key_arrives():
 
 BAD = [
     ("[medium", "scene is not TOML"),
-    (GOOD + "[water]\nx = 1", "table: 'water' is unknown; use one of medium, body, gait, numerics"),
+    (GOOD + "[water]\nx = 1", "table: 'water' is unknown; use one of medium, body, effects, system, gait"),
     (GOOD.replace("[gait]", "[giat]"), "table: 'giat' is unknown; did you mean 'gait'"),
     ("x = 1", "table: 'x' is unknown"),
     (GOOD.split("[gait]")[0], r"the table \[gait\] is missing"),
@@ -85,7 +85,7 @@ BAD = [
         r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'",
     ),
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
-    (GOOD.replace('law = "granular"', 'name = "glass"'), "takes no 'C'"),
+    (GOOD.replace('law = "granular"', 'name = "glass"'), "'C' is unknown; use one of name; it has no 'law'"),
     (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),
     (GOOD.replace("C = 1.8", ""), r"\[medium\] .*missing required field `C`"),
     (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),

@@ -541,7 +541,7 @@ def test_other_refusals(geomech, tmp_path):
     (tmp_path / "bad.toml").write_text(legless)
     (tmp_path / "small.toml").write_text(SMALL)
     for args, said in (
-        (("walk", "bad.toml"), "a robot without legs: add the table [robot.legs]"),
+        (("walk", "bad.toml"), "the table [robot.legs] is missing: add it"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),
         (("walk", "small.toml", "--animate", "film.avi"), "end the name in"),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tasks import always_dies, dies, doubled, fails, fails_oddly, notes, waits, who
+from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
 from test_cli import geomech
 
 from geomech import scene as scenes
@@ -58,8 +58,8 @@ def test_results_come_in_order(two):
     np.testing.assert_array_equal(found, np.outer(range(40), [1.0, 2.0]))
 
 
-def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(two):
-    found = each(two, who, None, range(20))
+def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(two, tmp_path):
+    found = each(two, meets, str(tmp_path), range(20))
     assert {x[1:4] for x in found} == {(1, "numpy", None)}
     pids = {x[0] for x in found}
     assert len(pids) == 2 and os.getpid() not in pids

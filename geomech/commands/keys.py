@@ -21,9 +21,10 @@ def keys(
     plugin: PluginOption = None,
 ):
     """Every key of a scene file: type, unit, default and meaning; or a JSON Schema for editors."""
-    from geomech.scene import keys as told
+    from geomech.scene.keys import text
+    from geomech.scene.schema import schema
 
     load_plugins(plugin)
     if json_schema and section is not None:
         raise SceneError("--json-schema is that of whole scene files: drop SECTION")
-    print(json.dumps(told.schema(), indent=1) if json_schema else told.text(section), end="\n" if json_schema else "")
+    print(json.dumps(schema(), indent=1) if json_schema else text(section), end="\n" if json_schema else "")

@@ -27,7 +27,7 @@ def walker_names() -> list[str]:
 
 def medium_names() -> list[str]:
     """Of the media of intruder scenes."""
-    from geomech.scene.intruder import VERTICAL
+    from geomech.scene.stress import VERTICAL
 
     return [*VERTICAL]
 

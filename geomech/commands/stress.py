@@ -30,7 +30,7 @@ def stress(
 ):
     """Stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig. 7)."""
     from geomech.io import files
-    from geomech.scene.intruder import load_medium
+    from geomech.scene.stress import load_medium
     from rft.plates import survey
 
     if (beta is None) != (gamma is None) or (beta is None and plot is None):

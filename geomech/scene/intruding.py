@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from geomech.core.errors import SceneError, choose, named, short
+from geomech.core.errors import named, short
 from geomech.core.summary import part
-from geomech.scene.parts import build_kind
+from rft.checks import check_numbers
 from rft.ground import KINDS, GroundEffect, checked, weight
 from rft.premise import not_so
-
-TABLES = ("medium", "intruder", "motion", "numerics", "effects")
 
 
 class Intruding:
@@ -25,6 +23,7 @@ class Intruding:
     finer: tuple[int, ...] = (2,)
     takes: Mapping[str, tuple[type, str]] = {}
     per_part = 0.0
+    example: ClassVar[str] = "c-leg"
     effects: tuple[GroundEffect, ...]
     files: tuple[str, ...]
 
@@ -35,7 +34,9 @@ class Intruding:
                 raise ValueError(f"{what} must be {such}, got {short(getattr(self, what))}")
         if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
             raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
-        object.__setattr__(self, "effects", checked(self.effects))
+        check_numbers(self)
+        with named("[[effects]]"):
+            object.__setattr__(self, "effects", checked(self.effects))
 
     @property
     def count(self) -> int:
@@ -85,22 +86,6 @@ class Intruding:
         return force + np.array([x, *[0.0] * (force.shape[1] - 2), z])
 
 
-def checked_tables(tables: Mapping, name: str) -> dict:
-    """The numerics and effects of a scene's tables; SceneError unless they are those of such a scene."""
-    for key in tables:
-        choose(f"{name}: table", key, TABLES)
-    for key in TABLES[:-1]:
-        if not isinstance(tables.get(key, {} if key == "numerics" else None), Mapping):
-            told = "is missing: add it" if key not in tables else "must be a table"
-            raise SceneError(f"{name}: the table [{key}] {told}, see 'geomech scenes --show c-leg'")
-    effects = tables.get("effects", [])
-    if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
-        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
-    made = tuple(build_kind(f"{name}: [[effects]]", e, "kind", KINDS) for e in effects)
-    with named(f"{name}: [[effects]]"):
-        return {"numerics": dict(tables.get("numerics", {})), "effects": checked(made)}
-
-
 def of_effects(effects) -> list[str]:
     """A line for each effect on the ground, and one more for what it takes for granted."""
     lines = []
@@ -112,21 +97,3 @@ def of_effects(effects) -> list[str]:
         if effect.assumes:
             lines.append(f"     assumes {effect.assumes}")
     return lines
-
-
-def located(table: Mapping, folder: Path, files: list[str]) -> dict:
-    """The table with its file, if it names one, looked for from the scene's folder, and noted."""
-    if not isinstance(table.get("file"), str):
-        return dict(table)
-    files.append(str(folder / table["file"]))
-    return {**table, "file": files[-1]}
-
-
-def as_table(thing, kinds: Mapping[str, type], **more) -> dict:
-    """The table of one of ``kinds``, lists in place of tuples."""
-    kind = next(k for k, v in kinds.items() if v is type(thing))
-    return {**more, "kind": kind} | {k: _listed(v) for k, v in dataclasses.asdict(thing).items()}
-
-
-def _listed(value):
-    return [_listed(v) for v in value] if isinstance(value, tuple) else value

@@ -1,33 +1,37 @@
-"""What a class that a table of a TOML file is read from says of the table's keys, as text to read and as JSON Schema.
+"""What a class that a section of a scene file is read from says of the section's keys.
 
-A class says it in the annotations of its fields (`rft.checks.Number`), else in its docstring: ``name (unit): meaning``,
-or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is - where there is none. Types
-and defaults are those of its fields.
+A class says it in the annotations of its fields (`rft.checks.Number`, `Word`), else in its docstring: ``name (unit): meaning``,
+or ``name, other (unit): meaning``, up to the next key or the end of the paragraph. The unit is - where there is none; a key in
+rad may be given in degrees, as ``name_deg``. Types and defaults are those of its fields.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import json
 import re
-import textwrap
-from collections.abc import Collection
-from typing import Any, NamedTuple
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import msgspec
 
 from rft.checks import numbers_of
 
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
-WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
-PLURALS = {"number": "numbers", "integer": "whole numbers", "string": "texts", "boolean": "truths"}
-WIDTH = 120
+
+
+class Word(NamedTuple):
+    """A text in a field: one of those that are known. meaning: for lists of keys."""
+
+    known: Collection[str]
+    meaning: str
 
 
 class Key(NamedTuple):
-    """One key of a table. schema: JSON Schema of its values. default: None where it may be left out for want of a value.
-    degrees: it may be given as ``name``_deg."""
+    """One key of a section. schema: JSON Schema of its values. default: None where it may be left out for want of a value.
+    degrees: it may be given as ``name``_deg. alias: another name of it."""
 
     name: str
     schema: dict[str, Any]
@@ -36,35 +40,76 @@ class Key(NamedTuple):
     required: bool
     default: Any
     degrees: bool
-
-    @property
-    def type(self) -> str:
-        return worded(self.schema)
+    alias: str = ""
 
     @property
     def value(self) -> str:
-        """Its default as a scene file has it."""
+        """The default as a scene file has it."""
         if self.required:
             return "required"
         return "none" if self.default is None else json.dumps(self.default, default=list)
 
+    @property
+    def spellings(self) -> tuple[str, ...]:
+        """The names under which a file may give it."""
+        return (self.name, *[f"{self.name}_deg"] * self.degrees, *[self.alias] * bool(self.alias))
+
+
+def text_key(name: str, meaning: str, required: bool = False) -> Key:
+    """Return a key that takes a text."""
+    return Key(name, {"type": "string"}, "-", meaning, required, None, False)
+
 
 def keys_of(kind: type) -> list[Key]:
-    """The keys of a table that a class is read from."""
-    shapes, told, angles = _shapes(kind), meanings(kind), getattr(kind, "angles", ())
+    """Return the keys of a section that a class is read from."""
+    shapes, told, shown = _shapes(kind), meanings(kind), aliases(kind)
     made = []
     for field in dataclasses.fields(kind):
         if field.init and field.name != "solver":
             required = field.default is field.default_factory is dataclasses.MISSING
             default = None if required else _default(field)
-            unit, meaning = told.get(field.name, ("", ""))
-            schema = _plain(shapes.get(field.name, {}))
-            made.append(Key(field.name, schema, unit, meaning, required, default, field.name in angles))
+            schema, (unit, meaning) = _plain(shapes.get(field.name, {})), told.get(field.name, ("", ""))
+            if word := words_of(kind).get(field.name):
+                schema, unit, meaning = schema | {"enum": [*word.known]}, "-", word.meaning
+            name, alias = (shown[field.name], field.name) if field.name in shown else (field.name, "")
+            degrees = field.name in angles_of(kind)
+            made.append(Key(name, schema, unit, meaning, required, default, degrees, alias))
     return made
 
 
+def aliases(kind: type) -> Mapping[str, str]:
+    """Return, by field, the names under which files have keys that are no names in Python."""
+    return getattr(kind, "aliases", {})
+
+
+@functools.cache
+def angles_of(kind: type) -> frozenset[str]:
+    """Return the fields in rad, which a file may give in degrees."""
+    return frozenset(name for name, (unit, _) in meanings(kind).items() if unit == "rad")
+
+
+@functools.cache
+def spellings(kind: type) -> dict[str, tuple[str, bool]]:
+    """Return, by key as a file may have it, the field of a class and whether it is in degrees."""
+    names = [field.name for field in dataclasses.fields(kind) if field.init]
+    found = {name: (name, False) for name in names}
+    found |= {shown: (name, False) for name, shown in aliases(kind).items()}
+    return found | {f"{name}_deg": (name, True) for name in names if name in angles_of(kind)}
+
+
+@functools.cache
+def words_of(kind: type) -> dict[str, Word]:
+    """Return the annotations `Word` of a form of keys by field."""
+    if not hasattr(kind, "to_part"):  # the names of a user's annotations need not be known
+        return {}
+    hints = get_type_hints(kind, include_extras=True)
+    marked = {name: [x for x in get_args(hint) if isinstance(x, Word)] for name, hint in hints.items()}
+    return {name: found[0] for name, found in marked.items() if found}
+
+
 def _shapes(kind: type) -> dict[str, dict]:
-    """JSON Schema of the fields; empty for types that no scene file can hold, and for a class of one's own with such."""
+    """Return JSON Schema of the fields; empty for types that no scene file can hold, and for a class of one's own with
+    such."""
     try:
         return msgspec.json.schema(kind, schema_hook=lambda other: {"type": "object"})["$defs"][kind.__name__][
             "properties"
@@ -74,7 +119,7 @@ def _shapes(kind: type) -> dict[str, dict]:
 
 
 def _plain(schema: dict) -> dict[str, Any]:
-    """Without default, and without null, which TOML has not."""
+    """Return it without default, and without null, which TOML has not."""
     values = [x for x in schema.get("anyOf", ()) if x.get("type") != "null"]
     return values[0] if len(values) == 1 else {k: v for k, v in schema.items() if k != "default"}
 
@@ -83,75 +128,23 @@ def _default(field: dataclasses.Field) -> Any:
     return field.default if field.default is not dataclasses.MISSING else field.default_factory()  # type: ignore[misc]
 
 
+@functools.cache
 def meanings(kind: type) -> dict[str, tuple[str, str]]:
-    """(unit, meaning) of the fields, as annotations and docstrings of the class and of those it is derived from say."""
+    """Return (unit, meaning) of the fields, as annotations and docstrings of the class and of those it is derived from
+    say."""
     names = {f.name for f in dataclasses.fields(kind)}
     found: dict[str, tuple[str, str]] = {}
     for base in reversed(kind.__mro__):
         for paragraph in inspect.cleandoc(vars(base).get("__doc__") or "").split("\n\n"):
             marks = [m for m in MARK.finditer(paragraph) if {*m[1].split(", ")} <= names]
             for mark, after in zip(marks, [*marks[1:], None]):
-                meaning = (
-                    " ".join(paragraph[mark.end() : after.start() if after else None].split())
-                    .rstrip(" .;")
-                    .replace("`", "")
-                )
-                found |= dict.fromkeys(mark[1].split(", "), (mark[2], meaning))
+                meaning = " ".join(paragraph[mark.end() : after.start() if after else None].split())
+                found |= dict.fromkeys(mark[1].split(", "), (mark[2], meaning.rstrip(" .;").replace("`", "")))
     return found | {name: (number.unit, number.meaning) for name, number in numbers_of(kind).items()}
 
 
 def first(kind: type) -> str:
-    """The first sentence of its docstring; nothing where that tells a key."""
+    """Return the first sentence of a class's docstring; nothing where that tells a key."""
     first = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0].replace("`", "")
-    sentence = re.split(r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s", " ".join(first.split()))[0].rstrip(
-        ".:;"
-    )
-    return "" if MARK.match(first) else f"{sentence}."
-
-
-def told(title: str, about: str, keys: list[Key]) -> str:
-    rows = [(k.name, k.type, k.unit, k.value) for k in keys]
-    widths = [max(map(len, column)) for column in zip(*rows)]  # none without keys
-    lines = [title, *textwrap.wrap(about, WIDTH)]
-    for key, row in zip(keys, rows):
-        start = "  " + "".join(f"{x:{width}}  " for x, width in zip(row, widths))
-        meaning = key.meaning + f"; in degrees as {key.name}_deg" * key.degrees
-        lines += textwrap.wrap(meaning, WIDTH, initial_indent=start, subsequent_indent=" " * min(len(start), 60))
-    return "\n".join(lines)
-
-
-def worded(schema: dict, several: bool = False) -> str:
-    if "anyOf" in schema:
-        return " or ".join(worded(x, several) for x in schema["anyOf"] if x.get("type") != "null")
-    if schema.get("type") == "array":
-        inner = schema.get("items") or schema["prefixItems"][0]
-        count = f"{schema['minItems']} " if "minItems" in schema else ""
-        return f"list{'s' * several} of {count}{worded(inner, True)}"
-    return (PLURALS if several else WORDS).get(schema.get("type", ""), "value")
-
-
-def properties(keys: list[Key]) -> dict[str, Any]:
-    """JSON Schema of the keys by name, in degrees too where they may be."""
-    made = {}
-    for key in keys:
-        unit = f" ({key.unit})" if key.unit not in ("", "-") else ""
-        more = {} if key.required or key.default is None else {"default": json.loads(key.value)}
-        made[key.name] = {**key.schema, "description": f"{key.meaning}{unit}", **more}
-        if key.degrees:
-            made[f"{key.name}_deg"] = {**key.schema, "description": f"{key.meaning} (degrees)"}
-    return made
-
-
-def option(about: str, key: str, name: str, keys: list[Key], elsewhere: Collection[str] = ()) -> dict[str, Any]:
-    """A table that names its class by ``key = "name"``, if there is a key. elsewhere: what may be given in another table."""
-    required = [k.name for k in keys if k.required and not k.degrees and k.name not in elsewhere]
-    named = {key: {"const": name}} if key else {}
-    made = table(about, {**named, **properties(keys)}, [*named, *required])
-    either = [({"required": [k.name]}, {"required": [f"{k.name}_deg"]}, k.required) for k in keys if k.degrees]
-    rules = [{"oneOf": [a, b]} if needed else {"not": {"allOf": [a, b]}} for a, b, needed in either]
-    return {**made, "allOf": rules} if rules else made
-
-
-def table(about: str, values: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    made = {"type": "object", "properties": values, "required": required, "additionalProperties": False}
-    return {"description": about, **made} if about else made
+    sentence = re.split(r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s", " ".join(first.split()))[0]
+    return "" if MARK.match(first) else f"{sentence.rstrip('.:;')}."

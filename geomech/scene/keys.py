@@ -1,157 +1,128 @@
-"""Every key of a scene file, from the classes that read it: as text to read, and as a JSON Schema for editors.
-
-What a class says of its keys is in `geomech.scene.key`; tables of intruder scenes are in `geomech.scene.intruder_keys`,
-those of walking robots in `geomech.scene.walker_keys`.
-"""
+"""Every key of a scene file, from the declarations by which it is read: as text to read (`geomech.scene.schema` has them for
+editors)."""
 
 from __future__ import annotations
 
-import dataclasses
+import textwrap
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from geomech.core.errors import choose
-from geomech.scene import intruder_keys, walker_keys
-from geomech.scene.key import Key, first, keys_of, meanings, option, properties, table, told
+from geomech.scene.intruder import IntruderScene
+from geomech.scene.key import Key, first
 from geomech.scene.kinds import FAMILIES, unloaded
-from geomech.scene.model import Numerics
-from geomech.scene.read import TABLES
-from geomech.scene.sizes import NOT_OF_THE_BODY, Physical
-from geomech.systems.swimmer import MEDIA, Swimmer
+from geomech.scene.model import Scene
+from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, keys_in, variants
+from geomech.scene.solid import MeshScene
+from geomech.scene.swimming import solvers
+from geomech.scene.walker import WalkerScene
+from geomech.tiers.base import Numerics
 
-GROUPS = {
-    "medium": "media",
-    "body": "bodies",
-    "gait": "gaits",
-    "effects": "effects",
-    "system": "systems",
-}  # of FAMILIES
-FRAME = (
-    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "
-    "which the connection is smallest"
-)
-FILE = (
-    "TOML of a medium, as geomech calibrate writes it, with no key beside it; or, beside law = 'table', CSV of a table"
-)
-SWIMMER = "A body in a medium: its tables [medium], [body] and [[effects]] may as well be in it as stand by themselves."
-__all__ = ["Key", "keys_of", "meanings", "names", "schema", "sections", "text"]
+SCENES = {"gaits": Scene, "outlines": IntruderScene, "meshes": MeshScene, "walkers": WalkerScene}
+WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
+PLURALS = {"number": "numbers", "integer": "whole numbers", "string": "texts", "boolean": "truths"}
+WIDTH = 120
 
 
-def sections() -> dict[str, list[tuple[str, str, type]]]:
-    """Of every table: (key that names the class, its name, the class), with "" for tables of one class."""
-    made: dict[str, list[tuple[str, str, type]]] = {}
-    for section, group in GROUPS.items():
-        family = FAMILIES[f"geomech.{group}"]
-        made[section] = [(family.key, name, kind) for name, kind in family.kinds.items() if kind is not Swimmer]
-    solvers = {type(k.solver): None for _, _, k in [*made["system"], ("", "", Swimmer)] if getattr(k, "solver", None)}
-    made["numerics"] = [("", "", kind) for kind in (Numerics, *solvers)]
-    made["physical"] = [("", "", Physical)]
-    return {name: made[name] for name in TABLES if name in made}
+class Part(NamedTuple):
+    """What a section may be, as it is listed."""
+
+    title: str
+    about: str
+    keys: list[Key]
+
+
+def sections() -> dict[str, list[Part]]:
+    """Return what every section of a scene file may be: a class that several kinds of scene have is listed once."""
+    found: dict[str, list[Part]] = {"frame": []}
+    listed = set()
+    for scene in SCENES.values():
+        for name, (how, *_) in file_sections(scene).items():
+            parts = found.setdefault(name, [])
+            if isinstance(how, Key):
+                parts.append(Part("above all tables", "", [how]))
+                continue
+            one = how.one if isinstance(how, Each) else how
+            if isinstance(one, OneOf) and one.meaning:
+                law = Key(one.key, {"type": "string", "enum": [*one.kinds]}, "-", one.meaning, False, None, False)
+                parts.append(Part(f"[{name}]{one.of}", "Besides the keys above.", [law]))
+                continue
+            for variant in all_variants(one):
+                if (name, variant.told, variant.kind) not in listed:
+                    parts.append(_part(name, how, variant))
+                    listed.add((name, variant.told, variant.kind))
+            parts += _of_packages(one)
+    return found
+
+
+def all_variants(how: Keys | OneOf) -> list[Variant]:
+    """Return what a section may be; [numerics] is of the tiers and of systems' solvers at once."""
+    kinds = [Numerics, *solvers()] if isinstance(how, Keys) and how.kind is Numerics else []
+    return [Variant({}, kind) for kind in kinds] or [*variants(how)]
+
+
+def _part(name: str, how: Section, variant: Variant) -> Part:
+    one = how.one if isinstance(how, Each) else how
+    head = f"[[{name}]]" if isinstance(how, Each) else f"[{name}]"
+    about = [first(variant.kind)]
+    if isinstance(one, OneOf) and one.short and one.short in variant.named.values():
+        inner = ", ".join(f"[[{part}]]" if isinstance(of, Each) else f"[{part}]" for part, of in variant.inner.items())
+        about.append(f"Its tables, {inner}, may as well stand by themselves.")
+    elif variant.inner:
+        inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
+        about.append(f"'geomech keys intruder' has the keys of {inner}.")
+    if variant.implied:
+        about.append(f"It need not say its {one.key}.")
+    return Part(f"{head} {variant.told}".strip() + one.of, " ".join(about).strip(), keys_in(variant))
+
+
+def _of_packages(one: Keys | OneOf) -> Iterator[Part]:
+    """Yield what installed packages offer."""
+    if group := group_of(one):
+        new, refused = unloaded(group)
+        for name, package in new.items():
+            yield Part(f'{one.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
+        for name, package in refused.items():
+            why = f"Not that of {package}, which is refused: the one that is built in has this name."
+            yield Part(f'{one.key} = "{name}"', why, [])
+
+
+def group_of(how: Section) -> str:
+    """Return the group of entry points by which packages offer what a section may name, "" if there is none."""
+    kinds = how.kinds if isinstance(how, OneOf) else None
+    return next((group for group, family in FAMILIES.items() if family.kinds is kinds), "")
 
 
 def names() -> list[str]:
-    """Of the tables, those of scenes with a gait first."""
-    return list(dict.fromkeys(["frame", *sections(), *intruder_keys.sections(), *walker_keys.sections()]))
+    """Return the names of all sections, those of scenes with a gait first."""
+    return [*sections()]
 
 
 def text(section: str | None = None) -> str:
-    """All keys, or those of one section, to be read."""
-    every, theirs = sections(), (intruder_keys.sections(), walker_keys.sections())
-    chosen = [choose("SECTION", section, names())] if section is not None else names()
-    of_gaits = [x for name in chosen if name in every or name == "frame" for x in _told(name, every)]
-    others = [told(*part[:3]) for of in theirs for name in chosen for part in of.get(name, ())]
-    return "\n\n".join([*of_gaits, *others]) + "\n"
+    """Return all keys, or those of one section, to be read."""
+    found = sections()
+    chosen = [*found] if section is None else [choose("SECTION", section, found)]
+    return "\n\n".join(told(part) for name in chosen for part in found[name]) + "\n"
 
 
-def _told(section: str, every: dict) -> Iterator[str]:
-    words = {"type": "string"}
-    if section == "frame":
-        yield told("above all tables", "", [Key("frame", words, "-", FRAME, False, "mean", False)])
-        return
-    if section == "medium":
-        meaning = f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show NAME' prints one"
-        yield told("[medium]", "By name, with no key beside it.", [Key("name", words, "-", meaning, True, None, False)])
-        yield told("[medium]", "From a file.", [Key("file", words, "-", FILE, True, None, False)])
-    for key, name, kind in every[section]:
-        head = f"[[{section}]]" if section == "effects" else f"[{section}]"
-        yield told(f'{head} {key} = "{name}"' if key else head, first(kind), keys_of(kind))
-    if section in GROUPS:
-        yield from _of_packages(f"geomech.{GROUPS[section]}", every[section][0][0])
-    if section == "system":
-        yield told('[system] kind = "swimmer"', SWIMMER, [])
+def told(part: Part) -> str:
+    """Return the keys of a part as lines."""
+    rows = [(key.name, worded(key.schema), key.unit, key.value) for key in part.keys]
+    widths = [max(map(len, column)) for column in zip(*rows)]  # none without keys
+    lines = [part.title, *textwrap.wrap(part.about, WIDTH)]
+    for key, row in zip(part.keys, rows):
+        start = "  " + "".join(f"{x:{width}}  " for x, width in zip(row, widths))
+        meaning = key.meaning + f"; in degrees as {key.name}_deg" * key.degrees
+        lines += textwrap.wrap(meaning, WIDTH, initial_indent=start, subsequent_indent=" " * min(len(start), 60))
+    return "\n".join(lines)
 
 
-def _of_packages(group: str, key: str) -> Iterator[str]:
-    new, refused = unloaded(group)
-    for name, package in new.items():
-        yield told(f'{key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
-    for name, package in refused.items():
-        why = f"Not that of {package}, which is refused: the one that is built in has this name."
-        yield told(f'{key} = "{name}"', why, [])
-
-
-def schema() -> dict[str, Any]:
-    """JSON Schema of a scene file, with a gait, an intruder or a robot that walks, its classes those that are known now."""
-    every, theirs = sections(), intruder_keys.schemas()
-    shapes = {"frame": {"type": "string", "description": FRAME}, **{k: _any(k, parts) for k, parts in every.items()}}
-    swimmer = {"kind": {"const": "swimmer"}, **{name: shapes[name] for name in ("medium", "body", "effects")}}
-    shapes["system"]["oneOf"].append(table(SWIMMER, swimmer, ["kind"]))
-    groups = {"gaits": shapes, **theirs, "walkers": walker_keys.schemas()}
-    named = {group: {k: {"$ref": f"#/$defs/{group}/{k}"} for k in of} for group, of in groups.items()}
-    own = named["gaits"]
-    every_name = dict.fromkeys(name for of in named.values() for name in of)
-    whole, short = {"required": ["gait"]}, {"required": ["medium", "body", "gait"]}
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "geomech scene",
-        "type": "object",
-        "properties": {k: {"anyOf": [of[k] for of in named.values() if k in of]} for k in every_name},
-        "additionalProperties": False,
-        "if": {"required": ["robot"]},
-        "then": walker_keys.whole(named["walkers"]),
-        "else": {
-            "if": {"anyOf": [{"required": ["intruder"]}, {"required": ["motion"]}]},
-            "then": intruder_keys.whole(named),
-            "else": {
-                **table("", own, []),
-                "if": {"required": ["system"]}, "then": whole, "else": short,
-                "allOf": [_size_needed(*each) for each in _sizes_needed(every)],
-            },
-        },
-        "$defs": groups,
-    }  # fmt: skip
-
-
-def _shared(kind: str) -> set[str]:
-    """Keys of a kind that [physical] may give; `_size_needed` asks for them there."""
-    return {f.name for f in dataclasses.fields(Physical) if kind not in NOT_OF_THE_BODY.get(f.name, ())}
-
-
-def _sizes_needed(every: dict) -> Iterator[tuple[str, str, str, str]]:
-    """(table, key that names a class, its name, a size that it must be given there or in [physical])."""
-    for section, parts in every.items():
-        for key, name, kind in parts:
-            for size in keys_of(kind):
-                if key and size.required and size.name in _shared(name):
-                    yield section, key, name, size.name
-
-
-def _size_needed(section: str, key: str, name: str, size: str) -> dict[str, Any]:
-    given = {"required": ["physical"], "properties": {"physical": {"required": [size]}}}
-    rule = {"if": {"required": [key], "properties": {key: {"const": name}}}, "then": {"required": [size]}}
-    return {"if": {"not": given}, "then": {"properties": {section: {"items": rule} if section == "effects" else rule}}}
-
-
-def _any(section: str, parts: list[tuple[str, str, type]]) -> dict[str, Any]:
-    if not parts[0][0]:  # one table, of the keys of all its classes
-        return table("", {k: v for _, _, kind in parts for k, v in properties(keys_of(kind)).items()}, [])
-    options = [option(first(kind), key, name, keys_of(kind), _shared(name)) for key, name, kind in parts]
-    if section == "medium":
-        file = {"file": {"type": "string", "description": FILE}}
-        options.append(table("A medium of the catalogue.", {"name": {"enum": [*MEDIA]}}, ["name"]))
-        options.append(table("A medium from a file.", file, ["file"]))
-        options.append(table("A table from a file.", {**file, "law": {"const": "table"}}, ["file", "law"]))
-    for other in unloaded(f"geomech.{GROUPS[section]}")[0]:  # its keys are known when it is loaded
-        options.append({"type": "object", "properties": {parts[0][0]: {"const": other}}, "required": [parts[0][0]]})
-    one = {"oneOf": options}
-    return {"type": "array", "items": one} if section == "effects" else one
+def worded(schema: dict[str, Any], several: bool = False) -> str:
+    """Return what a JSON Schema takes, in words."""
+    if "anyOf" in schema:
+        return " or ".join(worded(x, several) for x in schema["anyOf"] if x.get("type") != "null")
+    if schema.get("type") == "array":
+        inner = schema.get("items") or schema["prefixItems"][0]
+        count = f"{schema['minItems']} " if "minItems" in schema else ""
+        return f"list{'s' * several} of {count}{worded(inner, True)}"
+    return (PLURALS if several else WORDS).get(schema.get("type", ""), "value")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,9 +15,38 @@ from geomech.io.files import read_text
 from geomech.io.rows import Rows
 from geomech.io.rows import read as read_rows
 from geomech.scene.drag import LARGEST_FILE, header
+from geomech.scene.key import Word
+from geomech.systems.swimmer import MEDIA
 
 LARGEST = 1_000_000  # bytes of a medium's file
 FORCES = (("f_t", "f_n"), ("F_parallel_N", "F_perpendicular_N"))  # columns of a table, under either names
+
+
+@dataclass(frozen=True)
+class NamedMedium:
+    """By name, with no key beside it."""
+
+    name: Annotated[
+        str, Word(MEDIA, f"a medium of the catalogue: {', '.join(MEDIA)}; 'geomech scenes --show NAME' prints one")
+    ]
+
+    def to_part(self, place: str, given) -> Any:
+        """Return the medium of that name."""
+        return MEDIA[self.name]
+
+
+@dataclass(frozen=True)
+class MediumFile:
+    """From a file.
+
+    file (-): TOML of a medium, as geomech calibrate writes it, with no key beside it; or, beside law = 'table', CSV of a table.
+    """
+
+    file: str
+    law: Annotated[str | None, Word(("table",), "where the file is CSV")] = None
+
+    def to_part(self, place: str, given) -> Any:
+        raise NotImplementedError
 
 
 def with_files(tables: Mapping, name: str) -> tuple[Mapping, tuple[str, ...]]:

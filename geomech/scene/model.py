@@ -4,16 +4,36 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from geomech.core.errors import choose, named, plain, short
+from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scene.frames import reframed
+from geomech.scene.key import text_key
+from geomech.scene.medium import MediumFile, NamedMedium
+from geomech.scene.sections import Each, Keys, OneOf
+from geomech.scene.sizes import Physical
+from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.base import Cycle, System, as_system, kind_of, note_angles
 from geomech.systems.capabilities import solver_of, with_solver
+from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
+
+FRAME = (
+    "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "
+    "which the connection is smallest"
+)
+SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
+_kinds = {part: kinds for part, (_, kinds) in PARTS.items()}
+SWIMMER = {
+    "medium": OneOf(_kinds["medium"], "law", otherwise=(NamedMedium, MediumFile)),
+    "body": OneOf(_kinds["body"], sized=True),
+    "effects": Each(OneOf(_kinds["effects"], sized=True)),
+}
 
 
 class Told:
@@ -28,12 +48,14 @@ class Scene(Told):
     """A system and a gait. numerics: the tiers'; the system has its own. name: a built-in one's, or its file's. text: the
     TOML it was read from, if it was; `geomech.scene.write` says whether it still holds. files: others it was read from."""
 
-    system: System
-    gait: Gait
-    numerics: Numerics = field(default_factory=Numerics)
+    system: Annotated[System, OneOf(SYSTEMS, inner={SHORT: SWIMMER}, sized=True, short=SHORT)]
+    gait: Annotated[Gait, OneOf(GAITS, sized=True)]
+    numerics: Annotated[Numerics, Keys(Numerics)] = field(default_factory=Numerics)
     name: str = "scene"
     text: str = field(default="", compare=False)
     files: tuple[str, ...] = field(default=(), compare=False)
+    example: ClassVar[str] = "NAME"
+    once: ClassVar = {"physical": Keys(Physical), "frame": text_key("frame", FRAME)._replace(default="mean")}
 
     def __post_init__(self):
         with named(self.name):

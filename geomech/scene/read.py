@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import dataclasses
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geomech.core.errors import SceneError, choose, named, short
-from geomech.gaits import KINDS as GAITS
+from geomech.core.errors import SceneError, choose, short
 from geomech.io.files import note, read_text
-from geomech.scene import slips
-from geomech.scene.frames import framed
+from geomech.scene import reader, slips, swimming
 from geomech.scene.medium import with_files
-from geomech.scene.model import Numerics, Scene, checked_scene
-from geomech.scene.parts import LARGEST, build, build_kind, kind_in
-from geomech.scene.sizes import Sizes
-from geomech.systems import KINDS as SYSTEMS
+from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.systems.base import kind_of
-from geomech.systems.framed import NAME as FITTED
-from geomech.systems.swimmer import MEDIA, PARTS, Swimmer
+from geomech.systems.swimmer import Swimmer
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
     from geomech.scene.walker import WalkerScene
 
-TABLES = ("medium", "body", "gait", "numerics", "effects", "system", "physical", "frame")
+LARGEST = 10_000_000  # bytes of a scene file
 PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
 INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
 WALKERS = "walkers"  # and of robots that walk
@@ -103,7 +96,10 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
     tables, files = with_files({"medium": table}, scene.name)
-    return scene.changed(medium=_medium(f"{scene.name}: [medium]", tables["medium"]), files=files)
+    medium = reader.read_section(
+        reader.Source(scene.name, scene.example), "medium", tables["medium"], SWIMMER["medium"]
+    )
+    return scene.changed(medium=medium, files=files)
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
@@ -125,121 +121,26 @@ def parse(text: str, name: str = "scene") -> Scene | Any:
     return from_tables(tables, name, text)
 
 
+def _intruding(tables: Mapping, name: str) -> type[Intruding]:
+    """Return the class of an intruder scene, by the kind of its body."""
+    from geomech.scene.intruder import OUTLINES, IntruderScene
+    from geomech.scene.solid import KINDS, MeshScene
+
+    body = tables.get("intruder")
+    kind = body.get("kind") if isinstance(body, Mapping) else None
+    if kind is not None:
+        choose(f"{name}: [intruder] kind", kind, [*OUTLINES.kinds, *KINDS])
+    return MeshScene if kind in KINDS else IntruderScene
+
+
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
     """The scene of the tables of a TOML text; SceneError if they make none."""
     if not isinstance(tables, Mapping):
         raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
     if "robot" in tables:
-        from geomech.scene import walker
+        from geomech.scene.walker import WalkerScene, spelled_out
 
-        return walker.from_tables(tables, name, text)
+        return reader.read(WalkerScene, spelled_out(tables, name), name, text)
     if {"intruder", "motion"} & {*tables}:
-        from geomech.scene import intruder  # which reads tables with what is here
-
-        return intruder.from_tables(tables, name, text)
-    for table in tables:
-        choose(f"{name}: table", table, TABLES)
-    for table in ("gait",) if "system" in tables else ("medium", "body", "gait"):
-        if table not in tables:
-            raise SceneError(f"{name}: the table [{table}] is missing: add it, see 'geomech scenes --show NAME'")
-    for table, value in tables.items():
-        if table not in ("effects", "frame") and not isinstance(value, dict):
-            raise SceneError(f"{name}: {table} must be a table [{table}], got {type(value).__name__}")
-    tables, fitted = _without_fitted(tables, name)
-    tables, files = with_files(tables, name)
-    sizes = Sizes(name, tables)
-    gait = build_kind(f"{name}: [gait]", _located(tables["gait"], name), "kind", GAITS, sizes.timed)
-    kind, parts = _system(tables, name, sizes)
-    solver = getattr(kind, "solver", None)
-    own = {f.name for f in dataclasses.fields(solver)} if solver else set()
-    numerics = tables.get("numerics", {})
-    for key in numerics:
-        plain = key.removesuffix("_deg") if key.removesuffix("_deg") in Numerics.angles else key
-        choose(f"{name}: [numerics] key", plain, [f.name for f in dataclasses.fields(Numerics)] + sorted(own))
-    if own:
-        keys = {k: v for k, v in numerics.items() if k in own}
-        parts["solver"] = build(f"{name}: [numerics]", keys, type(solver))
-    finely = build(f"{name}: [numerics]", {k: v for k, v in numerics.items() if k not in own}, Numerics)
-    with named(name):
-        system = kind(**parts)
-        return Scene(
-            system=framed(system, finely) if fitted else system,
-            gait=gait,
-            numerics=finely,
-            name=name,
-            text=text,
-            files=files,
-        )
-
-
-def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
-    """The tables without the frame that is fitted to the whole system on the grid, and whether one asks for it: it stands
-    above all tables, in [body] or in [system], as any other."""
-    own, places = tables.get("frame"), []
-
-    def plain(place: str, table):
-        if not isinstance(table, Mapping) or table.get("frame") != FITTED:
-            return table
-        places.append(place)
-        return {k: v for k, v in table.items() if k != "frame"}
-
-    tables = {k: plain(k, v) if k in ("body", "system") else v for k, v in plain("", tables).items()}
-    if "body" in tables.get("system", {}):
-        tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
-    if places and own not in (None, FITTED):
-        raise SceneError(f"{name}: [{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}: keep one")
-    return tables, bool(places)
-
-
-def _system(tables: Mapping, name: str, sizes: Sizes) -> tuple[type, dict]:
-    """The class of the scene's system and its fields. [medium], [body] and [[effects]] are short for a swimmer, whose
-    they may also be in its own table."""
-    table = dict(_located(tables.get("system", {"kind": "swimmer"}), name))
-    kind = SYSTEMS[kind_in(f"{name}: [system]", table, "kind", SYSTEMS)]
-    del table["kind"]
-    if kind is not Swimmer:
-        if strangers := sorted({"medium", "body", "effects"} & {*tables}):
-            raise SceneError(f"{name}: a {kind.kind} takes no {strangers[0]!r}: drop it, or the table [system]")
-        place = f"{name}: [system]"
-        parts = _fields(build(place, sizes.fill(place, table, kind), kind))
-    else:
-        parts = _swimmer({**{k: tables[k] for k in PARTS if k in tables}, **table}, name, sizes)
-    sizes.all_used()
-    return kind, parts
-
-
-def _fields(thing) -> dict:
-    return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
-
-
-def _swimmer(parts: dict, name: str, sizes: Sizes) -> dict:
-    """The fields of a swimmer but for the solver."""
-    for part in parts:
-        choose(f"{name}: [system] key", part, PARTS)
-    effects = parts.get("effects", [])
-    if not (isinstance(effects, list) and all(isinstance(e, dict) for e in effects)):
-        raise SceneError(f"{name}: effects must be tables [[effects]], one for each")
-    for part in ("medium", "body"):
-        if not isinstance(parts.get(part), dict):
-            raise SceneError(f"{name}: the table [{part}] is missing: add it, see 'geomech scenes --show NAME'")
-    made = {"medium": _medium(f"{name}: [medium]", parts["medium"])}
-    made["body"] = build_kind(f"{name}: [body]", parts["body"], *PARTS["body"], sizes.fill)
-    places = [(f"{name}: [[effects]]", e) for e in effects]
-    made["effects"] = tuple(build_kind(place, e, *PARTS["effects"], sizes.fill) for place, e in places)
-    return made
-
-
-def _located(table: dict, name: str) -> dict:
-    """The table with its data file, if it names one, looked for from the folder of the scene file ``name``."""
-    file = table.get("file")
-    return {**table, "file": str(Path(name).absolute().parent / file)} if isinstance(file, str) else table
-
-
-def _medium(place: str, table: dict):
-    if "name" not in table:
-        return build_kind(place, table, *PARTS["medium"])
-    if extra := sorted(set(table) - {"name"}):
-        raise SceneError(
-            f"{place}: a medium given by name takes no {extra[0]!r}: drop it, or give 'law' in place of 'name'"
-        )
-    return MEDIA[choose(f"{place} name", table["name"], MEDIA)]
+        return reader.read(_intruding(tables, name), tables, name, text)
+    return swimming.from_tables(tables, name, text)

@@ -39,13 +39,6 @@ class Sizes:
             self._check(f"{name}: [gait]", "frequency", frequency)
             self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
 
-    def timed(self, place: str, table: dict, kind: type) -> dict:
-        """The table of the gait with the frequency, of all there is."""
-        if "frequency" not in self.given or "frequency" not in [f.name for f in dataclasses.fields(kind)]:
-            return table
-        self.unused.discard("frequency")
-        return {**table, "frequency": self.given["frequency"]}
-
     def _check(self, place: str, key: str, value) -> None:
         if key in self.given and self.given[key] != value:
             raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")

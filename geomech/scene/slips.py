@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 
 from geomech.core.errors import is_number, short
+from geomech.scene.key import angles_of, meanings
 
 WANTED = {
     "float": "a number", "int": "a whole number without a point", "str": 'text in "quotes"', "bool": "true or false",
@@ -35,12 +36,13 @@ def at_line(text: str, error: Exception) -> str:
     return f": {short(line.strip())}{cure}"
 
 
-def of_value(told: str, table: Mapping, angles: tuple[str, ...]) -> str:
-    """What to give in place of a value that is refused, as ``told``; empty if that says it all. angles: keys that may be
-    told in degrees."""
+def of_value(told: str, table: Mapping, kind: type) -> str:
+    """What to give in place of a value that is refused, as ``told``; empty if that says it all. kind: the class of the
+    keys."""
     if missing := re.search(r"missing required field `(\w+)`", told):
-        return f": add {missing[1]} = ..."
-    if found := re.search(r"Expected `(\w+)`.* at `\.(\w+)((?:\[\d+\])*)", told):
+        unit, _ = meanings(kind).get(missing[1], ("-", ""))
+        return f": add {missing[1]} = ..." + f", in {unit}" * (unit not in ("-", ""))
+    if found := re.search(r"Expected `(\w+)(?: \| null)?`.* at `\.(\w+)((?:\[\d+\])*)", told):
         wanted, key, places = found.groups()
         value = table.get(key, table.get(f"{key}_deg"))
         for place in re.findall(r"\d+", places):
@@ -48,4 +50,4 @@ def of_value(told: str, table: Mapping, angles: tuple[str, ...]) -> str:
         return f": give {WANTED.get(wanted, wanted)} in place of {short(value)}"
     key = told.partition(" must ")[0]
     given = is_number(table.get(key)) and abs(table[key]) < float("inf")
-    return f"; {key} is in rad, write {key}_deg for degrees" if given and key in angles else ""
+    return f"; {key} is in rad, write {key}_deg for degrees" if given and key in angles_of(kind) else ""

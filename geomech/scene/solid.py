@@ -1,27 +1,35 @@
-"""Intruder scenes of triangle meshes, which move in any way in three dimensions, and how their TOML is read."""
+"""Intruder scenes of triangle meshes, which move in any way in three dimensions."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import SceneError, choose, named, number
-from geomech.scene.columns import columns
-from geomech.scene.intruding import Intruding, as_table, checked_tables, located
-from geomech.scene.parts import build, kind_in
+from geomech.core.errors import named
+from geomech.scene.intruding import Intruding
+from geomech.scene.sections import Columns, Each, Keys, OneOf, Within
+from geomech.scene.stress import MatchedKeys
+from rft.checks import Number
 from rft.ground import KINDS as EFFECTS
 from rft.ground import GroundEffect
 from rft.meshes import MOTIONS, SOLIDS, Faces, Mesh, MeshFile, Motion, Passage, Solid, Spatial, bearing, below, wrench
 
-KINDS = {"mesh": MeshFile, **{k: v for k, v in SOLIDS.items() if k != "c-leg"}, "extruded-c-leg": SOLIDS["c-leg"]}
-STRENGTHS = ("name", "file", "zeta", "xi_n", "density", "internal_friction")
+KINDS = {
+    **{k: v for k, v in SOLIDS.items() if k != "c-leg"},
+    "extruded-c-leg": SOLIDS["c-leg"],
+    "mesh": OneOf(SOLIDS, "shape", otherwise=(MeshFile,)),
+}
+COURSE = Columns(
+    ("t", "x", "y", "z"),
+    "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); velocities are differences of order 2 in "
+    "the spacing of t",
+    optional=("rx", "ry", "rz"),
+)
+TRIANGLES = "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
 
 
 class Passed(NamedTuple):
@@ -49,11 +57,15 @@ class MeshScene(Intruding):
     """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
     the medium's strength was taken from, where it was told by a name of the vertical plane."""
 
-    medium: Spatial
-    intruder: Solid
-    motion: Motion
-    triangles: int = 5000
-    effects: tuple[GroundEffect, ...] = ()
+    medium: Annotated[Spatial, Keys(MatchedKeys, of=" of an intruder scene of a mesh", spread=True)]
+    intruder: Annotated[Solid, OneOf(KINDS)]
+    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, of=" of a mesh")]
+    triangles: Annotated[
+        int,
+        Within("numerics", of=" of an intruder scene of a mesh"),
+        Number(1, 2_000_000, "-", TRIANGLES, whole=True),
+    ] = 5000
+    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS, of=" of an intruder scene"))] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -72,8 +84,6 @@ class MeshScene(Intruding):
     def __post_init__(self):
         with named(self.name):
             self._check()
-            number("triangles", self.triangles, 1, 2_000_000, whole=True)
-            object.__setattr__(self, "triangles", int(self.triangles))
             _ = self.mesh
 
     @cached_property
@@ -117,84 +127,3 @@ class MeshScene(Intruding):
         force = {f"force_{a}": f for a, f in zip("xyz", found.force.T)}
         moment = {f"moment_{a}": m for a, m in zip("xyz", found.moment.T)}
         return {"t": passage.t, **place, **force, **moment, "moment": found.moment[:, 1]}
-
-    def tables(self) -> dict:
-        """Of a scene file that reads the same; SceneError for paths, which are files of their own."""
-        if MOTIONS["csv"] is type(self.motion):
-            raise SceneError(f"{self.name}: paths are CSV files: write the scene that names them by hand")
-        return {
-            "medium": dataclasses.asdict(self.medium),
-            "intruder": as_table(self.intruder, KINDS),
-            "motion": as_table(self.motion, MOTIONS),
-            "numerics": {"triangles": self.triangles},
-        } | ({"effects": [as_table(e, EFFECTS) for e in self.effects]} if self.effects else {})
-
-
-def from_tables(tables: Mapping, name: str, text: str, vertical: Callable) -> MeshScene:
-    """The scene of the tables of a TOML text; SceneError if they make none. vertical: reads a [medium] of the vertical
-    plane."""
-    rest, files = checked_tables(tables, name), []
-    place, folder = (lambda key: f"{name}: [{key}]"), Path(name).absolute().parent
-    for key in rest["numerics"]:
-        choose(f"{place('numerics')} key", key, ("triangles",))
-    medium, matched = read_medium(place("medium"), located(tables["medium"], folder, files), vertical)
-    return MeshScene(
-        medium=medium,
-        intruder=_solid(place("intruder"), located(tables["intruder"], folder, files)),
-        motion=_motion(place("motion"), located(tables["motion"], folder, files)),
-        effects=rest["effects"],
-        **rest["numerics"],
-        name=name,
-        text=text,
-        files=tuple(files),
-        matched=matched,
-    )
-
-
-def read_medium(place: str, table: dict, vertical: Callable) -> tuple[Spatial, str]:
-    """Of a [medium] of three dimensions: xi_n (N/m^3), or density and internal_friction, or name or file of one of the vertical
-    plane, with zeta; and surface_friction, tension, grazing(_deg). And what xi_n was matched to, if to one of those."""
-    given = {k: table.pop(k) for k in STRENGTHS if k in table}
-    ways = [{"name"}, {"file"}, {"xi_n"}, {"density", "internal_friction"}]
-    if {*given} not in ways and {*given} not in [{"name", "zeta"}, {"file", "zeta"}]:
-        told = "give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'"
-        raise SceneError(f"{place}: {told}")
-    xi_n, told = given.get("xi_n"), ""
-    with named(place):
-        if {"name", "file"} & {*given}:
-            xi_n = matched_strength(vertical(place, given))
-            of = given.get("name") or Path(given["file"]).name
-            times = f"{given['zeta']:g} times " if given.get("zeta", 1.0) != 1.0 else ""
-            told = f"xi_n = {xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) of {of} in the vertical plane"
-        elif "density" in given:
-            xi_n = Spatial.of_grains(given["density"], given["internal_friction"]).xi_n
-    return build(place, {**table, "xi_n": xi_n}, Spatial), told
-
-
-def matched_strength(stress) -> float:
-    """xi_n, N/m^3, with which a flat plate pushed straight down bears what it does by a map of the vertical plane."""
-    flat, down = (0.0, -1.0), (0.0, -1.0)
-    return 1e6 * float(stress.alpha(flat, down)[1]) / Spatial(1.0).plate
-
-
-def _solid(place: str, table: dict) -> Solid:
-    kind, shape = table.pop("kind"), table.pop("shape", None)
-    if shape is None:
-        if kind == "mesh" and "file" not in table:
-            raise SceneError(f"{place}: give 'file' (.stl, .obj, .ply) or 'shape', one of {', '.join(SOLIDS)}")
-        return build(place, table, KINDS[kind])
-    if kind != "mesh" or "file" in table:
-        raise SceneError(f"{place}: 'shape' goes with kind = 'mesh' and no 'file': drop one")
-    return build(place, table, SOLIDS[choose(f"{place} shape", shape, SOLIDS)])
-
-
-def _motion(place: str, table: dict) -> Motion:
-    name = kind_in(place, table, "kind", MOTIONS)
-    del table["kind"]
-    if name == "csv":
-        if {*table} != {"file"}:
-            told = "a motion of kind 'csv' takes 'file' and nothing else: a table t,x,y,z, and rx,ry,rz (rotation vector, rad)"
-            raise SceneError(f"{place}: {told}")
-        found = columns(place, table["file"], ("t", "x", "y", "z"), ("rx", "ry", "rz"))
-        table = {k: v.tolist() for k, v in found.items()}
-    return build(place, table, MOTIONS[name])

@@ -7,20 +7,21 @@ import json
 import math
 import textwrap
 import tomllib
+from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from geomech.core.errors import SceneError
-from geomech.gaits import KINDS as GAITS
+from geomech.core.errors import named
 from geomech.gaits import Gait
+from geomech.scene.key import angles_of
 from geomech.scene.medium import with_files
-from geomech.scene.model import Scene, checked_scene
+from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
-from geomech.systems import KINDS as SYSTEMS
+from geomech.scene.sections import Each, Keys, Section, sections_of, variants
 from geomech.systems.base import Given
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
-from geomech.systems.swimmer import PARTS, Swimmer, name_in
+from geomech.systems.swimmer import Swimmer, name_in
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -31,11 +32,15 @@ def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
     which a medium that came from a file stands, and other files with their folders. SceneError if it has a part that no
     scene file can name."""
-    other = not isinstance(scene, Scene) and hasattr(scene, "tables")  # without a gait
-    whole = scene.text if other else checked_scene(scene).text and not (scene.files or _beside(scene.text))
-    if whole and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
+    alone = not isinstance(_checked(scene), Scene) or not (scene.files or _beside(scene.text))
+    if scene.text and alone and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
         return scene.text
-    return _text(scene.tables() if other else _anew(scene))
+    return _text(_anew(scene))
+
+
+def _checked(scene: Scene | Intruding | WalkerScene) -> Scene | Intruding | WalkerScene:
+    """Return a scene of any kind; ValueError if it is none."""
+    return scene if hasattr(type(scene), "example") else checked_scene(scene)
 
 
 def _beside(text: str) -> bool:
@@ -51,8 +56,8 @@ def table(name: str, values: dict) -> str:
 
 
 def gait_table(gait: Gait) -> dict:
-    """What stands in [gait]."""
-    return _of_kind(gait, "kind", GAITS)
+    """Return what stands in [gait]."""
+    return section(gait, sections_of(Scene)["gait"].section)
 
 
 def medium_toml(name: str, entry) -> str:
@@ -61,10 +66,10 @@ def medium_toml(name: str, entry) -> str:
     if entry.axial_stress is not None:
         lines.append(f"axial drag over projected area at 7.62 cm depth: {entry.axial_stress:g} Pa")
     angles = [
-        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in getattr(entry.medium, "angles", ())
+        f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in sorted(angles_of(type(entry.medium)))
     ]
     head = "".join(f"# {line}\n" for line in [*lines, *angles])
-    return head + table("medium", _of_kind(entry.medium, *PARTS["medium"]))
+    return head + table("medium", section(entry.medium, SWIMMER["medium"]))
 
 
 def vertical_toml(name: str, entry) -> str:
@@ -77,13 +82,13 @@ def vertical_toml(name: str, entry) -> str:
     return f"{head}# coefficients in N/cm^3, times zeta\n{table('medium', values)}"
 
 
-def tables(scene: Scene) -> dict:
-    """The tables of its text, with the numerics of now, where these make the scene; else those written anew."""
-    numerics = _numerics(checked_scene(scene))
-    if scene.text:
-        read = {**with_files(tomllib.loads(scene.text), scene.name)[0], "numerics": numerics}
-        if from_tables(read, scene.name, scene.text) == scene:
-            return read
+def tables(scene: Scene | Intruding | WalkerScene) -> dict:
+    """Return the tables of a scene's text, with the numerics of now, where these make the scene; else those written anew."""
+    read = tomllib.loads(_checked(scene).text)
+    if isinstance(scene, Scene):
+        read = {**with_files(read, scene.name)[0], "numerics": _numerics(scene)}
+    if scene.text and from_tables(read, scene.name, scene.text) == scene:
+        return read
     return _anew(scene)
 
 
@@ -91,57 +96,77 @@ def spelled_out(tables: dict, scene: Scene) -> dict:
     """The scene's tables with the law and its parameters in place of the name of its medium."""
     if "name" not in tables.get("medium", {}):
         return tables
-    return {**tables, "medium": _of_kind(scene.system.medium, *PARTS["medium"])}
+    return {**tables, "medium": section(scene.system.medium, SWIMMER["medium"])}
 
 
-def _anew(scene: Scene) -> dict:
-    system, out = _named(scene.system), {}
-    if isinstance(system, Swimmer):
-        out["medium"] = _of_kind(system.medium, *PARTS["medium"])
-        out["body"] = _of_kind(system.body, *PARTS["body"])
-        effects = [_of_kind(effect, *PARTS["effects"]) for effect in system.effects]
+def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
+    """Return the tables that a scene's parts make; SceneError if a file cannot name one of them."""
+    with named(scene.name):
+        out = {}
+        for name, (how, *_) in sections_of(type(scene)).items():
+            part = getattr(scene, name, scene)  # the scene itself where its own fields are keys
+            if table := section(_named(part), how):
+                out[name] = table
+        if isinstance(scene, Scene):
+            out = _short(out, scene)
+        if from_tables(out, scene.name) != scene:
+            raise ValueError("a part of this scene is of no kind that a scene file can name")
+        return out
+
+
+def section(part: Any, how: Section) -> Any:
+    """Return the table of a section, or the tables of one for each part; ValueError if no file can name the part."""
+    if isinstance(how, Each):
+        return [section(each, how.one) for each in part]
+    for variant in variants(how):
+        kind = getattr(variant.kind, "makes", variant.kind)
+        of_file = variant.columns and not variant.columns.rows
+        if (type(part) is kind and not of_file) or (isinstance(how, Keys) and how.within):
+            inner = {field: section(getattr(part, field), one) for field, one in variant.inner.items()}
+            return {**variant.named, **_fields(part, kind, inner), **inner}
+        if type(part) is kind or isinstance(how, Keys):
+            raise ValueError(
+                f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
+            )
+    told = f"a {name_in(how.kinds, part)} is of no kind that a scene file can name"
+    raise ValueError(f"{told}: use one of {', '.join(how.kinds)}")
+
+
+def _short(tables: dict, scene: Scene) -> dict:
+    """Return tables with a swimmer's parts in place of [system], and once what holds for the whole scene."""
+    system, effects = tables.pop("system"), []
+    if isinstance(_named(scene.system), Swimmer):
+        tables = {part: system[part] for part in SWIMMER if system[part]} | tables
+        effects = tables.get("effects", [])
     else:
-        out["system"], effects = _of_kind(system, "kind", SYSTEMS), []
-        out["system"].pop("solver", None)
-    for part in (out.get("body"), out.get("system")):
-        if part and "frame" in part:
-            del part["frame"]  # the scene's
+        tables = {"system": system} | tables
+    for part in ("body", "system"):
+        if "frame" in tables.get(part, {}):
+            del tables[part]["frame"]
             if scene.frame != "mean":
-                out = {"frame": scene.frame, **out}
-    out["gait"] = gait_table(scene.gait)
-    if "frequency" in out["gait"]:
+                tables = {"frame": scene.frame} | tables
+    if "frequency" in tables["gait"]:
         for effect in effects:
-            effect.pop("frequency", None)  # the gait's
-    out["numerics"] = _numerics(scene)
-    if effects:
-        out["effects"] = effects
-    if from_tables(out, scene.name) != scene:
-        raise SceneError(f"{scene.name}: a part of this scene is of no kind that a scene file can name")
-    return out
+            effect.pop("frequency", None)
+    return tables | {"numerics": _numerics(scene)}
 
 
-def _named(system):
+def _named(part: Any) -> Any:
     """Return the object inside a system that a scene file can name."""
-    if isinstance(system, Framed):
-        return _named(system.inner)
-    return system.given if isinstance(system, Given) else system
+    if isinstance(part, Framed):
+        return _named(part.inner)
+    return part.given if isinstance(part, Given) else part
 
 
 def _numerics(scene: Scene) -> dict:
-    return _fields(scene.numerics) | (_fields(solver_of(scene.system)) if solver_of(scene.system) else {})
+    parts = [scene.numerics, solver_of(scene.system)]
+    return {key: value for part in parts if part for key, value in _fields(part, type(part)).items()}
 
 
-def _of_kind(thing, key: str, kinds: dict) -> dict:
-    name = name_in(kinds, thing)
-    if name not in kinds:
-        raise SceneError(f"a {name} is of no kind that a scene file can name: use one of {', '.join(kinds)}")
-    return {key: name, **_fields(thing)}
-
-
-def _fields(thing) -> dict:
-    """Those that are told at construction and have a value."""
-    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return {k: _plain(v) for k, v in values.items() if v is not None}
+def _fields(part: Any, kind: type, but: Collection[str] = ()) -> dict:
+    """Return the fields of a class, as a file has them, that are told at construction and have a value."""
+    names = [f.name for f in dataclasses.fields(kind) if f.init and f.name not in {*but, "solver"}]
+    return {name: _plain(getattr(part, name)) for name in names if getattr(part, name) is not None}
 
 
 def _plain(value):

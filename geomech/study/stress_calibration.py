@@ -13,7 +13,7 @@ from geomech.core.errors import SceneError, named
 from geomech.io.rows import read as read_rows
 from geomech.scene import penetration
 from geomech.scene.drag import LARGEST_FILE
-from geomech.scene.intruder import plate_rows
+from geomech.scene.stress import plate_rows
 from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_stress, fit_zeta
 from rft.plates.survey import survey
 

@@ -7,7 +7,6 @@ import dataclasses
 import itertools
 import math
 import time
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +16,7 @@ import numpy as np
 from geomech.core.errors import SceneError, named
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
+from geomech.scene import write as written
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
 from geomech.study.cost import BASE, PILOT, Cost
@@ -220,8 +220,7 @@ def _grid(scene: WalkerScene, over: Mapping):
     total = math.prod(map(len, values.values()))
     if not 0 < total <= LARGEST:
         raise SceneError(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
-    read = tomllib.loads(scene.text)
-    tables = read if read and from_tables(read, scene.name, scene.text) == scene else scene.tables()
+    tables = written.tables(scene)
     points, at = Points(list(values.values())), _At(tables, scene, tuple(values))
     for k in {*range(0, points.total, max(1, points.total // 200)), points.total - 1}:
         at(points[k])

@@ -1,0 +1,205 @@
+"""The reader of scene files: tables, as TOML has them, become what a scene declares of its sections."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+
+from geomech.core.errors import SceneError, UnitWarning, choose, named
+from geomech.scene import slips
+from geomech.scene.columns import columns
+from geomech.scene.key import Key, spellings, words_of
+from geomech.scene.kinds import choose_kind
+from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
+from geomech.scene.sizes import Sizes
+
+FILES = ("file", "mjcf")  # keys that name a file, looked for from the folder of the scene's
+Made = TypeVar("Made")
+
+
+@dataclass
+class Source:
+    """A scene file as it is read. name: its own. example: a built-in scene that has all that is needed. files: those that it
+    names, which reading adds. sizes: given once for all its parts."""
+
+    name: str
+    example: str
+    files: list[str] = dataclasses.field(default_factory=list)
+    sizes: Sizes | None = None
+
+    @property
+    def cure(self) -> str:
+        return f"see 'geomech scenes --show {self.example}'"
+
+    def located(self, table: Mapping) -> dict:
+        """Return a table with its file, if it names one, looked for from the scene's folder, and noted."""
+        table = dict(table)
+        for key in FILES:
+            if isinstance(table.get(key), str):
+                table[key] = str(Path(self.name).absolute().parent / table[key])
+                self.files.append(table[key])
+        return table
+
+
+def read(scene: type[Made], tables: Mapping, name: str, text: str) -> Made:
+    """Return the scene of the tables of a TOML text; SceneError, which names the place, if they make none."""
+    source = Source(name, scene.example)
+    check(scene, tables, source)
+    with named(name):
+        return scene(**read_sections(scene, tables, source), name=name, text=text, files=tuple(source.files))
+
+
+def check(scene: type, tables: Mapping, source: Source) -> None:
+    """Raise SceneError unless the tables are those that a scene declares, and none is missing."""
+    declared = file_sections(scene)
+    for table in tables:
+        choose(f"{source.name}: table", table, declared)
+    for section, (how, required, instead) in declared.items():
+        if section in tables:
+            _check_form(source, section, tables[section], how)
+        elif required and instead not in tables:
+            raise SceneError(f"{source.name}: the table [{section}] is missing: add it, {source.cure}")
+
+
+def _check_form(source: Source, path: str, table: Any, how: Section | Key) -> None:
+    """Raise SceneError unless a table is one, or a list of tables where a section is one for each part."""
+    if isinstance(how, Each):
+        if not (isinstance(table, list) and all(isinstance(each, Mapping) for each in table)):
+            raise SceneError(f"{source.name}: {path} must be tables [[{path}]], one for each")
+    elif not isinstance(how, Key) and not isinstance(table, Mapping):
+        raise SceneError(f"{source.name}: {path} must be a table [{path}], got {type(table).__name__}: {source.cure}")
+
+
+def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any]:
+    """Return the fields of a scene that its sections make; those of a section that is left out have their defaults."""
+    parts = {}
+    for name, (how, *_) in sections_of(scene).items():
+        if name in tables:
+            part = read_section(source, name, tables[name], how)
+            parts |= part if isinstance(how, Keys) and how.spread else {name: part}
+    return parts
+
+
+def read_section(source: Source, path: str, table: Any, how: Section) -> Any:
+    """Return the part of a scene that a section makes. path: its name, after those of the sections that it is within."""
+    if isinstance(how, Each):
+        return tuple(read_section(source, f"[{path}]", each, how.one) for each in table)
+    place = f"{source.name}: [{path}]"
+    variant, table = _chosen(place, source.located(table), how)
+    if isinstance(how, OneOf) and how.sized and source.sizes:
+        table = source.sizes.fill(place, table, variant.kind)
+    told, inner = variant.told or _unnamed(how), {}
+    if variant.inner:
+        _check_keys(place, table, variant.kind, told)
+    for field, section in variant.inner.items():
+        within = field if variant.named.get("kind") == how.short else f"{path}.{field}"
+        if field in table:
+            _check_form(source, within, table[field], section)
+            inner[field] = read_section(source, within, table.pop(field), section)
+        elif not isinstance(section, Each):
+            raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
+    if variant.columns:
+        table = _from_columns(place, table, variant)
+    return build(place, table, variant.kind, inner, told)
+
+
+def _chosen(place: str, table: dict, how: Keys | OneOf) -> tuple[Variant, dict]:
+    """Return which of the classes a section names, and its other keys."""
+    if isinstance(how, Keys):
+        return Variant({}, how.kind), table
+    if how.key in table:
+        name = choose_kind(f"{place} {how.key}", table[how.key], how.kinds)
+        table = {key: value for key, value in table.items() if key != how.key}
+        if not isinstance(how.kinds[name], OneOf):
+            return variant_of(how, name), table
+        variant, table = _chosen(place, table, how.kinds[name])
+        return variant._replace(named={how.key: name} | dict(variant.named)), table
+    others = {dataclasses.fields(kind)[0].name: kind for kind in how.otherwise}
+    for key, kind in others.items():
+        if key in table:
+            return Variant({}, kind), table
+    instead = "".join(f", or {key}" for key in others)
+    raise SceneError(f"{place} has no {how.key!r}: add {how.key} = one of {', '.join(how.kinds)}{instead}")
+
+
+def _unnamed(how: Keys | OneOf) -> str:
+    return f"no {how.key!r}" if isinstance(how, OneOf) else ""
+
+
+def _from_columns(place: str, table: dict, variant: Variant) -> dict:
+    """Return the keys of a section with columns of its file in place of the file."""
+    wanted, meaning, optional, rows = variant.columns
+    if not rows and {*table} != {"file"}:
+        raise SceneError(f"{place}: {variant.told} takes 'file' and nothing else: a {meaning}")
+    if "file" not in table:
+        return table
+    if rows in table:
+        raise SceneError(f"{place}: {rows} are given twice: keep one of {rows} and file")
+    found = columns(place, table.pop("file"), wanted, optional)
+    if rows:
+        return table | {rows: np.stack([*found.values()], -1).tolist()}
+    return {key: values.tolist() for key, values in found.items()}
+
+
+def build(place: str, table: Mapping, kind: type[Made], inner: Mapping[str, Any] | None = None, told: str = "") -> Made:
+    """Return a part of a class, or what a form of its keys makes, from a table of keys; else SceneError.
+
+    inner: fields that are made already. told: how the table names the class."""
+    _check_keys(place, table, kind, told)
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        field, in_degrees = spellings(kind)[key]
+        if field in values:
+            both = [other for other in table if spellings(kind)[other][0] == field]
+            raise SceneError(f"{place}: {field} is given twice: keep one of {' and '.join(both)}")
+        values[field] = _radians(value) if in_degrees else value
+        if key == "gamma0_deg":
+            _check_degrees(f"{place} {key}", value)
+    for field, word in words_of(kind).items():
+        if field in values:
+            choose(f"{place} {field}", values[field], word.known)
+    if ways := getattr(kind, "ways", None):
+        ways.check(place, values)
+    if inner and not values:  # of types that a file cannot hold
+        return kind(**inner)
+    try:
+        made = msgspec.convert({**values, **(inner or {})}, kind)
+        return made.to_part(place, {*values}) if hasattr(kind, "to_part") else made
+    except SceneError:
+        raise
+    except (ValueError, OverflowError) as error:
+        reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
+        raise SceneError(f"{place} {reason}{slips.of_value(reason, table, kind)}") from None
+
+
+def _check_keys(place: str, table: Mapping, kind: type, told: str) -> None:
+    """Raise SceneError for a key that a class has not. told: how the table names the class."""
+    try:
+        for key in table:
+            choose(f"{place} key", key, spellings(kind))
+    except SceneError as error:
+        raise SceneError(f"{error}; it has {told}" if told else str(error)) from None
+
+
+def _check_degrees(place: str, value) -> None:
+    """UnitWarning for an angle of grains below a degree: measured ones are of ten to twenty."""
+    if isinstance(value, (int, float)) and 0 < value < 1:
+        told = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
+        warnings.warn(told, UnitWarning, stacklevel=2)
+
+
+def _radians(degrees):
+    """Numbers, and numbers in lists, from degrees; anything else as it is, to be refused for what it is."""
+    if isinstance(degrees, list):
+        return [_radians(x) for x in degrees]
+    if isinstance(degrees, (int, float)) and not isinstance(degrees, bool) and abs(degrees) < 1e300:
+        return math.radians(degrees)
+    return degrees

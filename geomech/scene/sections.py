@@ -1,0 +1,200 @@
+"""Declarations: which section of a scene file a field of a scene is, and what may stand in it.
+
+A scene is a dataclass whose fields say so in their annotations:
+
+    @dataclass(frozen=True)
+    class IntruderScene:
+        medium: Annotated[PlateStress, Keys(StressKeys)]
+        intruder: Annotated[Shape, OneOf(SHAPES)]
+        elements: Annotated[int, Within("numerics"), Number(1, 5000, "-", "of the outline", whole=True)] = 100
+        effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS))] = ()
+
+`reader`, `write`, `keys` and `schema` walk over these declarations. The keys of a section are the fields of a class, whose
+units, bounds and meanings stand there (`geomech.scene.key`). A class that is not itself the part, but a form of its keys,
+has a method ``to_part(place, given)`` that returns the part; given: the fields that the file gives.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, get_args, get_type_hints
+
+from geomech.core.errors import SceneError
+from geomech.scene.key import Key, keys_of, text_key
+
+
+class Columns(NamedTuple):
+    """Columns of a CSV file, ``key file``, that stand in place of the keys of a class, or as rows of numbers in place of one
+    key. wanted: names of the columns; optional: of those that may be left out. meaning: for lists of keys."""
+
+    wanted: tuple[str, ...]
+    meaning: str
+    optional: tuple[str, ...] = ()
+    rows: str = ""
+
+
+@dataclass(frozen=True)
+class Keys:
+    """A section whose keys are the fields of a class.
+
+    of: what the lists of keys say of whose section it is. spread: it makes a mapping of several fields of the scene.
+    within: its keys are fields of the scene itself.
+    """
+
+    kind: type
+    of: str = ""
+    spread: bool = False
+    within: bool = False
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """A section that names one of several classes by a key.
+
+    kinds: the classes by name; in place of a class another `OneOf` takes the section's other keys. key: that has the name.
+    otherwise: classes of sections without that key, each known by its first field. inner: sections within those of a kind,
+    by kind and field. columns: files that take the place of keys, by kind. sized: keys that the scene gives once for all its
+    parts are put in. short: the kind whose inner sections may stand alone, in place of the section. implied: names that a
+    file may leave out. of: as `Keys.of`. meaning: of the key, where other sections' lists of keys have the rest.
+    """
+
+    kinds: Mapping[str, Any]
+    key: str = "kind"
+    otherwise: tuple[type, ...] = ()
+    inner: Mapping[str, Mapping[str, Section]] = field(default_factory=dict)
+    columns: Mapping[str, Columns] = field(default_factory=dict)
+    sized: bool = False
+    short: str = ""
+    implied: tuple[str, ...] = ()
+    of: str = ""
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Each:
+    """A list of sections, one for each part."""
+
+    one: OneOf
+
+
+Section = Keys | OneOf | Each
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Keys of which a section may have one group or another.
+
+    groups: of each, the keys that it must have and those that it may have beside them. told: what to give.
+    """
+
+    groups: tuple[tuple[set[str], set[str]], ...]
+    told: str
+
+    @property
+    def keys(self) -> set[str]:
+        """All that some groups have and others have not."""
+        return set().union(*(needed | allowed for needed, allowed in self.groups))
+
+    def check(self, place: str, given: Collection[str]) -> None:
+        """Raise SceneError unless the keys given make one of the groups."""
+        own = self.keys & {*given}
+        if any(needed <= own <= needed | allowed for needed, allowed in self.groups):
+            return
+        lacking = [sorted(needed - own) for needed, allowed in self.groups if own <= needed | allowed]
+        told = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
+        raise SceneError(f"{place}{told}: {self.told}")
+
+
+class Within(NamedTuple):
+    """The field is a key of a section. of: as `Keys.of`."""
+
+    section: str
+    of: str = ""
+
+
+class Variant(NamedTuple):
+    """What a section may be: keys that name it, with their values, and the class of its other keys."""
+
+    named: Mapping[str, str]
+    kind: type
+    inner: Mapping[str, Section] = {}
+    columns: Columns | None = None
+    implied: bool = False
+
+    @property
+    def told(self) -> str:
+        return ", ".join(f'{key} = "{name}"' for key, name in self.named.items())
+
+
+class Declared(NamedTuple):
+    """A section of a file, or a key above all sections. required: it must be there, unless the section ``instead`` is."""
+
+    section: Section | Key
+    required: bool = False
+    instead: str = ""
+
+
+def variants(section: Keys | OneOf) -> Iterator[Variant]:
+    """Yield what a section may be."""
+    if isinstance(section, Keys):
+        yield Variant({}, section.kind)
+        return
+    for kind in section.otherwise:
+        yield Variant({}, kind)
+    for name, kind in section.kinds.items():
+        if isinstance(kind, OneOf):
+            for other in variants(kind):
+                yield other._replace(named={section.key: name} | dict(other.named))
+        else:
+            yield variant_of(section, name)
+
+
+def variant_of(section: OneOf, name: str) -> Variant:
+    """Return the variant of a section that a name stands for."""
+    more = section.inner.get(name, {}), section.columns.get(name), name in section.implied
+    return Variant({section.key: name}, section.kinds[name], *more)
+
+
+def keys_in(variant: Variant) -> list[Key]:
+    """Return the keys of a section, but for those that name it and those of sections within it."""
+    keys = [key for key in keys_of(variant.kind) if key.name not in variant.inner]
+    if not variant.columns:
+        return keys
+    file = text_key("file", variant.columns.meaning, required=not variant.columns.rows)
+    return [file, *keys] if variant.columns.rows else [file]
+
+
+@functools.cache
+def sections_of(scene: type) -> dict[str, Declared]:
+    """Return the sections that the fields of a scene declare, by name. Fields within one section make one, of a class of
+    their own."""
+    hints = get_type_hints(scene, include_extras=True)
+    found: dict[str, Declared] = {}
+    within: dict[Within, list] = {}
+    for part in dataclasses.fields(scene):
+        for mark in get_args(hints[part.name])[1:]:
+            if isinstance(mark, Section):
+                required = part.default is part.default_factory is dataclasses.MISSING
+                found[part.name] = Declared(mark, required)
+            elif isinstance(mark, Within):
+                within.setdefault(mark, []).append((part.name, hints[part.name], part.default))
+    for (name, of), keys in within.items():
+        methods = {"to_part": lambda self, place, given: vars(self)}
+        kind = dataclasses.make_dataclass(name.title(), keys, namespace=methods)
+        kind.__doc__ = ""  # in place of a signature
+        found[name] = Declared(Keys(kind, of, spread=True, within=True))
+    return found
+
+
+def file_sections(scene: type) -> dict[str, Declared]:
+    """Return the sections that a scene's file may have: those of its fields, those that may stand in place of another one,
+    and those that hold for the whole scene (``once``)."""
+    found: dict[str, Declared] = {}
+    for name, (how, required, _) in sections_of(scene).items():
+        parts = how.inner[how.short] if isinstance(how, OneOf) and how.short else {}
+        found |= {part: Declared(inner, not isinstance(inner, Each), name) for part, inner in parts.items()}
+        found[name] = Declared(how, required and not parts)
+    return found | {name: Declared(how) for name, how in getattr(scene, "once", {}).items()}

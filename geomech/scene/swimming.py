@@ -1,0 +1,89 @@
+"""How scenes with a gait are read: what their files say once for the whole scene, and in the short form of a swimmer."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+from geomech.core.errors import SceneError, choose, named
+from geomech.scene import reader
+from geomech.scene.frames import framed
+from geomech.scene.key import spellings
+from geomech.scene.medium import with_files
+from geomech.scene.model import SHORT, SWIMMER, Scene
+from geomech.scene.sizes import Sizes
+from geomech.systems import KINDS as SYSTEMS
+from geomech.systems.base import System
+from geomech.systems.capabilities import solver_of
+from geomech.systems.framed import NAME as FITTED
+from geomech.tiers.base import Numerics
+
+
+@dataclasses.dataclass(frozen=True)
+class NoSolver:
+    """The part of [numerics] of a system that has none."""
+
+
+def from_tables(tables: Mapping, name: str, text: str) -> Scene:
+    """Return the scene of the tables of a TOML text; SceneError if they make none."""
+    source = reader.Source(name, Scene.example)
+    reader.check(Scene, tables, source)
+    tables, fitted = _without_fitted(tables, name)
+    tables, files = with_files(tables, name)
+    source.sizes = Sizes(name, tables)
+    given = tables.get("numerics", {})
+    with named(name):
+        parts = reader.read_sections(Scene, {"gait": tables["gait"], "system": _system(tables, name)}, source)
+        source.sizes.all_used()
+        system, numerics = _with_numerics(parts["system"], given, f"{name}: [numerics]")
+        system = framed(system, numerics) if fitted else system
+        return Scene(system, parts["gait"], numerics, name, text, files)
+
+
+def _system(tables: Mapping, name: str) -> dict:
+    """Return the table of the system. [medium], [body] and [[effects]] are short for a swimmer, whose they may also be in
+    its own table."""
+    table = tables.get("system", {"kind": SHORT})
+    short, kind = {part: tables[part] for part in SWIMMER if part in tables}, table.get("kind")
+    if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
+        told = f"a {kind} takes no {sorted(short)[0]!r}: drop it, or the table [system]"
+        raise SceneError(f"{name}: {told}")
+    return short | dict(table)
+
+
+def _with_numerics(system: System, given: Mapping, place: str) -> tuple[System, Numerics]:
+    """Return a system with its part of [numerics], and the rest, which is the tiers'."""
+    own = NoSolver if (solver := solver_of(system)) is None else type(solver)
+    names = [field.name for kind in (Numerics, own) for field in dataclasses.fields(kind)]
+    of = {True: {}, False: {}}
+    for key, value in given.items():
+        if key not in spellings(Numerics) and key not in spellings(own):
+            choose(f"{place} key", key, names)
+        of[key in spellings(own)][key] = value
+    if of[True]:
+        system = system.with_solver(reader.build(place, of[True], own))
+    return system, reader.build(place, of[False], Numerics)
+
+
+def solvers() -> list[type]:
+    """Return the classes of keys in [numerics] that systems have beside those of the tiers."""
+    return [*dict.fromkeys(type(kind.solver) for kind in SYSTEMS.values() if getattr(kind, "solver", None))]
+
+
+def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
+    """Return the tables without the frame that is fitted to the whole system on the grid, and whether one asks for it: it
+    stands above all tables, in [body] or in [system], as any other."""
+    own, places = tables.get("frame"), []
+
+    def plain(place: str, table):
+        if not isinstance(table, Mapping) or table.get("frame") != FITTED:
+            return table
+        places.append(place)
+        return {k: v for k, v in table.items() if k != "frame"}
+
+    tables = {k: plain(k, v) if k in ("body", "system") else v for k, v in plain("", tables).items()}
+    if "body" in tables.get("system", {}):
+        tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
+    if places and own not in (None, FITTED):
+        raise SceneError(f"{name}: [{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}: keep one")
+    return tables, bool(places)
