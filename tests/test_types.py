@@ -176,7 +176,6 @@ def geometries(value):
     yield "method", lambda: Study(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
     yield "one shape", lambda: single(plain.system, value, [1, 0])
-    yield "nothing", lambda: plain.with_numerics(nonsense=value)
     for tier in (path, direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)

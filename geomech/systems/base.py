@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -90,17 +91,22 @@ class Given:
         number("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
             raise ValueError(f"traits must be Traits(...), got {short(self.traits)}")
+        if not _takes_two(self._velocity):
+            raise ValueError(f"the velocity of {self.kind} must take (alpha, alphadot)")
 
     @property
     def kind(self) -> str:
         return kind_of(self.given)
 
+    @property
+    def _velocity(self) -> Callable:
+        return getattr(self.given, "velocity", self.given)
+
     @cached_property
     def _batched(self) -> Callable:
         """The velocity for many shapes at once, whichever it takes."""
-        function = getattr(self.given, "velocity", self.given)
         alpha, rates = np.random.default_rng(0).normal(size=(2, 3, self.joints))
-        return in_batches(function, *np.broadcast_arrays(alpha[:, None], rates))
+        return in_batches(self._velocity, *np.broadcast_arrays(alpha[:, None], rates))
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         alpha, alphadot = np.broadcast_arrays(np.asarray(alpha, float), np.asarray(alphadot, float))
@@ -116,6 +122,16 @@ class Given:
     def capability(self, kind: type) -> Any:
         """Return the object given, if it has the ability."""
         return self.given if isinstance(self.given, kind) else None
+
+
+def _takes_two(function: Callable) -> bool:
+    try:
+        inspect.signature(function).bind(None, None)
+    except TypeError:
+        return False
+    except ValueError:  # it does not say what it takes
+        return True
+    return True
 
 
 def as_system(given: Any, joints: int | None = None) -> System:
