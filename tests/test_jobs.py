@@ -34,6 +34,7 @@ from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
 from rft.balance import backend
 from rft.effects import Effect
+from rft.laws import LAWS
 from rft.premise import Premise
 from rft.stepping import Stepping
 
@@ -528,7 +529,7 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
     """That of a law in a file of one's own, which a stopped command has used."""
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
-    laws = kinds.FAMILIES["geomech.media"].kinds
+    laws = LAWS
     monkeypatch.setitem(laws, "power-of-jobs", None)  # which is undone at the end
     del laws["power-of-jobs"]
     text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace("ratio = 2.0", "power = 1.0")

@@ -604,7 +604,7 @@ def test_endings_that_lie(made, tmp_path):
         ("a.mat", old, r"is a MATLAB 7.3 \(HDF5\) file"),
         ("a.mat", b"t,x,y\n1,2,3\n", "no MATLAB file"),
         ("a.nc", b"t,x,y\n1,2,3\n", "is no NetCDF file: write it anew"),
-        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .nc or .mat"),
+        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .mat or .nc"),
     ):
         (tmp_path / name).write_bytes(raw)
         with pytest.raises(SceneError, match=said):

@@ -113,7 +113,7 @@ def mechanics() -> list[Any]:
     cycle = Swimmer(sand, swimmer, (rft.EndCaps(radius=0.06),)).run(*Circle().cycle(32, [0.5]))
     steps = time_steps(sand, swimmer, np.zeros((8, 2)), np.ones((8, 2)), effects=[rft.Transient(0.1)], cycles=1)
     power: Array = work_done(sand, swimmer, [0.0, 0.1], [1.0, 0.0], [0.0, 0.0, 0.0]).power
-    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Cart().run(*Circle().cycle(8)).net
+    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Scene(Cart(), Circle()).cycle(phases=8).net
     media = (
         rft.CATALOGUE["coulomb"].medium.traction(1.0, 0.5),
         rft.Viscous(2.0).slopes(1.0, 2.0, 0.0),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from geomech import terminal
 from geomech.commands.options import check_outputs
 from geomech.core.errors import Note, SceneError, check_angle, named
-from geomech.systems.capabilities import stored
 
 if TYPE_CHECKING:
     from geomech.scene import Scene
@@ -52,6 +51,7 @@ def scene_with_gait(name: str | Scene) -> Scene:
 def loaded(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
     """The scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is given."""
     from geomech.scene import in_medium
+    from geomech.systems.capabilities import stored
 
     scene = scene_with_gait(name)
     own = stored(scene.system, "connection")
@@ -186,6 +186,8 @@ def _pair(text: str, joints: int) -> tuple[int, int]:
 def _held(scene, pair: tuple[int, int], angles: list[float] | None, alone: bool):
     """The shape through which the plane of a pair of joints goes. alone: angles may be those of the joints that it holds."""
     import numpy as np
+
+    from geomech.systems.capabilities import stored
 
     at, held = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not held:

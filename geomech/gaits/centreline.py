@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech.core.errors import Note, UnitWarning, number, short
 from geomech.gaits import frames, midline
-from geomech.geometry.gait import Gait
+from geomech.geometry.gait import GAITS, Gait
 from geomech.io.rows import LARGEST_NUMBER
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
@@ -24,6 +24,7 @@ BACKWARDS = 1.0  # rad of phase along the body, by which a wave surely runs from
 OFF = 0.05  # of a period, by which the frequency may contradict the file
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Centreline(Gait):
     """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude scales them.
@@ -56,6 +57,8 @@ class Centreline(Gait):
     20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close, or that
     repeats within the period. Noted: a wave that runs from tail to head, as of points that were given from the head.
     """
+
+    kind = "centreline"
 
     estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 

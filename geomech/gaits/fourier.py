@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.core.errors import number, short
-from geomech.geometry.gait import LARGEST, Gait, finite_array
+from geomech.geometry.gait import GAITS, LARGEST, Gait, finite_array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +40,15 @@ class Series(Gait):
         return np.cos(kt) @ (k * sin).T - np.sin(kt) @ (k * cos).T
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Circle(Series):
     """alpha = centre + amplitude (cos t, sin t): counter-clockwise.
 
     amplitude (rad): its radius.
     """
+
+    kind = "circle"
 
     angles = ("centre", "amplitude")
 
@@ -57,12 +60,15 @@ class Circle(Series):
         return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Ellipse(Series):
     """Counter-clockwise about its centre.
 
     semi_axes (rad): at amplitude 1. tilt (rad): by which the first is turned counter-clockwise from alpha_1.
     """
+
+    kind = "ellipse"
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
     tilt: float = 0.0
@@ -80,11 +86,14 @@ class Ellipse(Series):
         return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Butterfly(Series):
     """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
     (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
     at amplitude 1."""
+
+    kind = "butterfly"
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
@@ -92,12 +101,15 @@ class Butterfly(Series):
         return np.array([sum_cos, sum_cos]), np.array([difference_sin, -difference_sin])
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Fourier(Series):
     """A Fourier series of one's own.
 
     cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the row.
     """
+
+    kind = "fourier"
 
     cos: tuple[tuple[float, ...], ...]
     sin: tuple[tuple[float, ...], ...]

@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.core.errors import short
-from geomech.geometry.gait import Gait, finite_array
+from geomech.geometry.gait import GAITS, Gait, finite_array
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Points(Gait):
     """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
 
     points (rad): three rows of joint angles or more.
     """
+
+    kind = "points"
 
     points: tuple[tuple[float, ...], ...]
     angles = ("centre", "points")

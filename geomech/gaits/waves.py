@@ -8,9 +8,10 @@ import numpy as np
 
 from geomech.core.errors import number, real_array
 from geomech.gaits.fourier import Series
-from geomech.geometry.gait import LARGEST, Gait
+from geomech.geometry.gait import GAITS, LARGEST, Gait
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Wave(Series):
     """A travelling wave of joint angles: alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)), k = 1, 2 ... from
@@ -23,6 +24,8 @@ class Wave(Series):
     In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
     reverse.
     """
+
+    kind = "wave"
 
     amplitude: float = 0.5
     waves: float = 1.0
@@ -86,6 +89,7 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return p
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Sine(Gait):
     """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
@@ -96,6 +100,8 @@ class Sine(Gait):
 
     The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
     """
+
+    kind = "sine"
 
     amplitude: float = 0.2
     waves: float = 1.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.core.errors import is_whole, number, real_array, short
+from geomech.core.registry import Registry, subclasses
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 FASTEST = 1e4  # Hz, as of the effects that have a frequency
@@ -96,6 +97,9 @@ class Gait:
             raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {short(phases)}")
         t = 2 * np.pi * np.arange(phases) / phases
         return self.shape(t, amplitudes), self.rate(t, amplitudes)
+
+
+GAITS = Registry("geomech.gaits", "kind", "a gait", subclasses(Gait))
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:

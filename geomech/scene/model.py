@@ -28,11 +28,10 @@ FRAME = (
     "which the connection is smallest"
 )
 SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
-_kinds = {part: kinds for part, (_, kinds) in PARTS.items()}
 SWIMMER = {
-    "medium": OneOf(_kinds["medium"], "law", otherwise=(NamedMedium, MediumFile)),
-    "body": OneOf(_kinds["body"], sized=True),
-    "effects": Each(OneOf(_kinds["effects"], sized=True)),
+    "medium": OneOf(PARTS["medium"], "law", otherwise=(NamedMedium, MediumFile)),
+    "body": OneOf(PARTS["body"], sized=True),
+    "effects": Each(OneOf(PARTS["effects"], sized=True)),
 }
 
 

@@ -14,10 +14,10 @@ import msgspec
 import numpy as np
 
 from geomech.core.errors import SceneError, UnitWarning, choose, named
+from geomech.core.registry import Registry
 from geomech.scene import slips
 from geomech.scene.columns import columns
 from geomech.scene.key import Key, spellings, words_of
-from geomech.scene.kinds import choose_kind
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
 
@@ -111,12 +111,16 @@ def read_section(source: Source, path: str, table: Any, how: Section) -> Any:
     return build(place, table, variant.kind, inner, told)
 
 
+def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
+    return kinds.choose(place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
+
+
 def _chosen(place: str, table: dict, how: Keys | OneOf) -> tuple[Variant, dict]:
     """Return which of the classes a section names, and its other keys."""
     if isinstance(how, Keys):
         return Variant({}, how.kind), table
     if how.key in table:
-        name = choose_kind(f"{place} {how.key}", table[how.key], how.kinds)
+        name = _choose(f"{place} {how.key}", table[how.key], how.kinds)
         table = {key: value for key, value in table.items() if key != how.key}
         if not isinstance(how.kinds[name], OneOf):
             return variant_of(how, name), table

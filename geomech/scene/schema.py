@@ -8,8 +8,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from geomech.scene.key import Key, first, keys_of
-from geomech.scene.keys import SCENES, all_variants, group_of
-from geomech.scene.kinds import unloaded
+from geomech.scene.keys import SCENES, all_variants, registry_of
 from geomech.scene.sections import Declared, Each, OneOf, Section, Variant, Ways, file_sections, keys_in
 from geomech.scene.sizes import NOT_OF_THE_BODY, Physical
 from geomech.scene.solid import KINDS as SOLIDS
@@ -65,8 +64,8 @@ def _section(how: Section | Key) -> dict[str, Any]:
             one["properties"] |= other["properties"]
         return one
     found = [_variant(each, _shared(each) if how.sized else (), how.short) for each in all_variants(how)]
-    if group := group_of(how):  # the keys of what packages offer are known when it is loaded
-        for other in unloaded(group)[0]:
+    if (registry := registry_of(how)) is not None:  # the keys of what packages offer are known when it is loaded
+        for other in registry.unloaded()[0]:
             found.append({"type": "object", "properties": {how.key: {"const": other}}, "required": [how.key]})
     return {"anyOf" if len(how.implied) > 1 else "oneOf": found}
 

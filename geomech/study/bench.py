@@ -269,7 +269,8 @@ class Study(Faced):
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
         size = [self.scene.system.length, 1.0]  # estimates are in body lengths
-        for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
+        # The direct tier first: the others are checked with it.
+        for method in sorted(chosen, key=lambda m: chosen[m].exact, reverse=True):
             if chosen[method].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
                 reference, seconds[method] = timed(direct)

@@ -1,7 +1,8 @@
 """Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
 
+from geomech.core.registry import load_all
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Cycle, System, as_system, integrated
+from geomech.systems.base import SYSTEMS, Cycle, System, as_system, integrated
 from geomech.systems.capabilities import capability
 from geomech.systems.diff_drive import DifferentialDrive
 from geomech.systems.floating import FloatingChain
@@ -12,17 +13,12 @@ from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
 from rft.premise import Premise
 
-KINDS = {
-    "swimmer": Swimmer,
-    "no-slip-snake": NoSlipSnake,
-    "differential-drive": DifferentialDrive,
-    "ideal-fluid-swimmer": IdealFluidSwimmer,
-    "floating-chain": FloatingChain,
-    "table": Table,
-}
+load_all(__name__, __path__)
+KINDS = SYSTEMS
 
 __all__ = [
     "KINDS",
+    "SYSTEMS",
     "Cycle",
     "DifferentialDrive",
     "FloatingChain",

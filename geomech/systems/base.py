@@ -12,6 +12,7 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.errors import check_angle, number, short
+from geomech.core.registry import Registry, classes_with
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import evaluate, in_batches
@@ -162,6 +163,9 @@ def note_angles(system: System, largest: float) -> None:
     """UnitWarning if the largest of some shape variables is a joint angle beyond a full turn."""
     if system.traits.joint_angles:
         check_angle("a joint angle", largest)
+
+
+SYSTEMS = Registry("geomech.systems", "kind", "a system", classes_with("velocity"))
 
 
 def length_unit(system: System) -> str:

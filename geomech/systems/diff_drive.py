@@ -14,9 +14,10 @@ import numpy as np
 
 from geomech.core.errors import choose, number
 from geomech.geometry.traits import Traits
-from geomech.systems.base import integrated
+from geomech.systems.base import SYSTEMS, integrated
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class DifferentialDrive:
     """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.

@@ -10,9 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class FloatingChain(Momentum):
     """Links joined by hinges, with masses and moments of inertia of their own.

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from geomech.core.errors import number as checked
+from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class IdealFluidSwimmer(Momentum):
     """Elliptical links joined at their tips.

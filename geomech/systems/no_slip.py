@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from geomech.geometry.traits import Traits
-from geomech.systems.base import integrated
+from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.

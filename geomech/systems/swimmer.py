@@ -11,11 +11,12 @@ import numpy as np
 
 import rft
 from geomech.core.errors import short
+from geomech.core.registry import Registry, classes_with, subclasses
 from geomech.core.work import iterate
 from geomech.geometry.images import around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import Cycle, refuse_mutable
+from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
 from geomech.systems.capabilities import Drawable, Part, Stepped, Uncertain
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
@@ -31,11 +32,16 @@ from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
 from rft.stepping import Row, State, Stepping
 
-PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
+PARTS = {  # of a scene's tables
+    "medium": Registry("geomech.media", "law", "a law", classes_with("traction"), LAWS),
+    "body": Registry("geomech.bodies", "kind", "a body", classes_with("motion"), BODIES),
+    "effects": Registry("geomech.effects", "kind", "an effect", subclasses(rft.effects.Effect), EFFECTS),
+}
 RATES = Premise.RATE_INDEPENDENT
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class Swimmer:
     """A body in a medium, with the effects it is asked to have."""

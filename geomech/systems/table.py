@@ -20,7 +20,7 @@ from geomech.geometry.traits import Traits
 from geomech.geometry.tube import BEYOND, Tube
 from geomech.geometry.velocity import evaluate
 from geomech.io import tables
-from geomech.systems.base import integrated
+from geomech.systems.base import SYSTEMS, integrated
 from geomech.systems.capabilities import Dissipative, OwnMetric
 
 LENGTHS = (
@@ -28,6 +28,7 @@ LENGTHS = (
 )
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class Table:
     """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout.

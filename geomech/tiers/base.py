@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import number, real_array
+from geomech.core.registry import Registry
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import costed, near
@@ -135,6 +136,11 @@ class Tier:
         """Of its markers and error bars."""
         return self.markers or self.style["color"]
 
+    @property
+    def home(self) -> str:
+        """Module of its plan."""
+        return self.plan.__module__
+
     def refuse(self, system: System) -> None:
         """ValueError if it says nothing of this system."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
@@ -157,6 +163,9 @@ class Tier:
     def is_offered(self, system: System) -> bool:
         """Return whether it says something of this system, and takes no longer than others that say more."""
         return system.joints in self.offered and self.is_possible(system)
+
+
+TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))  # cheapest look-up first
 
 
 def solved(system: System, gait: Gait, phases: int) -> int:
