@@ -36,7 +36,7 @@ def compute(ladder=(80, 320, 1280, 5120, 20480, 327680)) -> dict:
     line = np.radians(np.arange(STEP / 2 - 90, 90, STEP))
     angles = np.stack(np.meshgrid(line, line, indexing="ij"))
     two = np.stack(VERTICAL["generic"].stress(*angles))
-    three = law.of_angles(*angles, 0.0)[..., [0, 2]] * [-1, 1] / Spatial(1.0).plate
+    three = law.alpha_of_angles(*angles, 0.0)[..., [0, 2]] * [-1, 1] / Spatial(1.0).plate
     return {
         "pictures": pictures,
         "errors": {(body, name): _errors(body, depth, ladder) for body in BODIES for name, depth in DEPTHS.items()},

@@ -46,7 +46,7 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
         robot = dataclasses.replace(scene.robot, pair=pair, mass=mass)
         one = walk(robot)
         some = one.t * scene.gait.frequency <= turns + 1e-9
-        paths[pair, mass] = turns / scene.gait.frequency, one.pose[some, 0], one.more["y"][some], going(robot)
+        paths[pair, mass] = turns / scene.gait.frequency, one.pose[some, 0], one.spatial["y"][some], going(robot)
     return {
         "slip": slip, "pulled": pulled, "pitch": np.array(pitches), "advance": advance, "tried": np.array(tried),
         "found": found, "paths": paths,

@@ -24,11 +24,11 @@ FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 
 
 def _course(steps: int):
     """Return the walk of Xplorer by so many steps a cycle, not begun yet."""
-    from rft.walking.mujoco_walk import Course
+    from rft.walking.mujoco_walk import Simulation
 
     scene = load("xplorer")
     walker = Walker(scene.robot, Tripod(FREQUENCY), scene.medium)
-    return Course(walker, dataclasses.replace(scene.numerics, steps=steps))
+    return Simulation(walker, dataclasses.replace(scene.numerics, steps=steps))
 
 
 def way(start, steps: int, how: str) -> float:

@@ -26,7 +26,9 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
     """Take one explicit step, of order 2, for comparison: no walk is computed so."""
 
     def slope(at: State, where: float):
-        a, motors, ground = robots.forces(at.pose[None], at.twist[None], *robots.turned(np.array([where]), of))
+        a, motors, ground = robots.accelerations(
+            at.pose[None], at.twist[None], *robots.leg_motion(np.array([where]), of)
+        )
         return State(at.twist, a[0], motors[0], ground[0], *np.zeros((3, 1)))
 
     first = slope(state, phase)
@@ -39,7 +41,7 @@ def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
     """Return the progress, m, and what the balance of energy leaves of the work, after some cycles from rest."""
     scene = load("xplorer")
     robots = _strides([Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics).robots
-    state = first = robots.placed()
+    state = first = robots.start()
     count = round(cycles * steps)
     for k in range(count):
         phase, dt = k / steps, 1 / (steps * frequency)

@@ -1,13 +1,13 @@
 """Drag on a straight element: averages over its length, and their slopes (paper Eqs. 2-3).
 
-An element slides along itself with speed v_t and across itself with u(s) = v_n + s v_w, s in [-1, 1] from its tail's
-end to its head's, so that v_w is its turning rate times its half length. The drag per unit length, positive along the
-velocity that it opposes, is averaged over s:
+An element slides along itself with speed v_t and across itself with u(s) = v_n + s v_w, s from -1 at its tail's end to
+1 at its head's, so that v_w is its rotation rate times its half length. The drag per unit length, positive where it
+opposes a positive velocity, is averaged over s:
 
     t = <f_t>,    n = <f_n>,    w = <s f_n>.
 
-A dry term is f_t = k_t v_t / R, f_n = k_n u / R with R = sqrt(A^2 + u^2), A^2 = q^2 v_t^2 + rounding^2. In granular
-media two of them are Eqs. 2-3. The values R1, R2 at the ends and S = R1 + R2 give the elliptic coordinates mu = 2 v_n /
+A dry term is f_t = k_t v_t / R, f_n = k_n u / R with R = sqrt(A^2 + u^2), A^2 = q^2 v_t^2 + rounding^2. Eqs. 2-3 are
+two dry terms (`rft.laws.granular`). The values R1, R2 at the ends and S = R1 + R2 give the elliptic coordinates mu = 2 v_n /
 S, t = 2 v_w / S, in which A^2 = S^2 (1 - mu^2) (1 - t^2) / 4, and every average is elementary in mu, t and k(t) =
 (atanh t - t) / t^3:
 
@@ -24,14 +24,17 @@ import numpy as np
 
 from rft.vectors import absolute, copysign, exp, formula, log_ratio, maximum, minimum, polynomial, sqrt, where
 
-TINY = 1e-300  # keeps 0/0 finite where the element is at rest; far below any speed that can matter
+TINY = 1e-300  # added to divisors, for an element at rest without rounding; far below any speed that can matter
 SERIES_BELOW = 1.0 / 9.0  # t^2 below which k is a polynomial; above it atanh t - t loses at most one digit
 
 
 def _series(count: int = 12) -> tuple[float, ...]:
     """Return the coefficients of k = sum_j t^2j / (2j + 3) in powers of t^2 below SERIES_BELOW, to 1e-17, at
     Chebyshev's points."""
-    k = lambda z: sum(z**j / (2 * j + 3) for j in range(40))
+
+    def k(t2):
+        return sum(t2**j / (2 * j + 3) for j in range(40))
+
     series = np.polynomial.Chebyshev.interpolate(k, count - 1, domain=[0.0, SERIES_BELOW])
     return tuple(map(float, series.convert(kind=np.polynomial.Polynomial).coef))
 
@@ -40,7 +43,7 @@ SERIES = _series()
 
 
 class Load(NamedTuple):
-    """Averages of the drag on an element, t along, n across and w across times s, each with its slopes in v_t, v_n and
+    """Averages of the drag on an element, t = <f_t>, n = <f_n>, w = <s f_n>, each followed by its slopes in v_t, v_n and
     v_w."""
 
     t: float
@@ -58,7 +61,7 @@ class Load(NamedTuple):
 
 
 @formula
-def added(x, y):
+def sum_loads(x, y):
     """Return the sum of two loads."""
     return Load(
         x.t + y.t, x.t_t + y.t_t, x.t_n + y.t_n, x.t_w + y.t_w,
@@ -110,7 +113,8 @@ def end_coordinates(v_t, v_n, v_w, rounding, q):
 
 @formula
 def k_function(t, one_minus_t2):
-    """Return k = (atanh t - t) / t^3, which is even in t; 1 - t^2 is passed for its digits near t = 1."""
+    """Return k = (atanh t - t) / t^3, which is even in t; 1 - t^2 is an argument, for a difference would lose digits near
+    t = 1."""
     z = t * t
     far = maximum(z, SERIES_BELOW)
     t = sqrt(far)
@@ -126,11 +130,11 @@ def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
     h, denominator = 1.0 - one_minus_t2 * k, one_minus_mu2 + mu * mu * one_minus_t2
     inverse = 1.0 / (denominator * one_minus_t2 + TINY)
     p = one_minus_t2 * inverse  # 1 / (1 - mu^2 t^2) = S^2 / (4 R1 R2)
-    square = two_over_S * two_over_S
-    cube = square * denominator * inverse  # (2 / S)^2 / (1 - t^2)
+    four_over_S2 = two_over_S * two_over_S
+    ratio = four_over_S2 * denominator * inverse  # (2 / S)^2 / (1 - t^2)
     mean_1_R = two_over_S * (1.0 + t * t * k)
-    mean_u_R3, mean_su_R3 = square * mu * p, cube * t * (one_minus_mu2 * p - h)
-    mean_1_R3 = cube * two_over_S * p
+    mean_u_R3, mean_su_R3 = four_over_S2 * mu * p, ratio * t * (one_minus_mu2 * p - h)
+    mean_1_R3 = ratio * two_over_S * p
     q2v = q * q * v_t
     normal = k_n * two_over_S * one_minus_mu2 * p
     cross = -normal * mu * t
@@ -142,11 +146,10 @@ def dry(v_t, v_n, v_w, rounding, q, k_t, k_n):
 
 
 @formula
-def point(v_t, v_n, rounding, terms):
-    """Return the load on a point of dry terms (q, k_t, k_n), rows of ``terms``, of a law turned to face along the
-    element.
+def dry_point(v_t, v_n, rounding, terms):
+    """Return the load of dry terms (q, k_t, k_n), the rows of ``terms``, on a point that faces along the element.
 
-    An end cap pushes grains along the body as its side does across, so v_t and v_n change places:
+    The end of a body pushes grains along the body as its side pushes them across, so that v_t and v_n are exchanged:
     f_t = k_n v_t / R and f_n = k_t v_n / R with R^2 = q^2 v_n^2 + v_t^2 + rounding^2.
     """
     zero = 0.0 * v_t
@@ -157,7 +160,7 @@ def point(v_t, v_n, rounding, terms):
         inverse = where(R2 > 0.0, 1.0, 0.0) / sqrt(where(R2 > 0.0, R2, 1.0))
         e_n, e_t, e = v_n * inverse, v_t * inverse, rounding * inverse
         mixed = e_n * e_t * inverse
-        load = added(load, Load(
+        load = sum_loads(load, Load(
             k_n * e_t, k_n * (q * e_n * (q * e_n) + e * e) * inverse, -k_n * q * q * mixed, zero,
             k_t * e_n, -k_t * mixed, k_t * (e_t * e_t + e * e) * inverse, zero,
             zero, zero, zero, zero,
@@ -165,22 +168,34 @@ def point(v_t, v_n, rounding, terms):
     return load
 
 
-# Additions and factors.
+# Additions to the law, and factors of its drag.
+
+
+class Additions(NamedTuple):
+    """Additions to the law that apply to a problem; the others are not computed.
+
+    factor: `Factor`. quadratic: drag with the square of the speed. memory: `Memory`. incline: `Incline`. momentum: the
+    rate of change of momentum, which is added to the sum over all elements."""
+
+    factor: bool
+    quadratic: bool
+    memory: bool
+    incline: bool
+    momentum: bool
 
 
 @formula
-def pivot_of(v_n, v_w):
-    """Return the place on an element where it does not move across, or -1; whether there is one; and u on its head's
-    side."""
+def find_pivot(v_n, v_w):
+    """Return the pivot s of an element, where u(s) = 0, or -1 without a pivot; whether there is one; and a number with
+    the sign of u on the head's side of it."""
     inside = absolute(v_w) > absolute(v_n)
     return where(inside, -v_n / where(inside, v_w, 1.0), -1.0), inside, where(inside, v_w, v_n)
 
 
 @formula
-def square(v_n, v_w, strength):
-    """Return the load of f_n = strength |u| u, the momentum of grains that are pushed away; exact on both sides of the
-    pivot."""
-    pivot, _, u_head = pivot_of(v_n, v_w)
+def quadratic_load(v_n, v_w, strength):
+    """Return the exact load of f_n = strength |u| u, the flux of momentum into grains that are pushed away."""
+    pivot, _, u_head = find_pivot(v_n, v_w)
     sign = where(u_head == 0.0, 0.0, copysign(strength, u_head))
     p2 = pivot * pivot
     s0, s1 = -sign * pivot, sign * (1.0 - p2) / 2.0  # averages of sign(u) s^k
@@ -194,7 +209,7 @@ def square(v_n, v_w, strength):
 
 
 class Factor(NamedTuple):
-    """Factors of the drag on an element: along it, where it slides forward or backward, and across it."""
+    """Factors of the drag on an element: of f_t where it slides forward and backward, and of f_n."""
 
     forward: float
     backward: float
@@ -202,8 +217,8 @@ class Factor(NamedTuple):
 
 
 @formula
-def multiplied(load, v_t, factor):
-    """Return a load times the factors of the drag."""
+def scaled_load(load, v_t, factor):
+    """Return a load with its averages along and across multiplied by the factors of the drag."""
     along, across = where(v_t >= 0.0, factor.forward, factor.backward), factor.across
     return Load(
         along * load.t, along * load.t_t, along * load.t_n, along * load.t_w,
@@ -213,115 +228,125 @@ def multiplied(load, v_t, factor):
 
 
 class Incline(NamedTuple):
-    """A ground that slopes, as an element meets it.
+    """Sloping ground under an element.
 
-    down_t, down_n: unit vector downhill, along and across the element. level: factor of the drag on motion that is not
-    downhill. weakened: what the factor loses straight downhill. weight: force downhill per unit length, of the body."""
+    down_t, down_n: unit vector downhill, along and across the element. level_factor: factor of the drag on motion that is
+    not downhill. downhill_loss: decrease of that factor straight downhill. weight: force of gravity downhill per unit
+    length of the body."""
 
     down_t: float
     down_n: float
-    level: float
-    weakened: float
+    level_factor: float
+    downhill_loss: float
     weight: float
 
 
 @formula
-def inclined(load, v, rounding, incline):
-    """Return a load where the drag is times level - weakened (v . down) / |v| downhill, by the velocity of the centre,
-    less the body's weight along the slope."""
-    down_t, down_n, level, weakened, weight = incline
+def inclined_load(load, v, rounding, incline):
+    """Return a load on a slope: the drag times level_factor - downhill_loss max(v . down, 0) / |v|, with v the velocity of
+    the element's centre, less the body's weight along the slope."""
+    down_t, down_n, level_factor, downhill_loss, weight = incline
     inverse = 1.0 / sqrt(v[0] * v[0] + v[1] * v[1] + rounding * rounding + TINY)
     down = down_t * v[0] + down_n * v[1]
-    lost = where(down > 0.0, weakened, 0.0) * inverse
-    weight = weight / sqrt(1.0 + rounding * rounding)  # where drag is viscous it would speed the body up beyond measure
-    factor, share = level - lost * down, down * inverse * inverse
-    by_t, by_n = lost * (share * v[0] - down_t), lost * (share * v[1] - down_n)
+    loss = where(down > 0.0, downhill_loss, 0.0) * inverse
+    # With wide rounding drag is viscous and weak, and the full weight would move the body at enormous speeds.
+    weight = weight / sqrt(1.0 + rounding * rounding)
+    factor, cosine = level_factor - loss * down, down * inverse * inverse  # the cosine over the speed
+    slope_t, slope_n = loss * (cosine * v[0] - down_t), loss * (cosine * v[1] - down_n)  # of the factor
     return Load(
-        factor * load.t - weight * down_t, factor * load.t_t + by_t * load.t, factor * load.t_n + by_n * load.t,
+        factor * load.t - weight * down_t, factor * load.t_t + slope_t * load.t, factor * load.t_n + slope_n * load.t,
         factor * load.t_w,
-        factor * load.n - weight * down_n, factor * load.n_t + by_t * load.n, factor * load.n_n + by_n * load.n,
+        factor * load.n - weight * down_n, factor * load.n_t + slope_t * load.n, factor * load.n_n + slope_n * load.n,
         factor * load.n_w,
-        factor * load.w, factor * load.w_t + by_t * load.w, factor * load.w_n + by_n * load.w, factor * load.w_w,
+        factor * load.w, factor * load.w_t + slope_t * load.w, factor * load.w_n + slope_n * load.w, factor * load.w_w,
     )  # fmt: skip
 
 
-# The ground's memory: each side of an element has a share of the drag across.
+# Memory of the ground: a share of the drag across for the left and the right side of each element.
 
 
 class Memory(NamedTuple):
-    """State of the ground beside an element.
+    """State of the ground on both sides of an element.
 
-    left, right: developed shares (0 to 1) of the drag on motion to either side. before: v_n one step earlier.
-    given_left, given_right: shares that earlier passes have left. dt: the step, rad, below 0 where no share develops.
-    rate: e-foldings of a share to a body length of travel."""
+    left, right: developed shares, 0 to 1, of the drag on motion to either side. v_n_before: v_n one step earlier.
+    intact_left, intact_right: shares, 0 to 1, of the drag in ground that earlier passes have disturbed. dt: the step,
+    rad; below 0 shares do not develop. rate: e-foldings of a share per body length of travel."""
 
     left: float
     right: float
-    before: float
-    given_left: float
-    given_right: float
+    v_n_before: float
+    intact_left: float
+    intact_right: float
     dt: float
     rate: float
 
 
 class Decay(NamedTuple):
-    """One step of a share: the parts of the share and of what it lacks that remain, and the slopes of both exponents in
-    ``now``."""
+    """Factors of a share over one step.
 
-    share_remains: float
-    lack_remains: float
-    back_slope: float
-    on_slope: float
+    share, deficit: of the share while the element moves away from its side, and of 1 - share while it moves towards it.
+    share_slope, deficit_slope: slopes of their negative logarithms in the velocity ``now``."""
+
+    share: float
+    deficit: float
+    share_slope: float
+    deficit_slope: float
 
 
 @formula
 def decay(before, now, dt, rate):
-    """Return the decay over a step in which the velocity to a side went evenly from ``before`` to ``now`` >= 0.
+    """Return the decay over a step in which the velocity towards a side changes linearly from ``before`` to ``now`` >= 0.
 
-    Where it went the other way before, the share first decays. With an infinite rate the share develops at once.
+    Where ``before`` is negative the share decays first. With an infinite rate the share develops at once.
     """
-    at_once, forth = rate == np.inf, before >= 0.0
+    instant, forward = rate == np.inf, before >= 0.0
     total = absolute(before) + now
     total = where(total == 0.0, 1.0, total)
     old, new = absolute(before) / total, now / total
-    back, on = where(forth, 0.0, old * old), where(forth, old + new, new * new)  # travels, over dt / 2 x total
-    growth = where(forth, 1.0, new * new + 2.0 * old * new)
-    step = where(at_once, 0.0, rate) * dt / 2.0
-    return Decay(exp(-step * total * back), where(at_once, 0.0, exp(-step * total * on)), step * back, step * growth)
+    # Travels away from the side and towards it, over total x dt / 2.
+    away, towards = where(forward, 0.0, old * old), where(forward, old + new, new * new)
+    towards_slope = where(forward, 1.0, new * new + 2.0 * old * new)
+    step = where(instant, 0.0, rate) * dt / 2.0
+    return Decay(
+        exp(-step * total * away),
+        where(instant, 0.0, exp(-step * total * towards)),
+        step * away,
+        step * towards_slope,
+    )
 
 
 @formula
-def developed(share, before, now, dt, rate):
-    """Return a share after such a step, and its slope in ``now``."""
-    share_remains, lack_remains, back_slope, on_slope = decay(before, now, dt, rate)
-    old = share * share_remains
-    return 1.0 - (1.0 - old) * lack_remains, lack_remains * (on_slope * (1.0 - old) + back_slope * old)
+def developed_share(share, before, now, dt, rate):
+    """Return a share after the step of `decay`, and its slope in ``now``."""
+    d = decay(before, now, dt, rate)
+    old = share * d.share
+    return 1.0 - (1.0 - old) * d.deficit, d.deficit * (d.deficit_slope * (1.0 - old) + d.share_slope * old)
 
 
 @formula
-def side_share(share, given, sign, v_n, v_w, memory):
-    """Return the share of the drag on the part that moves left (sign 1) or right (-1), and its slopes in v_n and
-    v_w."""
-    _, inside, _ = pivot_of(v_n, v_w)
+def side_share(share, intact, sign, v_n, v_w, memory):
+    """Return the share of the drag across on the part of an element that moves left (sign 1) or right (sign -1), and its
+    slopes in v_n and v_w."""
+    _, inside, _ = find_pivot(v_n, v_w)
     now = where(inside, 0.5 * (sign * v_n + absolute(v_w)), maximum(sign * v_n, 0.0))  # mean velocity of the part
-    value, slope = developed(share, sign * memory.before, now, memory.dt, memory.rate)
+    value, slope = developed_share(share, sign * memory.v_n_before, now, memory.dt, memory.rate)
     develops = memory.dt >= 0.0
-    value, slope = where(develops, given * value, given), where(develops, given * slope, 0.0)
+    value, slope = where(develops, intact * value, intact), where(develops, intact * slope, 0.0)
     return value, where(inside, 0.5, 1.0) * sign * slope, where(inside, copysign(0.5, v_w), 0.0) * slope
 
 
 @formula
-def chosen(condition, x, y):
+def select_triple(condition, x, y):
     """Return the triple x where the condition holds, y elsewhere."""
     return where(condition, x[0], y[0]), where(condition, x[1], y[1]), where(condition, x[2], y[2])
 
 
 @formula
-def part(law, v_t, v_n, v_w, rounding, low, high, share):
-    """Return the load of the part of an element from s = low to high, with its share (value, slopes) of the drag
-    across."""
+def part_load(law, v_t, v_n, v_w, rounding, low, high, share):
+    """Return the load of the part of an element from s = low to high, with a share of the drag across, given as (value,
+    slope in v_n, slope in v_w)."""
     value, by_n, by_w = share
-    c, h = 0.5 * (high + low), 0.5 * (high - low)
+    c, h = 0.5 * (high + low), 0.5 * (high - low)  # centre and half length of the part
     f = law.average(v_t, v_n + v_w * c, h * v_w, rounding)
     w, w_t, w_n, w_w = c * f.n + h * f.w, c * f.n_t + h * f.w_t, c * f.n_n + h * f.w_n, c * f.n_w + h * f.w_w
     return Load(
@@ -333,39 +358,40 @@ def part(law, v_t, v_n, v_w, rounding, low, high, share):
 
 
 @formula
-def sided(law, v_t, v_n, v_w, rounding, memory):
-    """Return the load of a law with a share of the drag across for each side.
+def two_sided_load(law, v_t, v_n, v_w, rounding, memory):
+    """Return the load of a law with a share of the drag across for each side of an element, split at its pivot.
 
-    The element is split at its pivot. There the drag across vanishes, so moving the pivot costs nothing, and the slopes
-    are those of the parts."""
-    pivot, _, u_head = pivot_of(v_n, v_w)
-    left = side_share(memory.left, memory.given_left, 1.0, v_n, v_w, memory)
-    right = side_share(memory.right, memory.given_right, -1.0, v_n, v_w, memory)
+    The drag across vanishes at the pivot, so that its motion does not contribute to the slopes."""
+    pivot, _, u_head = find_pivot(v_n, v_w)
+    left = side_share(memory.left, memory.intact_left, 1.0, v_n, v_w, memory)
+    right = side_share(memory.right, memory.intact_right, -1.0, v_n, v_w, memory)
     leftward = u_head > 0.0
-    head = part(law, v_t, v_n, v_w, rounding, pivot, 1.0, chosen(leftward, left, right))
-    tail = part(law, v_t, v_n, v_w, rounding, -1.0, pivot, chosen(leftward, right, left))
-    return added(head, tail)
+    head = part_load(law, v_t, v_n, v_w, rounding, pivot, 1.0, select_triple(leftward, left, right))
+    tail = part_load(law, v_t, v_n, v_w, rounding, -1.0, pivot, select_triple(leftward, right, left))
+    return sum_loads(head, tail)
 
 
 @formula
-def side_load(law, v, rounding, factor, incline, strength, memory, acts):
-    """Return the load on an element of the body's side.
+def side_load(law, v, rounding, factor, incline, strength, memory, additions):
+    """Return the load on an element of the body's sides at v = (v_t, v_n, v_w).
 
-    v: (v_t, v_n, v_w). strength: of the drag with the square of the speed. acts: whether factors, that drag, memory and
-    a slope act."""
+    strength: of the drag with the square of the speed. additions: `Additions`, those of the arguments that apply."""
     v_t, v_n, v_w = v
-    load = sided(law, v_t, v_n, v_w, rounding, memory) if acts[2] else law.average(v_t, v_n, v_w, rounding)
-    if acts[0]:
-        load = multiplied(load, v_t, factor)
-    if acts[3]:
-        load = inclined(load, v, rounding, incline)
-    if acts[1]:
-        load = added(load, square(v_n, v_w, strength))
+    if additions.memory:
+        load = two_sided_load(law, v_t, v_n, v_w, rounding, memory)
+    else:
+        load = law.average(v_t, v_n, v_w, rounding)
+    if additions.factor:
+        load = scaled_load(load, v_t, factor)
+    if additions.incline:
+        load = inclined_load(load, v, rounding, incline)
+    if additions.quadratic:
+        load = sum_loads(load, quadratic_load(v_n, v_w, strength))
     return load
 
 
 @formula
-def point_load(terms, v, rounding, factor, incline, acts):
-    """Return the load on a point fixed to the body, of dry terms turned to face along it."""
-    load = multiplied(point(v[0], v[1], rounding, terms), v[0], factor)
-    return inclined(load, v, rounding, incline) if acts[3] else load
+def point_load(terms, v, rounding, factor, incline, additions):
+    """Return the load on a point attached to the body, of dry terms (q, k_t, k_n) that face along the body."""
+    load = scaled_load(dry_point(v[0], v[1], rounding, terms), v[0], factor)
+    return inclined_load(load, v, rounding, incline) if additions.incline else load

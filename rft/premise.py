@@ -34,6 +34,6 @@ SHAPE_ALONE = (
 )  # a body velocity follows from shape alone
 
 
-def not_so(lacking: Premise) -> str:
+def negated(lacking: Premise) -> str:
     """ "not memoryless, not quasi-static": how something that lacks premises is told."""
     return ", ".join(f"not {word}" for word in lacking.words)

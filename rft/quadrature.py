@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from rft.link import TINY, Load, added
+from rft.link import TINY, Load, sum_loads
 from rft.vectors import formula, over_nodes, sqrt
 
 QUADRATURE = "gauss:24"  # in place of "exact" where a medium has no closed form
@@ -34,7 +34,7 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
         u_t, u_n = v_t + 0.0 * s, v_n + s * v_w
         (t, n), (tt, tn, nt, nn) = law.traction(u_t, u_n, rounding), law.slopes(u_t, u_n, rounding)
         k = w * s
-        load = added(load, over_nodes(Load(
+        load = sum_loads(load, over_nodes(Load(
             w * t, w * tt, w * tn, k * tn,
             w * n, w * nt, w * nn, k * nn,
             k * n, k * nt, k * nn, k * s * nn,

@@ -9,7 +9,7 @@ from pathlib import Path
 from geomech.core.errors import SceneError, UnitWarning
 from geomech.run.jobs import runner
 from rft.balance import backend
-from rft.threads import workers as threads
+from rft.threads import thread_count
 
 
 def doubled(by, x):
@@ -18,7 +18,7 @@ def doubled(by, x):
 
 def who(_, x):
     """What a worker is, and what it may take."""
-    return os.getpid(), threads(None, 100), backend._preferred.get(), runner().executor, x
+    return os.getpid(), thread_count(None, 100), backend._preferred.get(), runner().executor, x
 
 
 def meets(folder, x):

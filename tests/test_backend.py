@@ -143,8 +143,8 @@ def test_no_overflow_is_a_solution(size, solved_by, monkeypatch):
     """Whatever brought a descent there: a residual that is 0 because squares overflow, or nan, is none."""
     alpha, alphadot = (x.T for x in GAIT.cycle(8))
     assembly = assemble(GLASS, BODY)
-    problem = assembly.rescaled(assembly.at(alpha, alphadot), np.ones(8))
-    given = np.ones(8), balance.Accuracy(1e-6, 1e-10), assembly.law, assembly.points, solved_by, 1
+    problem = assembly.rescaled(assembly.problem(alpha, alphadot), np.ones(8))
+    given = np.ones(8), balance.Accuracy(1e-6, 1e-10), assembly.law, assembly.n_law_points, solved_by, 1
     assert (balance.solve(problem.take, *given).residual < 1e-10).all()
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(balance, name, ())
@@ -172,9 +172,9 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
     alpha, alphadot = rng.uniform(-2, 2, (300, 2)), rng.normal(size=(300, 2))
     some = rng.uniform(0.05, 1.0, (3, 300))
     effects = (
-        SkinFriction().having(forward=some[0], backward=some[1]),
-        TowedSled(1.0, 0.3).having(pull=some[2]),
-        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).having(strength=some[0]),
+        SkinFriction().with_parameters(forward=some[0], backward=some[1]),
+        TowedSled(1.0, 0.3).with_parameters(pull=some[2]),
+        GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=1.0).with_parameters(strength=some[0]),
     )
     plain, fast = (body_velocity(GLASS, BODY, alpha, alphadot, effects=effects, backend=b, threads=3) for b in BOTH)
     assert apart(plain, fast, alphadot, BODY).max() < 1e-10
@@ -298,7 +298,7 @@ class Softening(Effect):
 
     def apply(self, problem, site, past):
         share = self.travel / (self.travel + past)
-        return problem._replace(sides=problem.sides.multiplied(share, share, share))
+        return problem._replace(sides=problem.sides.with_factors(share, share, share))
 
     def after(self, problem, site, past, v):
         return 0.5 * past + site.dt * np.hypot(v[0], v[1])
@@ -315,7 +315,7 @@ class Turtle:
         turn = np.stack([0 * alphadot[0], alphadot[0], -alphadot[1]])
         half, shoulder = np.array([[0.3], [0.1], [0.1]]), np.array([[0.0], [0.3], [0.3]])
         arm = half * along * (shoulder > 0)
-        return Elements.of(along, shoulder + arm, 1j * turn * arm, turn, half)
+        return Elements.from_complex(along, shoulder + arm, 1j * turn * arm, turn, half)
 
 
 @pytest.mark.usefixtures("compiled_code")

@@ -9,8 +9,8 @@ from registry import BODIES, CLOSED, DRY, LINEAR, MEDIA
 from geomech import cli, symbolic
 from rft import Chain, Coulomb, EndCaps, GrainInertia, Granular, TowedSled, Viscous, body_velocity
 from rft.balance.arrays import nets, solve
-from rft.balance.newton import Descent, Limits, carried, plus, to_frame
-from rft.balance.path import _carried, _with_slope
+from rft.balance.newton import Descent, Limits, plus, to_element, to_frame
+from rft.balance.path import _to_elements, _with_slope
 from rft.balance.solver import QUICK
 from rft.contact import assemble, mapped
 from rft.laws.base import TermLaw
@@ -144,7 +144,7 @@ def test_stuck_is_slower_than_ten_times_the_regularisation():
     eps = 1e-3
     found = body_velocity(GLASS, THREE, alpha, alphadot, regularisation=eps)
     motion = THREE.motion(alpha.T, alphadot.T)
-    a, m, w = plus((motion.v_t, motion.v_n, motion.v_w), carried(motion, *found.xi.T))
+    a, m, w = plus((motion.v_t, motion.v_n, motion.v_w), to_element(motion, *found.xi.T))
     slowest = np.hypot(a, np.maximum(np.abs(m - w), np.abs(m + w))).min(0)
     stuck = found.status == "stuck"
     for low, high, wanted in ((5, 9.999, True), (10.001, 20, False), (20, 40, False)):
@@ -193,9 +193,9 @@ def test_the_slope_in_the_rounding(medium, cost):
     """d(net)/d(log eps), exactly or by a difference, against a wider one."""
     alpha, alphadot = (x.T for x in samples(THREE, 20))
     assembly = assemble(medium, THREE)
-    some, xi, eps = assembly.at(alpha, alphadot), np.full((3, 20), 0.1), np.full(20, 0.05)
+    some, xi, eps = assembly.problem(alpha, alphadot), np.full((3, 20), 0.1), np.full(20, 0.05)
     some = assembly.rescaled(some, np.full(20, 0.7))
-    v = some.sides.elements.v / 0.7 + _carried(some, xi)
+    v = some.sides.elements.v / 0.7 + _to_elements(some, xi)
     slope, evaluations = _with_slope(nets, some, xi, v, eps)[1:]
     up, down = (_with_slope(nets, some, xi, v, eps * np.exp(h))[0][:, 0] for h in (1e-4, -1e-4))
     np.testing.assert_allclose(slope, (up - down) / 2e-4, rtol=1e-4, atol=1e-6)
@@ -231,7 +231,7 @@ def test_curves_of_laws_that_know_speed(speed, loads, monkeypatch):
 def test_the_first_step_is_that_of_kinks_rounded_off_without_end(medium, effects, loads):
     """Of a wide rounding the first step from rest is the whole way: the balance is linear."""
     body = Chain((2, 1, 3), frame="link-1")
-    problem = assemble(medium, body, effects, loads).at(*(x.T.copy() for x in samples(body, 30)))
+    problem = assemble(medium, body, effects, loads).problem(*(x.T.copy() for x in samples(body, 30)))
     wide = 1e6
     xi, residual, evaluations, _ = solve(problem, Descent(wide, 0.5, 0.0, np.inf, 3.0), Limits(wide, 1e-11), None)
     assert (evaluations <= 2).all()
@@ -319,7 +319,7 @@ def test_yield_stress_and_viscosity_together(speed, loads):
     alpha, alphadot = np.array([0.5, -0.9]), speed * np.array([1.0, 0.4])
     solution = body_velocity(Mud(), Chain(), alpha, alphadot, loads=loads).checked()
     motion = Chain().motion(alpha[:, None], alphadot[:, None])
-    a, m, w = np.stack(plus((motion.v_t, motion.v_n, motion.v_w), carried(motion, *solution.xi[:, None])))[..., 0]
+    a, m, w = np.stack(plus((motion.v_t, motion.v_n, motion.v_w), to_element(motion, *solution.xi[:, None])))[..., 0]
     net = np.zeros(3)
     for k in range(3):
         at = lambda s: np.array(Mud().traction(a[k], m[k] + w[k] * s))

@@ -11,9 +11,10 @@ import rft
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier, Sine
+from geomech.geometry import connection
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
-from geomech.systems import Solver, Swimmer, base
+from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import in_frame
@@ -23,8 +24,8 @@ GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
 @pytest.fixture
 def fits(monkeypatch):
-    counts, fit = [], base.fit
-    monkeypatch.setattr(base, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
+    counts, fit = [], connection.fit
+    monkeypatch.setattr(connection, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
     return counts
 
 

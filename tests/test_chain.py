@@ -5,7 +5,7 @@ import pytest
 from registry import BODIES
 
 from rft import Chain
-from rft.balance.newton import carried, on_frame, to_frame
+from rft.balance.newton import element_net, to_element, to_frame
 from rft.link import Load
 
 
@@ -64,18 +64,18 @@ def test_carried_and_wrench_are_transposes():
     body, rng = BODIES["uneven"], np.random.default_rng(2)
     motion = body.motion(*rng.normal(size=(2, 2, 6)))
     xi, force = rng.normal(size=(3, 6)), rng.normal(size=(3, 3, 6))
-    power = sum(f * v for f, v in zip(force, carried(motion, *xi))).sum(0)
+    power = sum(f * v for f, v in zip(force, to_element(motion, *xi))).sum(0)
     np.testing.assert_allclose(power, (xi * np.stack(to_frame(motion, *force)).sum(1)).sum(0), rtol=1e-12)
     H = rng.normal(size=(3, 3, 3, 6))
     load = Load(*(x for row in range(3) for x in (force[row], *H[row])))
     v = rng.normal(size=(3, 3, 6))
-    net = on_frame(motion, load, v, 0.7)
+    net = element_net(motion, load, v, 0.7)
     wrench = lambda f: np.stack(to_frame(motion, *(motion.weight * f))).sum(1)
     tangent = lambda v: wrench(np.einsum("ijnb,jnb->inb", H, np.stack(np.broadcast_arrays(*v, motion.c)[:3])))
     total = lambda triple: np.stack(triple).sum(1)
     np.testing.assert_allclose(total(net.force), wrench(force), rtol=1e-12)
     for column, unit in zip(net[1:4], np.eye(3)):
-        np.testing.assert_allclose(total(column), 0.7 * tangent(carried(motion, *unit)), rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(total(column), 0.7 * tangent(to_element(motion, *unit)), rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(total(net.drift), 0.7 * tangent(v), rtol=1e-10, atol=1e-12)
 
 

@@ -1,15 +1,18 @@
 """Large requests: foretold, refused without --yes, stopped at once, kept as far as they got, and bounded in memory."""
 
 import contextlib
+import dataclasses
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
+import tasks
 from scipy.io import netcdf_file
 from test_cli import geomech as run
 
@@ -19,10 +22,13 @@ from geomech.core.errors import SceneError
 from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
 from geomech.output import plots
-from geomech.study import accuracy, cost, estimate, sweep
+from geomech.run import cost as run_cost
+from geomech.run import jobs
+from geomech.study import accuracy, cost, effort, estimate, motion, sweep
 from geomech.study.bench import Study
-from rft.balance import solver as balance
-from rft.effects import SkinFriction
+from rft.balance.backend import preferring
+from rft.balance.listening import listener, listening, nobody
+from rft.effects import SkinFriction, Slope
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -38,81 +44,195 @@ FIVE = scenes.parse(FIVE_LINKS)
 
 
 @pytest.fixture
-def solved(monkeypatch):
-    """Counts the force balances that are solved; those of a body in other pieces by the share of its elements."""
-    counts, elements, solve = [], [], balance.solve
-
-    def counting(problem_at, speed, *args, **kwargs):
-        elements.append(len(problem_at(np.arange(1)).sides.station))
-        counts.append(speed.size * elements[-1] / elements[0])
-        return solve(problem_at, speed, *args, **kwargs)
-
-    for module in ("rft.stepping", "rft.balance.velocity"):
-        monkeypatch.setattr(f"{module}.solve", counting)
-    return counts
+def solved():
+    """Counts the force balances that are solved."""
+    counts = []
+    with listening(lambda samples, points, linear: counts.append(samples)):
+        yield counts
 
 
-@pytest.mark.parametrize(
-    ("scene", "methods"),
-    [
-        (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
-        (GLASS.with_numerics(grid=9, phases=40), ("path",)),
-        (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
-        (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
-        (FIVE.with_numerics(grid=4, directions=16), ("path",)),
-        (VISCOUS, ("area", "path", "harmonic", "direct")),
-        (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
-        (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
-    ],
-)
-def test_the_balances_foretold_are_those_solved(scene, methods, solved):
+SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
+SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
+FOUND = {
+    "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
+    "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
+    "errors alone": (GLASS.with_numerics(grid=9, phases=40), ("path",)),
+    "a family": (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
+    "four joints": (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
+    "four joints, errors alone": (FIVE.with_numerics(grid=4, directions=16), ("path",)),
+    "around the gait": (FIVE.with_numerics(grid=15, directions=16, phases=16), ("area", "path", "direct")),
+    "linear": (VISCOUS, ("area", "path", "harmonic", "direct")),
+    "by a rule": (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
+    "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
+    "a backbone": (SNAKE, ("direct",)),
+    "a frame": (Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene, ("harmonic", "direct")),
+    "time stepping": (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
+    "place": (GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32), ("direct",)),
+}
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_the_balances_foretold_are_those_solved(name, solved):
+    scene, methods = FOUND[name]
     foretold = Study(scene).cost([0.1, 0.2, 0.3], methods).balances
-    solved.clear()  # of a pilot
     Study(scene).study([0.1, 0.2, 0.3], methods)
-    assert foretold == pytest.approx(sum(solved), rel=0.02)  # half of a grid, and its middle
+    assert foretold == sum(solved)
 
 
-@pytest.mark.parametrize("scene", [GLASS, SLOPING.with_numerics(cycles=3)])
-def test_a_pilot_tells_what_a_balance_takes(scene, solved, monkeypatch):
-    """By a clock on which every balance takes a tenth of a millisecond."""
-    monkeypatch.setattr(cost.time, "process_time", lambda: 1e-4 * sum(solved))
-    foretold = cost.price(cost.direct(scene, scene.gait, 3000, 256))
-    assert foretold.balances == pytest.approx(3000 * (65 + 17 if scene is GLASS else 256 * 3 * 3.375), abs=1)
-    assert foretold.seconds == pytest.approx(1e-4 * foretold.balances, rel=0.05)
-    assert 0 < sum(solved) < foretold.balances / 50
+@pytest.mark.parametrize("scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)])
+def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
+    foretold = cost.price(cost.of_effort(scene, 3)).balances
+    effort.effort(scene, None, [0.1, 0.2, 0.3])
+    assert foretold == sum(solved)
+
+
+PLACE = FOUND["place"][0]
+
+
+@pytest.mark.parametrize(("scene", "cycles"), [(GLASS, 3), (PLACE, 3), (PLACE.with_numerics(cycles=2), 2)])
+def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
+    foretold = motion.cost(scene, cycles).balances
+    motion.motion(scene, cycles)
+    assert foretold == sum(solved)
+
+
+TABLES = {
+    "connection": (cost.connection, lambda study: study.fitted),
+    "harmonics": (cost.harmonics, lambda study: study.compute_harmonics()),
+    "metric": (cost.of_metric, lambda study: study.metric),
+    "even part": (cost.of_even_part, lambda study: study.even_part),
+    "plane": (lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]), lambda study: study.plane((0, 1))),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("grid", [7, 8])
+@pytest.mark.parametrize("scene", [GLASS, VISCOUS, SKIN])
+def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
+    scene, (jobs, compute) = scene.with_numerics(grid=grid), TABLES[name]
+    study = Study(scene)
+    if name == "even part":
+        study.compute_field()  # on whose grid it is
+    if name == "metric" and effort.why_none(scene.system):
+        pytest.skip("it has none")
     solved.clear()
-    assert cost.price(cost.direct(scene.with_numerics(cycles=1), scene.gait, 1, 32)).seconds < 1.0
-    assert not solved  # too small for a pilot
-
-
-def test_what_is_not_tried_is_not_taken_for_less(monkeypatch):
-    """NumPy takes 1e-5 s and more for each element in sand: a field of 200 x 200 is worth a pilot, and what is not is told
-    within a few times of what it takes."""
-    tried = []
-    monkeypatch.setattr(cost, "_grown", lambda f, samples, most: tried.append(f) or 0.0)
-    cost.price(cost.connection(GLASS.with_numerics(grid=200)))
-    assert len(tried) == 1
-    small = GLASS.with_numerics(grid=60)
-    told = cost.price(cost.connection(small))
-    assert len(tried) == 1
-    rng = np.random.default_rng(0)
-    start = time.process_time()
-    small.system.sample(rng.uniform(-2, 2, (4000, 2)), rng.normal(size=(4000, 2)))
-    took = (time.process_time() - start) / 4000 * told.balances
-    assert told.seconds > took / 4
+    compute(study)
+    assert sum(solved) == cost.price(jobs(scene)).balances
 
 
 def test_accuracy_and_sweep_say_what_they_cost(solved):
     scene = VISCOUS.with_numerics(grid=5)
     foretold = accuracy.cost(scene).balances
-    solved.clear()
     accuracy.study(scene)
-    assert foretold == pytest.approx(sum(solved), rel=0.02)
-    over = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
-    foretold = sweep.cost(VISCOUS, over).balances
-    solved.clear()
-    sweep.sweep(VISCOUS, over)
     assert foretold == sum(solved)
+    media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
+    for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
+        foretold = sweep.cost(scene, over).balances
+        solved.clear()
+        sweep.sweep(scene, over)
+        assert foretold == sum(solved)
+
+
+def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
+    """Ten times as many places, or batches, take ten times as long; a linear medium takes a tenth."""
+    with preferring("numpy"):
+        one, places, batches = (
+            run_cost.assumed(*x) for x in ((1e6, 3, False, 0), (1e6, 30, False, 0), (0, 0, False, 1e3))
+        )
+        assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
+        assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
+    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (100, 1000))  # each medium is a batch
+    assert sweep.cost(VISCOUS, many).seconds == pytest.approx(10 * sweep.cost(VISCOUS, few).seconds, rel=0.01)
+    together = {"medium.ratio": many["medium.ratio"][:100], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
+    assert sweep.cost(VISCOUS, together).seconds < 0.4 * sweep.cost(VISCOUS, many).seconds
+
+
+class Clock:
+    """Computing time that passes as a request says it does."""
+
+    def __init__(self, monkeypatch):
+        self.now = 0.0
+        monkeypatch.setattr(run_cost.time, "process_time", lambda: self.now)
+
+    def solve(self, seconds, samples=1000, count=1):
+        """Batches that take so long each."""
+        for _ in range(count):
+            self.now += seconds
+            listener()(samples, 3, False)
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    with listening(nobody), preferring("numpy"):
+        yield Clock(monkeypatch)
+
+
+BATCH = 1000 * 3 * run_cost.BALANCE["numpy"] + run_cost.BATCH["numpy"]  # s that one is assumed to take
+
+
+@pytest.mark.parametrize("factor", [0.1, 1.0, 3.0])
+def test_the_first_batches_tell_what_the_others_take(factor, clock):
+    """The very first one, and one that is far off, have loaded code."""
+    judged = []
+    run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8, 1.0), judged.append)
+    assert run_cost.is_undecided()
+    clock.solve(9.0)
+    clock.solve(factor * BATCH)
+    clock.solve(25 * factor * BATCH)
+    assert judged == []
+    clock.solve(factor * BATCH, count=500)
+    (told,) = judged
+    assert told.seconds == pytest.approx(1 + factor * 30) and not run_cost.is_undecided()
+    assert (told.balances, told.memory) == (10**6, 1e8)
+
+
+@pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 700.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
+def test_what_is_sure_is_decided_at_once(cost, clock):
+    """Little, very much, much memory, or much that is no balances."""
+    judged = []
+    run_cost.decide(run_cost.Cost(*cost), judged.append)
+    assert judged == [run_cost.Cost(*cost)] and not run_cost.is_undecided()
+
+
+class Others:
+    """Who begin at once, and are given what they compute."""
+
+    remote, patience = True, None
+
+    def __init__(self):
+        self.given = 0
+
+    def submit(self, task, *arguments):
+        assert not run_cost.is_undecided()
+        self.given, future = self.given + 1, Future()
+        future.set_result(task(*arguments))
+        return future
+
+    def ahead(self):
+        return 1
+
+
+def test_others_compute_once_it_is_decided(clock):
+    others, found = Others(), []
+    run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), lambda told: None)
+    with jobs.running(dataclasses.replace(jobs.runner(), executor=others)):
+        for x in jobs.runner().map(tasks.doubled, 2.0, range(8), 8):
+            found.append(x)
+            clock.solve(1.0)
+    assert found == [2.0 * x for x in range(8)] and others.given == 8 - 1 - run_cost.FEWEST
+
+
+def test_what_is_refused_leaves_nothing(tmp_path, clock):
+    def refused():
+        with jobs.storing(tmp_path / ".a.partial", keep=True) as runner:
+            runner.store.put(b"key", 1.0, float)
+            runner.store.commit()
+            run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8), lambda told: told.check("here", False))
+            clock.solve(1.0, count=9)
+
+    with pytest.raises(SceneError, match="here: 1,000,000 force balances, about"):
+        refused()
+    assert list(tmp_path.iterdir()) == []
 
 
 LARGE = {
@@ -120,7 +240,7 @@ LARGE = {
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
-    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:999", "--methods", "path"],
+    "a connection around a gait": ["displacement", "five.toml", "--amplitudes", "0.1:0.5:2999", "--methods", "path"],
     "a map": ["ccf", "directions.toml", "--grid", "301", "--plot", "out.png"],
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
@@ -146,7 +266,7 @@ def large(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", [n for n in LARGE if n not in ("accuracy", "phases")])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
-    monkeypatch.setattr(cost, "PILOT", 0.005)  # what is refused is far beyond what may be
+    monkeypatch.setattr(run_cost, "ENOUGH", 0.05)  # what is refused is far beyond what may be
     before = sorted(p.name for p in large.iterdir())
     code, out, err = run(*LARGE[name])
     assert (code, out) == (2, "")
@@ -157,8 +277,8 @@ def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
 
 
 def test_yes_computes_and_says_what_is_to_come(large, monkeypatch):
-    monkeypatch.setattr(cost, "LONGEST", 0.0)
-    monkeypatch.setattr(cost, "WORTH_SAYING", 0.0)
+    monkeypatch.setattr(run_cost, "LONGEST", 0.0)
+    monkeypatch.setattr(run_cost, "WORTH_SAYING", 0.0)
     args = ["displacement", "three-link-viscous", "--amplitudes", "1", "--methods", "direct", "--json"]
     assert run(*args)[0] == 2
     code, out, err = run(*args, "--yes")
@@ -174,7 +294,7 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     monkeypatch.setattr("geomech.commands.asked.WORTH_SAYING", 0.0)
     code, out, err = run("connection", "five.toml", "--grid", "4", "--extent", "1.2", "-o", "out.nc")
     assert (code, out) == (0, "")
-    assert err.startswith("five.toml: 8,192 force balances, about 1 s of computing and 16")
+    assert err.startswith("five.toml: 8,704 force balances, about 1 s of computing and 16")
     with netcdf_file(large / "out.nc", mmap=False) as file:
         A, axes = file.variables["A"][:].copy(), [file.variables[f"alpha_{k}"][:].copy() for k in (1, 2, 3, 4)]
         assert file.variables["A"].dimensions == ("component", "joint", "alpha_1", "alpha_2", "alpha_3", "alpha_4")
@@ -184,33 +304,13 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("over", "batches"),
-    [
-        ({"medium.ratio": 3, "effects.skin-friction.backward": 5}, 0),  # as many as are taken for nothing
-        ({"medium.ratio": 40}, 40),
-        ({"medium.ratio": 25, "gait.amplitude": 4}, 25),
-        ({"effects.skin-friction.backward": 660}, 10.3),
-        ({"effects.skin-friction.forward": 10, "medium.ratio": 65}, 650),
-        ({"medium.ratio": 16, "effects.skin-friction.forward": 64}, 16),
-    ],
-    ids=lambda x: str(x),
-)
-def test_what_does_not_share_a_batch_is_counted(over, batches, monkeypatch):
-    """A sweep of media takes ten times what their balances do: each is a batch, which takes its 100 s here."""
-    monkeypatch.setattr(sweep, "_of_a_batch", lambda at, part: 100.0)
-    scene = VISCOUS.changed(effects=(SkinFriction(0.8, 1.2, 1.0),))
-    values = {k: np.linspace(0.5, 1.0, n).tolist() for k, n in over.items()}
-    assert sweep.cost(scene, values).seconds == pytest.approx(100 * batches, abs=20)
-
-
 def test_a_cost_reads_well():
-    assert str(cost.Cost(1_000_000, 90.0, 2.1e9)) == (
+    assert str(run_cost.Cost(1_000_000, 90.0, 2.1e9)) == (
         "1,000,000 force balances, about 1.5 min of computing and 2.1 GB of memory"
     )
-    assert "about 14 h" in str(cost.Cost(1, 5e4, 0)) and "about 116 days" in str(cost.Cost(1, 1e7, 0))
-    cost.Cost(1, 59.0, 1.9e9).check("here", False)
-    for beyond in (cost.Cost(1, 61.0, 1.0), cost.Cost(1, 1.0, 2.1e9)):
+    assert "about 14 h" in str(run_cost.Cost(1, 5e4, 0)) and "about 116 days" in str(run_cost.Cost(1, 1e7, 0))
+    run_cost.Cost(1, 59.0, 1.9e9).check("here", False)
+    for beyond in (run_cost.Cost(1, 61.0, 1.0), run_cost.Cost(1, 1.0, 2.1e9)):
         beyond.check("here", True)
         with pytest.raises(SceneError, match="here: 1 force balances"):
             beyond.check("here", False)
@@ -229,8 +329,8 @@ def test_pieces_change_no_numbers(monkeypatch):
         return [*tiers, *fields, marched, *estimate.direct(scene, scene.gait, amplitudes, 32)]
 
     whole = everything()
-    monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
-    monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.capabilities.STEPPED_TOGETHER", 1)
     for module in (
         connection,
         *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "geometry.family")),
@@ -419,7 +519,7 @@ def test_memory_stays_below_what_was_said(args, large):
     done = subprocess.run([sys.executable, "-c", code, *args, "--yes"], capture_output=True, text=True)
     used = int(done.stderr.splitlines()[-1])
     assert done.returncode == 0
-    assert used < cost.LARGEST
+    assert used < run_cost.LARGEST
 
 
 @pytest.mark.soak

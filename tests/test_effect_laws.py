@@ -31,9 +31,18 @@ from rft import (
 from rft.bodies.pieces import Pieces, subdivide
 from rft.contact import assemble
 from rft.effects.base import Site
-from rft.effects.transient import sides
+from rft.effects.transient import part_velocities
 from rft.laws.records import record
-from rft.link import Factor, Incline, Memory, developed, inclined, multiplied, sided, square
+from rft.link import (
+    Factor,
+    Incline,
+    Memory,
+    developed_share,
+    inclined_load,
+    quadratic_load,
+    scaled_load,
+    two_sided_load,
+)
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 
@@ -69,7 +78,7 @@ def test_skin_friction_scales_the_drag_along_by_the_way_it_slides():
     skin = SkinFriction(forward=0.12, backward=0.31, reference=0.25)
     factor = straight((skin,)).sides.factor
     plain = record(GLASS).average(a, m, w, 1e-3)
-    found = as_array(multiplied(plain, a, Factor(*(np.ravel(x) for x in factor))), a)
+    found = as_array(scaled_load(plain, a, Factor(*(np.ravel(x) for x in factor))), a)
     without = as_array(plain, a)
     np.testing.assert_allclose(found[0], without[0] * np.where(a > 0, 0.12, 0.31) / 0.25, rtol=1e-14)
     np.testing.assert_array_equal(found[1:], without[1:])
@@ -87,7 +96,7 @@ def test_squared_speed_is_integrated_exactly():
         u = m + w * s
         part = np.array([np.abs(u) * u, s * np.abs(u) * u])
         exact += (weight[:, None] * part).sum(1) * (high - low) / 4
-    squared_speed_load = lambda m, w: as_array(square(m, w, 1.0), m)[1:]
+    squared_speed_load = lambda m, w: as_array(quadratic_load(m, w, 1.0), m)[1:]
     got = squared_speed_load(m, w)
     np.testing.assert_allclose(got[:, 0], exact, atol=1e-14)
     h = 1e-6
@@ -108,7 +117,7 @@ def test_sides_are_parts_of_the_whole():
     eps, load = np.full(50, 1e-3), element_load(GLASS)
 
     def side(share):
-        return lambda a, m, w, eps: as_array(sided(record(GLASS), a, m, w, eps, given(share, 1 - share)), a)
+        return lambda a, m, w, eps: as_array(two_sided_load(record(GLASS), a, m, w, eps, given(share, 1 - share)), a)
 
     left, right = (side(share)(a, m, w, eps) for share in (1.0, 0.0))
     np.testing.assert_allclose((left + right)[1:], load(a, m, w, eps)[1:], atol=1e-12)
@@ -134,7 +143,7 @@ def given(left, right):
 def test_shares_of_both_sides_multiply_the_drag_across():
     rng = np.random.default_rng(7)
     v, eps = rng.normal(size=(3, 4, 50)), np.full(50, 1e-3)
-    sixth, plain = (as_array(sided(record(GLASS), *v, eps, given(x, x)), v[0]) for x in (1 / 6, 1.0))
+    sixth, plain = (as_array(two_sided_load(record(GLASS), *v, eps, given(x, x)), v[0]) for x in (1 / 6, 1.0))
     np.testing.assert_allclose(plain, element_load(GLASS)(*v, eps), rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(sixth[1:], plain[1:] / 6, atol=1e-12)
     np.testing.assert_allclose(sixth[0], plain[0], atol=1e-12)
@@ -176,15 +185,17 @@ def test_slopes_of_shares_are_derivatives():
     rng = np.random.default_rng(3)
     memory, before, now, h = rng.uniform(size=(2, 5, 40)), *rng.normal(size=(2, 2, 5, 40)), 1e-6
     now = 0.01 + np.abs(now)
-    values, slopes = developed(memory, before, now, 0.3, 2.0)
-    difference = developed(memory, before, now + h, 0.3, 2.0)[0] - developed(memory, before, now - h, 0.3, 2.0)[0]
+    values, slopes = developed_share(memory, before, now, 0.3, 2.0)
+    difference = (
+        developed_share(memory, before, now + h, 0.3, 2.0)[0] - developed_share(memory, before, now - h, 0.3, 2.0)[0]
+    )
     np.testing.assert_allclose(slopes, difference / (2 * h), atol=1e-7)
     assert (values >= 0).all()
     assert (values <= 1).all()
     assert (slopes >= 0).all()  # the faster to a side, the more of the drag to that side
-    paused = developed(memory, np.abs(before), 0 * now, 0.3, 2.0)[0]  # it went on for a while before it stopped
+    paused = developed_share(memory, np.abs(before), 0 * now, 0.3, 2.0)[0]  # it went on for a while before it stopped
     np.testing.assert_allclose(paused, 1 - (1 - memory) * np.exp(-2.0 * 0.15 * np.abs(before)), rtol=1e-12)
-    still = developed(memory, before, now, 0.3, np.inf)
+    still = developed_share(memory, before, now, 0.3, np.inf)
     assert (still[0] == 1).all()
     assert (still[1] == 0).all()
 
@@ -193,7 +204,7 @@ def test_parts_of_elements_are_means_of_their_velocities():
     rng = np.random.default_rng(6)
     m, w = rng.normal(size=(2, 60))
     m[0], w[1], w[2] = 0.0, 0.0, -m[2]
-    velocity, left = sides(m, w)
+    velocity, left = part_velocities(m, w)
     u = m + w * ((np.arange(200_000)[:, None] + 0.5) / 100_000 - 1)
     np.testing.assert_allclose(left, (u > 0).mean(0), atol=1e-5)
     for side, share, found in ((u > 0, left, velocity[0]), (u < 0, 1 - left, velocity[1])):
@@ -213,13 +224,15 @@ def test_a_piece_that_turns_remembers_both_of_its_sides():
 def straight(effects, body=None, rate=1.0, medium=GLASS):
     """The balance of a straight body."""
     body = body or Chain((1, 1))
-    return assemble(medium, body, effects, pieces=40).at(np.zeros((body.joints, 1)), np.full((body.joints, 1), rate))
+    return assemble(medium, body, effects, pieces=40).problem(
+        np.zeros((body.joints, 1)), np.full((body.joints, 1), rate)
+    )
 
 
 def test_ground_remembers_where_the_body_was():
     effect = DisturbedGround(radius=0.05, weakening=1.0)
     fresh = effect.begin(None, Site(0, 0.0, np.zeros((3, 2)), ()))
-    ground = effect.marked(fresh, np.array([[0.3 + 0.2j, 0.0]]))
+    ground = effect.with_track(fresh, np.array([[0.3 + 0.2j, 0.0]]))
     at = lambda *places: effect.disturbance(ground, np.array(places))
     # A whole disturbance on the axis, nothing far off, and nothing in the other sample's ground.
     assert at(0.3 + 0.2j, 0.3 + 0.2j) == pytest.approx([1, 0], abs=0.05)
@@ -227,7 +240,7 @@ def test_ground_remembers_where_the_body_was():
     assert at(0.3 + 0.25j, 0.05) == pytest.approx([0.5, 0.5], abs=0.1)
     # A patch that wraps round onto the same cells is untouched ground, and taking it over forgets the old.
     assert at(0.3 + 0.2j + 4, 0.0) == pytest.approx([0, 1], abs=0.05)
-    ground = effect.marked(ground, np.array([[4.3 + 0.2j, 0.0]]))
+    ground = effect.with_track(ground, np.array([[4.3 + 0.2j, 0.0]]))
     assert at(0.3 + 0.2j, 0.0) == pytest.approx([0, 1], abs=0.05)
     assert all((x == 0).all() for x in fresh.value)  # a step leaves the state it came from as it was
     assert sum(x is not y for x, y in zip(fresh.value, ground.value)) < 10  # and copies what it marks alone
@@ -236,7 +249,7 @@ def test_ground_remembers_where_the_body_was():
 def shares(effect, problem, site, ground):
     """What an effect leaves of the drag across, to the left and to the right, (2, n, B)."""
     memory = effect.apply(problem, site, ground).memory
-    return np.stack([memory.given_left, memory.given_right])
+    return np.stack([memory.intact_left, memory.intact_right])
 
 
 def test_a_body_that_finds_fresh_ground_is_not_weakened():
@@ -259,7 +272,7 @@ def test_the_side_where_most_was_disturbed_does_not_weaken_the_whole():
     effect, problem = DisturbedGround(radius=0.03, weakening=1.0), straight(())
     site = Site(1, 0.1, np.zeros((3, 1)), ())
     track = np.linspace(-0.5, -0.25, 40)[:, None, None] + 0.06j  # along the tail half of the tail's link, to its left
-    ground = effect.marked(effect.begin(problem, site), track)
+    ground = effect.with_track(effect.begin(problem, site), track)
     left, right = shares(effect, problem, site, ground)[..., 0]
     assert left[0] == pytest.approx(0.5, abs=0.08)
     assert [left[1], *right] == [1, 1, 1]
@@ -317,15 +330,15 @@ def test_a_slope_weakens_what_moves_downhill():
         v = speed * -unit * np.exp(-1j * heading)  # straight downhill, in the element's frame
         body, down = Chain((1.0, 1.0), frame="link-1"), -unit * np.exp(-1j * heading)
         site = Site(0, 0.0, np.array([[0.0], [0.0], [heading]]), ())
-        level = assemble(GLASS, body).at(np.zeros((1, 1)), np.ones((1, 1)))
+        level = assemble(GLASS, body).problem(np.zeros((1, 1)), np.ones((1, 1)))
         problem = Slope(np.radians(20.0), towards=0.7, weight=0.4).apply(level, site)
         incline = problem.sides.incline
         np.testing.assert_allclose([incline.down_t[0, 0], incline.down_n[0, 0]], [down.real, down.imag], atol=1e-15)
         for sign, share in ((1, 0.5), (-1, np.cos(np.radians(20.0)))):
             load = record(GLASS).average(sign * v.real, sign * v.imag, 0.0, 0.0)
             row = Incline(*(x[0, 0] for x in incline))
-            found = inclined(load, (sign * v.real, sign * v.imag), 0.0, row)
-            pull = 0.4 * np.sin(np.radians(20.0)) * problem.unit
+            found = inclined_load(load, (sign * v.real, sign * v.imag), 0.0, row)
+            pull = 0.4 * np.sin(np.radians(20.0)) * problem.axial_drag
             expected = share * load.t - pull * down.real, share * load.n - pull * down.imag, share * load.w
             np.testing.assert_allclose((found.t, found.n, found.w), expected, atol=1e-12)
 
@@ -335,7 +348,7 @@ def test_a_slope_has_the_slopes_of_its_load():
     law, row = record(GLASS), Incline(0.6, -0.8, 0.9, 0.5, 0.3)
 
     def load(v):
-        return inclined(law.average(*v, 1e-2), v, 1e-2, row)
+        return inclined_load(law.average(*v, 1e-2), v, 1e-2, row)
 
     for v in rng.normal(size=(20, 3)):
         found = load(v)
@@ -413,7 +426,7 @@ def test_places_run_from_the_tail_to_the_head():
     problem = straight((EndCaps(radius=0.05, tail=4.0, head=0.0),), Chain((1, 3)))
     np.testing.assert_allclose(problem.sides.station[:, 0], [1 / 8, 5 / 8], atol=1e-15)
     np.testing.assert_allclose(problem.points.station[:, 0], [0, 1], atol=1e-15)
-    np.testing.assert_allclose(problem.points.elements.place[:, 0], [-0.5, 0.5], atol=1e-15)
+    np.testing.assert_allclose(problem.points.elements.centres[:, 0], [-0.5, 0.5], atol=1e-15)
     tail, head = problem.points.elements.weight[:, 0]
     assert tail > head == 0
 
@@ -517,4 +530,4 @@ def test_a_sled_takes_no_viscous_medium():
             ValueError, match="a towed sled takes a medium without viscous drag, dry as itself, got Power"
         ):
             assemble(Power(power), Chain(), [TowedSled(pull=0.1)])
-    assert assemble(Power(0.0), Chain(), [TowedSled(pull=0.1)]).elements == 4
+    assert assemble(Power(0.0), Chain(), [TowedSled(pull=0.1)]).n_elements == 4

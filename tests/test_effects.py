@@ -27,9 +27,9 @@ from rft import (
     time_steps,
 )
 from rft.contact import assemble
-from rft.effects import KINDS, engine, side_by_side
-from rft.link import square
-from rft.premise import ALL, not_so
+from rft.effects import KINDS, batched_effect, engine
+from rft.link import quadratic_load
+from rft.premise import ALL, negated
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
@@ -68,7 +68,7 @@ def test_effects_say_what_they_are(name):
     assert np.abs(run(effect) - run()).max() > 1e-3
     told = explain(SANDFISH.changed(effects=(effect,)))
     assert f"; costs {effect.cost}; gone at {effect.limit}, order {effect.order}" in told
-    assert f"; {not_so(effect.breaks) or 'keeps every premise'};" in told
+    assert f"; {negated(effect.breaks) or 'keeps every premise'};" in told
     assert len(effect.cost) > 10
 
 
@@ -83,14 +83,14 @@ def test_parameters_that_may_differ_within_a_batch(name):
         changed = (*value[:-1], 2 * value[-1]) if isinstance(value, tuple) else value * 1.5 + 0.001
         other = dataclasses.replace(effect, **{field.name: changed})
         if field.name in effect.batched:
-            joined = side_by_side([effect, other], [2, 1])
+            joined = batched_effect([effect, other], [2, 1])
             assert getattr(joined, field.name).tolist() == [value, value, changed]
             assert all(
                 getattr(joined, f.name) == getattr(effect, f.name) for f in dataclasses.fields(effect) if f != field
             )
         else:
             with pytest.raises(ValueError, match=f"{effect.kind}: {field.name} cannot differ within a batch"):
-                side_by_side([effect, other], [2, 1])
+                batched_effect([effect, other], [2, 1])
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -119,7 +119,7 @@ def each(f, effects):
     """f(effect, count) (count,) of all effects of a kind: side by side, as one of so many samples, or one by one."""
     if effects[0].kind in ONE_BY_ONE:
         return np.concatenate([f(effect, 1) for effect in effects])
-    return f(side_by_side(effects, [1] * len(effects)), len(effects))
+    return f(batched_effect(effects, [1] * len(effects)), len(effects))
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -219,7 +219,7 @@ def test_engines(name):
         at_once = body_velocity(GLASS, body, alpha, alphadot, effects=(effect,), tolerance=1e-12).xi
         np.testing.assert_allclose(marched, at_once, atol=1e-9)
     else:
-        with pytest.raises(ValueError, match=re.escape(f"effects are {not_so(effect.breaks)}: use rft.time_steps")):
+        with pytest.raises(ValueError, match=re.escape(f"effects are {negated(effect.breaks)}: use rft.time_steps")):
             body_velocity(GLASS, body, alpha, alphadot, effects=(effect,))
 
 
@@ -259,8 +259,8 @@ def test_every_sample_of_a_batch_has_its_own_parameters(name):
     )
     alpha, alphadot = OFF_CENTRE.cycle(8, [0.7, 1.0, 1.2])
     given = {k: getattr(effect, k) for k in effect.batched if getattr(effect, k) is not None}
-    batch = effect.having(**{k: value * np.array([1.0, 0.6, 0.8]) for k, value in given.items()})
-    each = [effect.having(**{k: value * part for k, value in given.items()}) for part in (1.0, 0.6, 0.8)]
+    batch = effect.with_parameters(**{k: value * np.array([1.0, 0.6, 0.8]) for k, value in given.items()})
+    each = [effect.with_parameters(**{k: value * part for k, value in given.items()}) for part in (1.0, 0.6, 0.8)]
     alone = [time_steps(GLASS, body, a, d, effects=(e,), cycles=1, **how).xi for a, d, e in zip(alpha, alphadot, each)]
     found = time_steps(GLASS, body, alpha, alphadot, effects=(batch,), cycles=1, **how).xi
     np.testing.assert_allclose(found, alone, atol=1e-9)
@@ -321,8 +321,8 @@ def test_grain_inertia_takes_the_grains_own_pressure():
 
     def added(effect, medium):
         """Normal load of an element that goes across at 0.7 body lengths per rad, over what the medium itself gives."""
-        strength = assemble(medium, Chain(), [effect]).at(np.zeros((2, 1)), np.ones((2, 1))).square
-        return float(square(m, zero, strength).n[0, 0])
+        strength = assemble(medium, Chain(), [effect]).problem(np.zeros((2, 1)), np.ones((2, 1))).quadratic_drag
+        return float(quadratic_load(m, zero, strength).n[0, 0])
 
     speed = 0.7 * 0.3 * 2 * np.pi * 2.0  # m/s
     unit = 1.5 * speed**2 / (9.81 * 0.05)

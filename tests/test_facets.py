@@ -69,7 +69,7 @@ def test_loads_are_those_of_each_mesh_alone():
     turn, place = Rotation.from_euler("xyz", [0.3, -1.1, 0.7]).as_matrix(), np.array([0.02, -0.01, 0.015])
     at = poses(2)
     parts = [(0, meshes[0], np.eye(3), np.zeros(3)), (0, meshes[1], turn, place), (1, meshes[2], turn.T, -place)]
-    facets = Facets([Surface.of_mesh(b + 4, m, r, p) for b, m, r, p in parts])
+    facets = Facets([Surface.from_mesh(b + 4, m, r, p) for b, m, r, p in parts])
     found, _ = facets.loads(Grains(SPATIAL, 0.7, rounding=1e-7), at)
     wanted = np.zeros((2, 6))
     for b, mesh, r, p in parts:
@@ -93,13 +93,13 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
         np.array([[0.3, 0.0, -0.2]]),
         np.array([[0, 4.0, 0]]),
     )
-    facets = Facets([Surface.of_outline(0, outline)])
+    facets = Facets([Surface.from_outline(0, outline)])
     found = facets.loads(Grains(Extruded(SAND), 1.0, 2000.0, 1e-7), at)[0][0]
     ground = Ground(*np.array([1.0, 2000.0, 1e-7])[:, None], np.sin(SAND.grazing))
-    flat, one = Elements(Outlines.of([outline]), None, np.zeros((2, 1, 1)), SAND), np.zeros(1, int)
+    flat, one = Elements(Outlines.from_list([outline]), None, np.zeros((2, 1, 1)), SAND), np.zeros(1, int)
     pose, twist = np.array([place[0], place[2], angle]), motion
     at = (x[:, None, None] for x in (pose, twist))
-    *force, moment = np.ravel(flat.sums(ground, one, *at, *np.zeros((2, 1, 1)))[:3])
+    *force, moment = np.ravel(flat.load(ground, one, *at, *np.zeros((2, 1, 1)))[:3])
     np.testing.assert_allclose(found[[0, 2]], force, rtol=3e-3, atol=2e-4 * np.abs(force).max())
     assert found[4] == pytest.approx(moment, abs=6e-5 * np.abs(force).max())
     np.testing.assert_allclose(found[[1, 3, 5]], 0.0, atol=1e-9)
@@ -107,7 +107,7 @@ def test_loads_on_outlines_in_their_plane_are_those_of_the_plane(shape):
 
 def test_what_moves_aside_is_held_back():
     """A box that turns and drifts to its left feels a force to its right; grains never drive."""
-    facets = Facets([Surface.of_mesh(0, shapes.box((0.1, 0.05, 0.03), 3))])
+    facets = Facets([Surface.from_mesh(0, shapes.box((0.1, 0.05, 0.03), 3))])
     for law in (SPATIAL, Extruded(SAND)):
         for grains in (Grains(law), Grains(law, flux=500.0)):
             at = Poses(np.eye(3)[None], np.array([[0, 0, -0.005]]), np.array([[0, 0.4, 0]]), np.zeros((1, 3)))
@@ -118,7 +118,7 @@ def test_what_moves_aside_is_held_back():
 
 def test_slopes_of_loads_are_what_moving_a_body_changes():
     facets, k = (
-        Facets([Surface.of_mesh(0, Sphere(0.02).mesh(320)), Surface.of_outline(1, CLeg(0.03, 0.02).outline(12))]),
+        Facets([Surface.from_mesh(0, Sphere(0.02).mesh(320)), Surface.from_outline(1, CLeg(0.03, 0.02).outline(12))]),
         0.002,
     )
     at, grains = poses(2), Grains(Extruded(SAND), 0.8, 200.0, 0.3)

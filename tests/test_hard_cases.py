@@ -10,7 +10,7 @@ from geomech.gaits import Butterfly, Circle, Fourier
 from geomech.geometry import coordinates
 from geomech.tiers.direct import direct
 from rft import CATALOGUE, Chain, Coulomb, Granular, Viscous, body_velocity, se2
-from rft.balance.newton import Descent, carried
+from rft.balance.newton import Descent, to_element
 from rft.balance.solver import QUICK, Accuracy, solve
 from rft.contact import assemble
 
@@ -107,7 +107,10 @@ def test_large_ratios_approach_the_kinematic_limit():
     limit = []
     for b in range(20):
         J = np.stack(
-            [np.stack(np.broadcast_arrays(*carried(motion, *e)[1:], motion.c)[:2])[..., b].ravel() for e in np.eye(3)],
+            [
+                np.stack(np.broadcast_arrays(*to_element(motion, *e)[1:], motion.c)[:2])[..., b].ravel()
+                for e in np.eye(3)
+            ],
             1,
         )
         weight = np.sqrt(np.concatenate([motion.half[:, 0], motion.half[:, 0] / 3]))
@@ -276,10 +279,10 @@ def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
         monkeypatch.setattr("rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100))
         assembly = assemble(medium, body)
-        problem = assembly.at(alpha, alphadot)
+        problem = assembly.problem(alpha, alphadot)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         accuracy = Accuracy(regularisation, 1e-10)
-        solved = solve(problem.take, np.ones(starts), accuracy, assembly.law, assembly.points, "numpy", 1, guess)
+        solved = solve(problem.take, np.ones(starts), accuracy, assembly.law, assembly.n_law_points, "numpy", 1, guess)
         for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])

@@ -13,7 +13,7 @@ from geomech.geometry.traits import NOTHING, Traits
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
 from rft.bodies.base import is_reversible
-from rft.laws.base import TermLaw, is_central
+from rft.laws.base import TermLaw, is_odd
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 MIRROR, BACKWARDS, BOTH = Traits(mirror=True), Traits(reversible=True), Traits(mirror=True, reversible=True)
@@ -36,7 +36,7 @@ def test_what_else_tells_head_from_tail():
     assert not Swimmer(GLASS, chain, (SkinFriction(forward=0.109, backward=0.137),)).traits.reversible
     assert not Swimmer(GLASS, dataclasses.replace(chain, frame="link-1")).traits.reversible
     assert not Swimmer(Scales(), chain).traits.reversible
-    assert is_central(GLASS)
+    assert is_odd(GLASS)
     assert not is_reversible(Chain((1, 2, 1 + 1e-9)))
 
 
@@ -179,7 +179,7 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     """Of an effect with a parameter for each gait, of which some phases are solved; begun from what is known of all phases."""
     frequencies, body = np.array([0.5, 3.0]), Chain((1, 2, 1))
     effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
-    both = Swimmer(GLASS, body, (effect.having(frequency=frequencies),))
+    both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
     alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
     assert both.solved(alpha, alphadot) == 16
     run = both.run(alpha, alphadot)

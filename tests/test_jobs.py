@@ -27,7 +27,7 @@ from geomech.run.jobs import Runner, context_of, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scene import kinds
-from geomech.study import accuracy, cost, estimate, intrusion, motion, walking
+from geomech.study import accuracy, cost, estimate, intrusion, walking
 from geomech.study.bench import Study
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
@@ -374,13 +374,6 @@ def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):
     assert groups == 1 and same(found, whole)
 
 
-def test_what_a_request_costs_is_no_part_of_it(tmp_path, monkeypatch):
-    """How many pilots there are depends on the clock."""
-    monkeypatch.setattr(cost, "FREE", 0.0)
-    scene = scenes.parse(scenes.load("sandfish-transient").text.replace("100", "5"))
-    assert asked(tmp_path / "p", lambda: motion.cost(scene))[1] == 0
-
-
 # Commands.
 
 
@@ -428,8 +421,6 @@ COMMANDS = {
 @pytest.fixture
 def small(tmp_path, monkeypatch, fine, step_by_step):
     """Small scenes whose requests are made of many tasks."""
-    monkeypatch.setattr(cost, "FREE", 1e9)
-    monkeypatch.setattr(cost, "PILOT", 0.0)
     monkeypatch.setattr(walking, "PILOT", 0.0)
     monkeypatch.setattr(walking, "TOGETHER", 2)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))

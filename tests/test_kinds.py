@@ -235,7 +235,7 @@ class Slick(Effect):
     cost = "one multiplication"
 
     def apply(self, problem, site=None, past=None):
-        return problem._replace(sides=problem.sides.multiplied(self.by, self.by, 1.0))
+        return problem._replace(sides=problem.sides.with_factors(self.by, self.by, 1.0))
 
 
 @dataclass(frozen=True)

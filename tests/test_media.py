@@ -209,11 +209,11 @@ def test_media_that_drag_pass(name):
 def test_residuals_are_magnitudes():
     """Whatever the sign of the law: the solver below the check has no negative residual."""
     alpha, alphadot = np.array([[0.4], [-0.7]]), np.array([[1.0], [0.2]])
-    problem = assemble(Law((1.0, 1.0, 3.0)), Chain()).at(alpha, alphadot)
+    problem = assemble(Law((1.0, 1.0, 3.0)), Chain()).problem(alpha, alphadot)
     problem = problem._replace(law=record(Law((1.0, -1.0, -3.0))))
     _, residual, _, _ = solve(problem, QUICK, Limits(1e-6, 1e-10), None)
     assert (residual >= 0).all()
-    assert problem.unit == 1.0
+    assert problem.axial_drag == 1.0
 
 
 def test_a_law_without_axial_drag():

@@ -96,9 +96,9 @@ def test_scenes_of_meshes_run(name, geomech, tmp_path):
         "t", *place, "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z", "moment",
     ]  # fmt: skip
     assert found["moment"] == found["moment_y"]
-    passage = scene.motion.passage(scene.mesh)
-    k = len(passage.t) // 3
-    turn, at, v, w = passage.rotation[k], passage.place[k], passage.velocity[k], passage.spin[k]
+    trajectory = scene.motion.trajectory(scene.mesh)
+    k = len(trajectory.t) // 3
+    turn, at, v, w = trajectory.rotation[k], trajectory.place[k], trajectory.velocity[k], trajectory.spin[k]
     wanted = wrench(scene.medium, scene.mesh, turn, at, v, w)
     np.testing.assert_allclose([found[f"force_{a}"][k] for a in "xyz"], wanted.force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose([found[f"moment_{a}"][k] for a in "xyz"], wanted.moment, rtol=1e-12, atol=1e-15)
@@ -125,7 +125,7 @@ def test_strength_is_matched_to_the_vertical_plane_and_that_is_told(geomech, tmp
     own = scenes.load(tmp_path / "s.toml")
     assert own.medium.xi_n * scene.medium.plate == pytest.approx(0.3e6)
     assert "of own.toml in" in own.matched and own.files == (str(tmp_path / "own.toml"),)
-    assert scenes.parse(MADE).medium.xi_n == Spatial.of_grains(1500, 0.5).xi_n
+    assert scenes.parse(MADE).medium.xi_n == Spatial.from_grains(1500, 0.5).xi_n
 
 
 def test_a_leg_of_three_dimensions_is_like_that_of_two():
@@ -134,7 +134,7 @@ def test_a_leg_of_three_dimensions_is_like_that_of_two():
     for k in (0, 1):
         one, two = solid.force[:, 2 * k], flat.force[:, k]
         assert one.max() == pytest.approx(two.max(), rel=0.3)
-        at = solid.passage.angle[one.argmax()], flat.pose[two.argmax(), 2]
+        at = solid.trajectory.angle[one.argmax()], flat.pose[two.argmax(), 2]
         assert abs(np.degrees(at[0] - at[1])) < 20
     assert np.abs(solid.force[:, 1]).max() < 1e-12
     assert solid.moment[:, 1].min() == pytest.approx(flat.moment.min(), rel=0.2)
@@ -145,7 +145,7 @@ def test_a_leg_of_three_dimensions_is_like_that_of_two():
 def test_velocities_are_those_of_the_poses(body, motion):
     """Against differences between poses close by."""
     mesh = body.mesh(200)
-    dense = dataclasses.replace(motion, samples=4001).passage(mesh)
+    dense = dataclasses.replace(motion, samples=4001).trajectory(mesh)
     h, k = dense.t[1], 1234
     np.testing.assert_allclose((dense.place[k + 1] - dense.place[k - 1]) / (2 * h), dense.velocity[k], atol=1e-9)
     turn = Rotation.from_matrix(dense.rotation[k + 1] @ dense.rotation[k - 1].T).as_rotvec() / (2 * h)
@@ -164,18 +164,18 @@ def test_motions_go_where_their_angles_say():
         (np.pi / 2, 0.0, (0, 1, 0)),
         (2.0, -0.5, (np.cos(0.5) * np.cos(2.0), np.cos(0.5) * np.sin(2.0), np.sin(0.5))),
     ):
-        p = Drag(0.05, direction, heading, speed=0.2, distance=0.3).passage(ball)
+        p = Drag(0.05, direction, heading, speed=0.2, distance=0.3).trajectory(ball)
         np.testing.assert_allclose(p.place[-1], [0, 0, -0.05] + 0.3 * np.array(way), atol=1e-15)
         np.testing.assert_allclose(p.velocity[7], 0.2 * np.array(way), atol=1e-16)
         assert (p.velocity[7] == 0.0).tolist() == [x == 0 for x in way]  # to the last digit
         assert p.t[-1] == pytest.approx(1.5) and not p.angle.any()
-    p = Penetrate(0.03, direction=2.0, heading=-1.0).passage(ball)
+    p = Penetrate(0.03, direction=2.0, heading=-1.0).trajectory(ball)
     assert p.place[-1] == pytest.approx([0.03 / np.tan(2.0) * np.cos(1.0), -0.03 / np.tan(2.0) * np.sin(1.0), -0.01])
-    turned = Rotate(0.04, start=-1.0, stop=0.5).passage(ball)
+    turned = Rotate(0.04, start=-1.0, stop=0.5).trajectory(ball)
     assert turned.spin[0] == pytest.approx([0, 2 * np.pi, 0]) and turned.angle[[0, -1]] == pytest.approx([-1.0, 0.5])
     np.testing.assert_allclose(turned.rotation[-1] @ [0, 0, -1], [-np.sin(0.5), 0, -np.cos(0.5)], atol=1e-15)
     t = np.arange(3.0)
-    assert not Path(t, t, 0 * t, 0 * t).passage(ball).angle.any()
+    assert not Path(t, t, 0 * t, 0 * t).trajectory(ball).angle.any()
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_path_of_poses_gives_the_motion_it_was_taken_from(geomech, tmp_path):
     made = MADE.replace("sphere", "c-leg").replace("radius", "width = 0.02\nthickness = 0.004\nradius")
     motion = Rotate(0.01, (1.0, 2.0, -1.0), 3.0, -1.0, 1.5, 0.1, 0.5, 0.2, 21)
     straight = dataclasses.replace(scenes.parse(made), motion=motion).run()
-    p = straight.passage
+    p = straight.trajectory
     rows = np.column_stack([p.t, p.place, Rotation.from_matrix(p.rotation).as_rotvec()]).tolist()
     (tmp_path / "p.csv").write_text("t,x,y,z,rx,ry,rz\n" + "\n".join(",".join(map(repr, row)) for row in rows))
     parts = made[: made.index("[motion]")], made[made.index("[numerics]") :]
@@ -220,7 +220,7 @@ def test_velocities_of_a_path_are_of_order_2():
     for samples in (50, 100, 200):
         t = 0.1 + np.linspace(0, 1, samples) ** 1.2
         exact = (turns(t + 1e-6) * turns(t - 1e-6).inv()).as_rotvec() / 2e-6
-        found = Path(t, np.sin(t), 0 * t, t**3 / 5, *turns(t).as_rotvec().T).passage(None)
+        found = Path(t, np.sin(t), 0 * t, t**3 / 5, *turns(t).as_rotvec().T).trajectory(None)
         errors.append([np.abs(found.spin - exact).max(), np.abs(found.velocity[:, 0] - np.cos(t)).max()])
     assert np.max(errors[-1]) < 2e-4
     assert (np.log2(np.divide(errors[0], errors[-1])) / 2 > 1.8).all()
@@ -235,7 +235,7 @@ def test_meshes_of_files(geomech, tmp_path):
     scene = scenes.load(tmp_path / "s.toml")
     assert [p.name for p in scenes.inputs(scene)] == ["s.toml", "leg.STL"]
     assert scenes.parse(scenes.toml(dataclasses.replace(scene, triangles=301))).mesh.volume == scene.mesh.volume
-    p = scene.motion.passage(mesh)
+    p = scene.motion.trajectory(mesh)
     wanted = wrench(scene.medium, mesh, p.rotation, p.place, p.velocity, p.spin, scene.effects)
     weight = [-0.2 * 9.81 * math.sin(math.radians(10)), 0.0, 0.0]
     assert scene.run(len(mesh.faces)).force == pytest.approx(wanted.force + weight, rel=1e-4, abs=1e-6)
@@ -435,11 +435,11 @@ def test_pictures_show_the_stress_on_the_mesh():
     step = np.linalg.norm(found.force, axis=-1).argmax()
     faces, above = scene.faces(found, step)
     solid = next(ax for ax in fig.axes if ax.name == "3d")
-    assert len(solid.collections[0].get_facecolor()) <= len(faces.of) + len(above)
-    p = [x[step] for x in found.passage]
+    assert len(solid.collections[0].get_facecolor()) <= len(faces.triangle) + len(above)
+    p = [x[step] for x in found.trajectory]
     wanted = bearing(scene.medium, scene.mesh, p[2], p[1], p[3], p[4], scene.effects)
     np.testing.assert_array_equal(faces.force, wanted.force)
-    assert above[..., 2].min() >= -1e-12 and faces.corners[..., 2].max() <= 1e-12 and len(above) and len(faces.of)
+    assert above[..., 2].min() >= -1e-12 and faces.corners[..., 2].max() <= 1e-12 and len(above) and len(faces.triangle)
     areas = lambda t: np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=-1).sum() / 2
     assert areas(faces.corners) + areas(above) == pytest.approx(scene.mesh.areas.sum())
     lines = [line for ax in fig.axes for line in ax.lines if len(line.get_xdata()) == len(found.t)]
@@ -454,7 +454,7 @@ def test_a_body_in_the_air_is_drawn_without_stress(tmp_path):
     fig = plots.intrusion_figure(scene, found)
     plots.save(fig, tmp_path / "a.png")
     faces, above = scene.faces(found, 0)
-    assert len(faces.of) == 0 and len(above) == scene.count
+    assert len(faces.triangle) == 0 and len(above) == scene.count
 
 
 def test_figure_of_meshes(tmp_path):

@@ -117,7 +117,7 @@ def test_a_refusal_stays_one_line_and_keeps_the_note():
 def test_an_extent_that_is_refused_is_told_too():
     code, out, err = geomech("displacement", "three-link-viscous", "--amplitudes", "1", "--extent", "120")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "extent must be a number from 1e-06 to 100, got 120" in err
+    assert "extent must be a number from 1e-06 to 100 rad, got 120" in err
     assert "; an extent of 120 rad is beyond a full turn" in err
 
 

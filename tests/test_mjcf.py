@@ -20,7 +20,7 @@ mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geo
 from rft.walking import geoms  # noqa: E402
 from rft.walking.facets import Facets  # noqa: E402
 from rft.walking.machine import Clock, machine  # noqa: E402
-from rft.walking.mujoco_walk import Course  # noqa: E402
+from rft.walking.mujoco_walk import Simulation  # noqa: E402
 
 ACTUATOR = '<position name="{0}" joint="{0}" kp="40" kv="0.4"/>'
 NAMES = ("fl", "fr", "rl", "rr")
@@ -63,10 +63,10 @@ def test_a_cart_rolls_ahead_and_with_its_gears_reversed_back(cart, geomech):
     """From a file in another folder; wheels in step, on seeds and not on the MJCF's own floor."""
     scene = scenes.load(cart / "cart.toml")
     assert scene.engine == "mujoco" and scene.files == (str(cart / "parts" / "cart.xml"),)
-    run = lambda robot: Course(dataclasses.replace(scene.walker, robot=robot), scene.numerics).walk(2)
+    run = lambda robot: Simulation(dataclasses.replace(scene.walker, robot=robot), scene.numerics).walk(2)
     ahead = run(scene.robot)
     assert ahead.status == "walking" and 0.09 < ahead.speed < 2 * np.pi * 0.03
-    assert ahead.pose[-1, 1] < 0.03 and np.abs(ahead.more["y"]).max() < 1e-3
+    assert ahead.pose[-1, 1] < 0.03 and np.abs(ahead.spatial["y"]).max() < 1e-3
     (cart / "back.xml").write_text(CART.replace('kp="40"', 'gear="-1" kp="40"'))
     back = run(dataclasses.replace(scene.robot, mjcf=str(cart / "back.xml")))
     assert back.speed == pytest.approx(-ahead.speed, rel=1e-3)
@@ -80,21 +80,21 @@ def test_the_clock_drives_what_it_is_told_to_and_the_rest_keeps_its_keyframe(car
     (cart / "key.xml").write_text(CART.replace("</mujoco>", key).replace('name="fl" joint', 'name="fl" gear="2" joint'))
     robot = Mjcf(str(cart / "key.xml"), ("fl",), ("rr", "fl"), (0.25, 0.5))
     assert robot.mass == pytest.approx(250 * (0.12 * 0.06 * 0.02 + 4 * np.pi * 0.03**2 * 0.02))
-    course = Course(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8))
+    course = Simulation(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8))
     clock = course.clock
-    angle, rate = clock.turned(0.1, 0.1)
+    angle, rate = clock.actuator_motion(0.1, 0.1)
     wanted = [angle[1] + rate[1] * 0.01, 2.0, 3.0, angle[0] + rate[0] * 0.01]
     np.testing.assert_allclose(clock(0.1, 0.1), wanted)
     np.testing.assert_allclose(clock.kinks(), [0.0, 0.35, 0.6, 0.65, 0.9, 1.0])
     data = course.body.data
-    start = clock.turned(0.0, 1e-9)[0]
+    start = clock.actuator_motion(0.0, 1e-9)[0]
     np.testing.assert_allclose(data.qpos[7:], [start[1] / 2, 0.4, 0.0, start[0]])
     assert course.body.facets.heights(data.xmat[[2]].reshape(1, 3, 3), data.xpos[[2]]).min() == pytest.approx(0.0)
 
 
 def test_without_a_keyframe_what_the_clock_does_not_drive_is_left_at_zero(cart):
     robot = Mjcf(str(cart / "parts" / "cart.xml"), ("fl",), ("rr",), (0.25,))
-    clock = Course(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8)).clock
+    clock = Simulation(Walker(robot, Tripod(2.0, 0.3, 1.0), Spatial(3e5)), Fineness(steps=8)).clock
     controls = clock(0.1, 0.1)
     assert controls[:3].tolist() == [0.0, 0.0, 0.0] and controls[3] != 0.0
 
@@ -115,7 +115,7 @@ def test_geoms_become_triangles_of_their_size(kind, volume, size):
     geom = f'<geom name="g" {kind} pos="0.1 0.2 0.3" euler="0 90 0"/>'
     text = f"<mujoco>{asset}<worldbody><body><freejoint/>{geom}</body></worldbody></mujoco>"
     model = mujoco.MjModel.from_xml_string(text)
-    mesh = geoms.mesh_of(model, 0, 48)
+    mesh = geoms.geom_mesh(model, 0, 48)
     assert mesh.volume == pytest.approx(volume, rel=0.02)
     if size:
         np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), size, rtol=0.01)
@@ -215,7 +215,7 @@ def test_a_machine_written_is_the_machine_read(cart):
     other = scenes.parse(SCENE.replace("grazing_deg = 5", 'law = "3d"\nzeta = 2.0'), str(cart / "cart.toml"))
     assert isinstance(other.medium, Spatial) and other.medium.xi_n > 1e5
     copied = pickle.loads(pickle.dumps(anew.robot))
-    assert copied == anew.robot and copied.found.tolist() == [2, 3, 4, 5, 1]
+    assert copied == anew.robot and copied.geom_numbers.tolist() == [2, 3, 4, 5, 1]
     (cart / "parts" / "cart.xml").write_text(CART.replace("0.01", "0.011"))
     assert scenes.load(cart / "cart.toml").robot != scene.robot
     with pytest.raises(SceneError, match="law: '2d' is unknown; did you mean '3d'"):
@@ -302,4 +302,6 @@ def test_the_clock_of_a_robot_of_the_plane_is_that_of_its_tripods():
     made = machine(robot, 6)
     clock = Clock(made, Tripod(2.0, 0.3, 1.0))
     assert [made.model.actuator(k).name for k in made.driven] == [f"leg{k}" for k in range(6)]
-    np.testing.assert_allclose(clock.turned(0.0, 1e-9)[0][[1, 2, 5]] - clock.turned(0.0, 1e-9)[0][[0, 3, 4]], np.pi)
+    np.testing.assert_allclose(
+        clock.actuator_motion(0.0, 1e-9)[0][[1, 2, 5]] - clock.actuator_motion(0.0, 1e-9)[0][[0, 3, 4]], np.pi
+    )

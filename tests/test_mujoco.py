@@ -20,7 +20,7 @@ from rft.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
 from rft.walking import geoms, hexapod  # noqa: E402
-from rft.walking.mujoco_walk import Course, Start, again, walk  # noqa: E402
+from rft.walking.mujoco_walk import Simulation, Start, rerun, walk  # noqa: E402
 from rft.walking.multibody import Multibody  # noqa: E402
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
@@ -39,8 +39,8 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight():
     """Of a body whose centre of mass, origin and geom are three places with three frames, that tumbles; against the wrench of
     the geom's mesh by itself."""
     model = mujoco.MjModel.from_xml_string(TILTED)
-    mesh = geoms.mesh_of(model, 0, 24)
-    body = Multibody(model, geoms.named(model, {"g": mesh}), Grains(SPATIAL, rounding=1e-5))
+    mesh = geoms.geom_mesh(model, 0, 24)
+    body = Multibody(model, geoms.surfaces(model, {"g": mesh}), Grains(SPATIAL, rounding=1e-5))
     data = body.data
     data.qvel[:] = [0.4, 0.2, -0.5, 3.0, -4.0, 2.0]
 
@@ -62,7 +62,7 @@ def test_momenta_change_by_the_forces_and_moments_of_grains_and_weight():
 
 def test_what_falls_free_falls_as_galilei_says():
     model = mujoco.MjModel.from_xml_string(TILTED)
-    body = Multibody(model, geoms.named(model, {"g": geoms.mesh_of(model, 0, 12)}), Grains(SPATIAL))
+    body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 12)}), Grains(SPATIAL))
     data = body.data
     data.qpos[2], data.qvel[3:] = 3.0, [2.0, -1.0, 3.0]
     mujoco.mj_forward(model, data)
@@ -90,14 +90,14 @@ def test_what_touches_grains_touches_no_floor():
     """As `geomech walk` has it: a foot sinks through the floor of its MJCF as through none, until the grains bear it, while
     other geoms go on to touch the floor; of a surface that names no geom that holds of all of its body."""
     made = lambda text: mujoco.MjModel.from_xml_string(text)
-    foot = lambda model: geoms.mesh_of(model, 1, 24)
+    foot = lambda model: geoms.geom_mesh(model, 1, 24)
     depths = []
     for text in (
         FLOORED.format(""),
         FLOORED.format("").replace('name="floor"', 'name="floor" contype="0" conaffinity="0"'),
     ):
         model = made(text)
-        body = Multibody(model, geoms.named(model, {"foot": foot(model)}), Grains(SPATIAL))
+        body = Multibody(model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL))
         assert body.data.ncon == 0
         for _ in range(100):
             body.step(0.005)
@@ -105,13 +105,13 @@ def test_what_touches_grains_touches_no_floor():
         assert body.data.ncon == 0 and body.wrenches[0, 2] == pytest.approx(model.body_mass[1] * 9.81, rel=0.02)
     assert depths[0] == depths[1] > 1e-3
     model = made(FLOORED.format("").replace('pos="0 0 0.05"', 'pos="0 0 -0.025"'))
-    body = Multibody(model, geoms.named(model, {"foot": foot(model)}), Grains(SPATIAL))
+    body = Multibody(model, geoms.surfaces(model, {"foot": foot(model)}), Grains(SPATIAL))
     assert body.data.ncon == 1 and model.geom_contype.tolist() == [1, 0, 1]
-    whole = Multibody(model, [Surface.of_mesh(1, foot(model))], Grains(SPATIAL))
+    whole = Multibody(model, [Surface.from_mesh(1, foot(model))], Grains(SPATIAL))
     assert whole.data.ncon == 0 and model.geom_contype.tolist() == [1, 0, 0]
     paired = made(FLOORED.format('<contact><pair geom1="floor" geom2="foot"/></contact>'))
     with pytest.raises(ValueError, match="a <pair> of <contact> names a geom that touches the ground"):
-        Multibody(paired, geoms.named(paired, {"foot": foot(paired)}), Grains(SPATIAL))
+        Multibody(paired, geoms.surfaces(paired, {"foot": foot(paired)}), Grains(SPATIAL))
 
 
 PENDULUM = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body pos="0 0 5"><joint name="j" axis="0 1 0" stiffness="0.4"
@@ -122,7 +122,7 @@ def test_springs_keep_energy_and_dampers_take_it():
     """To the second order of the steps, which make no difference to what a halved step does."""
     model, left = mujoco.MjModel.from_xml_string(PENDULUM), []
     for steps in (20, 40):
-        body = Multibody(model, geoms.named(model, {"g": geoms.mesh_of(model, 0, 8)}), Grains(SPATIAL))
+        body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}), Grains(SPATIAL))
         body.data.qpos[0], body.data.qvel[0] = 0.3, 2.0
         first = body.energy()
         for _ in range(steps):
@@ -132,7 +132,7 @@ def test_springs_keep_energy_and_dampers_take_it():
     assert left[1] < 1e-4 and left[0] / left[1] > 3.5
     ends = []
     for fails in (0, 1):
-        body = Multibody(model, geoms.named(model, {"g": geoms.mesh_of(model, 0, 8)}), Grains(SPATIAL))
+        body = Multibody(model, geoms.surfaces(model, {"g": geoms.geom_mesh(model, 0, 8)}), Grains(SPATIAL))
         body.data.qvel[0], solved, tried = 2.0, body._step, iter([fails, 0, 0])
         body._step = lambda *args: solved(*args) and not next(tried)
         for h in (0.04,) if fails else (0.02, 0.02):
@@ -144,8 +144,8 @@ def test_springs_keep_energy_and_dampers_take_it():
 def test_steps_are_of_order_two_and_energy_is_kept_to_that():
     """Xplorer in its plane at 4 Hz, after its fall: motors' work = losses + change of energy."""
     walker = dataclasses.replace(XPLORER.walker, gait=Tripod(4.0))
-    first = Course(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(1).limit
-    run = lambda steps: Course(walker, dataclasses.replace(QUICK, steps=steps), planar=True).walk(1, start=first)
+    first = Simulation(walker, dataclasses.replace(QUICK, steps=48), planar=True).walk(1).limit
+    run = lambda steps: Simulation(walker, dataclasses.replace(QUICK, steps=steps), planar=True).walk(1, start=first)
     finest, errors, audits = run(160), [], []
     for steps in (12, 24, 48):
         w = run(steps)
@@ -168,21 +168,21 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
     wanted = planar_walk([walker], finely, 2)[0]
     free = walk([walker], finely, 2)[0]
     assert free.status == wanted.status == "walking" and free.speed == pytest.approx(wanted.speed, rel=0.03)
-    assert np.abs(free.more["roll"]).max() < 0.06 and np.abs(free.more["yaw"]).max() < 0.06
+    assert np.abs(free.spatial["roll"]).max() < 0.06 and np.abs(free.spatial["yaw"]).max() < 0.06
     if name != "xplorer":
         return
     assert free.pose[:, 2].min() == pytest.approx(wanted.pose[:, 2].min(), abs=0.02)  # nose up, by ten degrees
     assert free.twist[:, 2].max() == pytest.approx(wanted.twist[:, 2].max(), rel=0.2)
-    kept = Course(walker, finely, planar=True).walk(8)
+    kept = Simulation(walker, finely, planar=True).walk(8)
     assert kept.speed == pytest.approx(wanted.speed, rel=0.025)
-    assert np.abs(kept.more["roll"]).max() < 1e-12
+    assert np.abs(kept.spatial["roll"]).max() < 1e-12
 
 
 def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     """Legs swapped from left to right, by half a cycle; hips so near that they roll and yaw."""
     robot = Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=(0.03, 0.04))
     right, left = (
-        Course(Walker(robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)), QUICK)
+        Simulation(Walker(robot, Tripod(2.0, 0.5, math.pi, m), SAND, (GrainInertia(0.5, 300.0),)), QUICK)
         for m in (0.0, math.pi)
     )
     first, other = (np.zeros(0),) * 2
@@ -223,11 +223,11 @@ def test_every_end_has_its_status_and_no_nan():
     for status, walker in cases.items():
         found = walk([walker], QUICK, 1)[0]
         assert found.status == status
-        for values in (*found[:7], found.drift, *found.more.values()):
+        for values in (*found[:7], found.drift, *found.spatial.values()):
             assert np.isfinite(values).all(), status
-        more = again([walker], dataclasses.replace(QUICK, steps=8), [found], 1)[0]
+        more = rerun([walker], dataclasses.replace(QUICK, steps=8), [found], 1)[0]
         assert math.isfinite(more.speed)
-    thrown = Course(cases["stuck"], QUICK)
+    thrown = Simulation(cases["stuck"], QUICK)
     start = Start(thrown.body.data.qpos, np.array([1.0, 0.0, 3.0, *np.zeros(9)]))
     found = thrown.walk(3, start=start)
     assert found.status == "airborne" and found.limit is None and found.speed == pytest.approx(1.0, rel=1e-3)
@@ -247,13 +247,13 @@ def test_who_turns_is_not_told_by_strides_along_a_line(turn, monkeypatch):
         states.append(qpos.copy())
         return ""
 
-    monkeypatch.setattr(Course, "stride", stride)
+    monkeypatch.setattr(Simulation, "stride", stride)
     found = walk([Walker(XPLORER.robot, Tripod(2.0), XPLORER.medium)], dataclasses.replace(QUICK, duration=5.0))[0]
     assert found.periodic and found.speed == pytest.approx(0.2) and (found.cycles == 10) == (turn > 0.0)
-    assert (found.turning, found.aside, found.settled) == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
+    assert (found.yaw_rate, found.lateral_speed, found.settling_time) == pytest.approx((2 * turn, 0.0, 0.0), abs=1e-9)
     way = 0.1 * np.exp(1j * turn * np.arange(10)).cumsum()
     np.testing.assert_allclose(found.pose[1:, 0], way.real, atol=1e-9)
-    np.testing.assert_allclose(found.more["y"][1:], way.imag, atol=1e-9)
+    np.testing.assert_allclose(found.spatial["y"][1:], way.imag, atol=1e-9)
 
 
 def test_a_plain_wheel_rolls_as_fast_as_the_grains_bear_it():

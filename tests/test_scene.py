@@ -1,5 +1,6 @@
 """Scenes: built-in ones run, bad ones are refused with one line that names the place and the cure."""
 
+import dataclasses
 import math
 import tracemalloc
 
@@ -196,3 +197,12 @@ def test_a_large_field_converges_everywhere_in_little_memory():
     assert solution.residual.max() < 1e-9
     assert not (solution.status == "unconverged").any()
     assert most < 100e6
+
+
+@pytest.mark.parametrize("name", scenes.builtin_names() + scenes.intruder_names() + scenes.walker_names())
+def test_a_scene_written_from_its_parts_reads_the_same(name):
+    """Not from the text that it was read from; and its tables are a scene of the same parts."""
+    scene = dataclasses.replace(scenes.load(name), text="")
+    text = scenes.toml(scene)
+    assert text != scenes.load(name).text and scenes.parse(text, name) == scene
+    assert scenes.from_tables(scenes.tables(scenes.load(name)), name) == scene

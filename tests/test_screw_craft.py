@@ -45,12 +45,12 @@ def test_mujoco_goes_on_as_the_balance_says(pair):
     """From the pose and velocity of the balance, a turn to settle, one to look at. Alike, the craft is so heavy that it
     screws forwards and does not roll aside."""
     pytest.importorskip("mujoco")
-    from rft.walking.mujoco_walk import Course, Start
+    from rft.walking.mujoco_walk import Simulation, Start
 
     robot = dataclasses.replace(SCENE.robot, mass=2.5, pair=pair)
     steady = cruise(SCENE.medium, robot, 0.7, PER_SQUARE * COARSE.elements**2, 8)
     assert steady.residual < 1e-5 and 0.1 < steady.slip < 0.6
-    course = Course(Walker(robot, Tripod(0.7), SCENE.medium), COARSE)
+    course = Simulation(Walker(robot, Tripod(0.7), SCENE.medium), COARSE)
     turn = np.roll(Rotation.from_euler("xy", [steady.roll, steady.pitch]).as_quat(), 1)
     qpos, qvel = course.body.data.qpos.copy(), course.body.data.qvel.copy()
     qpos[:7], qvel[:6] = [0, 0, steady.height, *turn], [*steady.velocity, 0, 0, 0, steady.yaw_rate]

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
-from rft.walking.screws import cruise, freely, turning
+from rft.walking.screws import cruise, free_turning, turning
 
 SAND = Spatial(3e5, 0.3)
 SCREW = Screw(0.03, 0.018, 0.05, 0.13, 0.006, 0.02)
@@ -30,7 +30,7 @@ def test_the_volume_of_a_screw_is_its_closed_form_and_normals_point_out(screw):
         errors.append(1 - mesh.volume / volume(screw))
     assert errors[2] < 8e-3
     assert errors[0] > 3 * errors[1] > 9 * errors[2] > 0.0  # of order 1 in their number, below as chords are
-    assert (mesh.facing * mesh.normals).sum(-1).min() > 0.995
+    assert (mesh.middle_normals * mesh.normals).sum(-1).min() > 0.995
     reach = np.hypot(mesh.vertices[:, 1], mesh.vertices[:, 2])
     assert reach.max() == pytest.approx(screw.radius)
     assert np.ptp(mesh.vertices[:, 0]) == pytest.approx(screw.length + 2 * screw.nose)
@@ -38,7 +38,7 @@ def test_the_volume_of_a_screw_is_its_closed_form_and_normals_point_out(screw):
 
 def test_in_a_nut_nothing_but_the_ends_leads_or_trails():
     mesh = SCREW.mesh(800)
-    along = mesh.facing @ [SCREW.pitch / (2 * np.pi), 0, 0] + mesh.twists @ [1.0, 0, 0]
+    along = mesh.middle_normals @ [SCREW.pitch / (2 * np.pi), 0, 0] + mesh.normal_moments @ [1.0, 0, 0]
     inside = np.abs(mesh.middles[:, 0]) < SCREW.length / 2 * (1 - 1e-9)
     assert np.abs(along[inside]).max() < 1e-15 and inside.mean() > 0.7
     out = np.sign(mesh.middles[~inside, 0])
@@ -113,7 +113,7 @@ def test_a_mirror_shows_the_other_hand():
     """Vectors across it change sign, turns about axes along it do, too. What the surface cuts is cut otherwise."""
     flip, mesh, other = np.array([1, -1, 1]), SCREW.mesh(1500), SCREW.mirrored.mesh(1500)
     np.testing.assert_array_equal(mesh.vertices[mesh.faces] * flip, other.vertices[other.faces][:, ::-1])
-    np.testing.assert_array_equal(mesh.bends * flip, other.bends[:, ::-1])
+    np.testing.assert_array_equal(mesh.smooth_normals * flip, other.smooth_normals[:, ::-1])
     velocity, spin = np.array([0.02, 0.01, 0.03]), np.array([6.0, 1.0, 2.0])
     for height, rel in ((-0.1, 1e-12), (0.0, 2e-3)):
         one = wrench(SAND, mesh, np.eye(3), [0, 0, height], velocity, spin)
@@ -135,10 +135,10 @@ def test_thrust_grows_with_slip_and_no_more_is_done_than_the_motor_gives():
 
 
 def test_a_screw_runs_freely_where_it_pulls_nothing():
-    free = freely(SAND, SCREW, -0.005, **COARSE)
+    free = free_turning(SAND, SCREW, -0.005, **COARSE)
     assert abs(free.thrust) < 1e-3 and 0.02 < free.slip < 0.5
     assert turning(SAND, SCREW, -0.005, free.slip + 0.01, **COARSE).thrust > 1e-3
-    assert np.isnan(freely(SAND, SCREW, 0.05, **COARSE).slip)  # out of the ground
+    assert np.isnan(free_turning(SAND, SCREW, 0.05, **COARSE).slip)  # out of the ground
 
 
 def test_limits_of_the_blade():

@@ -30,7 +30,7 @@ def directions(count):
     ],
 )
 def test_alpha_at_plain_angles(angles, expected):
-    assert law.of_angles(*np.radians(angles)) == pytest.approx(expected, abs=5e-4)
+    assert law.alpha_of_angles(*np.radians(angles)) == pytest.approx(expected, abs=5e-4)
 
 
 def test_alpha_is_the_published_sum_of_terms():
@@ -48,12 +48,12 @@ def test_alpha_is_the_published_sum_of_terms():
         f1 * np.sin(beta) * np.sin(psi),
         -f1 * np.cos(beta) - f2 * np.sin(gamma) - f3,
     ], -1)  # fmt: skip
-    assert law.of_angles(beta, gamma, psi) == pytest.approx(expected, abs=1e-14)
+    assert law.alpha_of_angles(beta, gamma, psi) == pytest.approx(expected, abs=1e-14)
 
 
 def test_no_twist_where_the_normal_lies_in_the_plane_of_motion():
     beta, gamma = np.meshgrid(np.linspace(-1.57, 1.57, 41), np.linspace(-1.57, 1.57, 41))
-    assert np.abs(law.of_angles(beta, gamma, 0.0)[..., 1]).max() == 0.0
+    assert np.abs(law.alpha_of_angles(beta, gamma, 0.0)[..., 1]).max() == 0.0
 
 
 @pytest.mark.parametrize("tension", law.TENSION)
@@ -139,8 +139,8 @@ def test_where_the_law_drives_it_says_so():
 
 
 def test_strength_from_density_and_friction():
-    assert Spatial.of_grains(3000.0, 0.4).xi_n == pytest.approx(3000 * 9.81 * (894 * 0.064 - 386 * 0.16 + 89 * 0.4))
-    assert Spatial.of_grains(1500.0, 0.7, tension="keep").tension == "keep"
+    assert Spatial.from_grains(3000.0, 0.4).xi_n == pytest.approx(3000 * 9.81 * (894 * 0.064 - 386 * 0.16 + 89 * 0.4))
+    assert Spatial.from_grains(1500.0, 0.7, tension="keep").tension == "keep"
 
 
 def random_pose():
@@ -314,12 +314,12 @@ SIDES = np.array([
         (CUBE, SIDES[:0], "1 to"),
         (CUBE, SIDES.astype(float), "whole numbers"),
         ("mesh", SIDES, "real numbers"),
-        (CUBE, SIDES, "bends must be unit normals"),
+        (CUBE, SIDES, "smooth_normals must be unit normals"),
     ],
 )
 def test_bad_meshes_are_refused(vertices, faces, said):
     with pytest.raises(ValueError, match=said) as told:
-        Mesh(vertices, faces, bends=np.zeros((3, 3)) if said.startswith("bends") else None)
+        Mesh(vertices, faces, smooth_normals=np.zeros((3, 3)) if said.startswith("smooth_normals") else None)
     assert "\n" not in str(told.value)
 
 
@@ -374,7 +374,7 @@ def test_motions_that_make_no_sense_are_refused(wrong, said):
         (lambda: Spatial(-1.0), "xi_n"),
         (lambda: Spatial(1e6, tension="pull"), "tension"),
         (lambda: Spatial(1e6, surface_friction=-0.1), "surface_friction"),
-        (lambda: Spatial.of_grains(3000, 30.0), "friction"),
+        (lambda: Spatial.from_grains(3000, 30.0), "friction"),
         (lambda: shapes.sphere(0.0), "radius"),
         (lambda: shapes.sphere(1.0, 9), "fineness"),
         (lambda: shapes.screw(0.01, 0.02, 0.05, 0.1), "core"),
@@ -396,7 +396,7 @@ def test_the_trend_is_that_of_the_map_of_two_dimensions(name):
     beta, gamma = np.meshgrid(line, line, indexing="ij")
     stress = VERTICAL[name].stress
     two = np.stack(stress(beta, gamma)) / stress(0.0, np.pi / 2)[1]
-    three = law.of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
+    three = law.alpha_of_angles(beta, gamma, 0.0) / Spatial(1.0).plate
     for flat, solid, least in zip(two, (-three[..., 0], three[..., 2]), (0.79, 0.9)):
         assert np.corrcoef(flat.ravel(), solid.ravel())[0, 1] > least
     apart = three[..., 2] - two[1]
@@ -433,16 +433,18 @@ def test_smooth_meshes_have_the_normals_of_their_surface():
     side = np.abs(mesh.normals[:, 1]) < 0.5
     outwards = mesh.middles[side] * [1, 0, 1]
     outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
-    assert np.abs(mesh.facing[side] - outwards).max() < 1e-4 < 0.02 < np.abs(mesh.normals[side] - outwards).max()
-    np.testing.assert_allclose(mesh.facing[~side], mesh.normals[~side], atol=1e-15)
+    assert (
+        np.abs(mesh.middle_normals[side] - outwards).max() < 1e-4 < 0.02 < np.abs(mesh.normals[side] - outwards).max()
+    )
+    np.testing.assert_allclose(mesh.middle_normals[~side], mesh.normals[~side], atol=1e-15)
     for ball, off in ((Sphere(0.02).mesh(300), 1e-15), (smooth(shapes.sphere(0.02, 2)), 4e-3)):
         radial = ball.middles / np.linalg.norm(ball.middles, axis=-1, keepdims=True)
-        assert np.abs(ball.facing - radial).max() < off < np.abs(ball.normals - radial).max()
+        assert np.abs(ball.middle_normals - radial).max() < off < np.abs(ball.normals - radial).max()
     finer = quartered(mesh)
-    middle = finer.facing[3 * len(mesh.faces) :]  # of the triangle in the middle of each
-    assert np.abs(middle - mesh.facing).max() < 5e-3
+    middle = finer.middle_normals[3 * len(mesh.faces) :]  # of the triangle in the middle of each
+    assert np.abs(middle - mesh.middle_normals).max() < 5e-3
     both = smooth(Mesh(mesh.vertices, mesh.faces[side], closed=False)).two_sided
-    np.testing.assert_allclose(both.facing[side.sum() :], -both.facing[: side.sum()], atol=1e-15)
+    np.testing.assert_allclose(both.middle_normals[side.sum() :], -both.middle_normals[: side.sum()], atol=1e-15)
 
 
 def test_a_round_body_that_turns_about_its_axis_bears_nothing_across():

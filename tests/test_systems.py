@@ -28,7 +28,7 @@ from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 
 AWAY = Ellipse(semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7))  # from alpha_1 = alpha_2
 
@@ -72,7 +72,7 @@ def test_no_wheel_slips_in_any_frame(frame):
     xi = snake.velocity(alpha, alphadot)
     body = Chain((0.8, 1.3, 1.0), 0.4, frame)
     motion = body.motion(alpha.T, alphadot.T)
-    across = motion.v_n + carried(motion, *(xi / [0.4, 0.4, 1.0]).T)[1]
+    across = motion.v_n + to_element(motion, *(xi / [0.4, 0.4, 1.0]).T)[1]
     assert np.abs(across).max() < 1e-10 * np.abs(xi).max()
     h, hdot = Chain((0.8, 1.3, 1.0), 0.4, "link-2").frame_pose(frame, alpha, alphadot)
     middle = NoSlipSnake((0.8, 1.3, 1.0), 0.4, "link-2").velocity(alpha, alphadot)

@@ -10,10 +10,10 @@ from test_loads import CubicDrag
 
 from rft import Granular
 from rft.balance.arrays import loads, row
-from rft.balance.newton import Net, carried, plus, with_momentum
+from rft.balance.newton import Net, plus, to_element, with_momentum
 from rft.contact import assemble
-from rft.effects.base import Site, by_steps
-from rft.momentum import inertia, on_elements
+from rft.effects.base import Site, stepwise_effects
+from rft.momentum import element_momentum_rates, frame_inertia
 
 LAWS = {**MEDIA, "mud": Mud(), "no closed form": CubicDrag()}
 RULES = [(name, how) for name in LAWS for how in ("exact", "gauss:5", "midpoint:4")]
@@ -43,9 +43,9 @@ def test_laws(law, how):
 def at_one_step(effects, body, medium, samples, rng):
     """The balance with effects within a gait whose ground, place and past are not those of its start."""
     assembly = assemble(medium, body, effects)
-    stepwise = by_steps(assembly.effects)
+    stepwise = stepwise_effects(assembly.effects)
     always = assembly._replace(effects=tuple(e for e in assembly.effects if e not in stepwise))
-    problem = always.at(*rng.uniform(-1, 1, (2, body.joints, samples)))
+    problem = always.problem(*rng.uniform(-1, 1, (2, body.joints, samples)))
     pose = np.stack([*rng.uniform(-0.2, 0.2, (2, samples)), rng.uniform(-0.5, 0.5, samples)])
     site = Site(5, 0.2, pose, tuple(0.4 * problem.sides.elements.v))
     pasts = [e.begin(problem, site) for e in stepwise]
@@ -60,7 +60,7 @@ def at_one_step(effects, body, medium, samples, rng):
 
 def loads_on(problem, v, eps):
     """Loads of all elements, those of the sides first, (3, 4, n, B), at true velocities."""
-    n, scale = len(problem.sides.station), problem.speed
+    n, scale = len(problem.sides.station), problem.law_speed_scale
     halves = tuple(v[:, :n] / scale), tuple(v[:, n:] / scale)
     found = loads(problem, halves, eps / scale)
     return np.concatenate([as_array(load, part[0]) for (_, load), part in zip(found, halves)], 2)
@@ -93,20 +93,20 @@ def test_effects(name, medium):
 def test_mass(name):
     """What it adds to the balance: its tangent; what elements bear adds up to it; a few samples have their own."""
     rng, samples = np.random.default_rng(4), 12
-    mass = EFFECTS[name][0](0.5).having(mass=rng.uniform(0.5, 3.0, samples))
+    mass = EFFECTS[name][0](0.5).with_parameters(mass=rng.uniform(0.5, 3.0, samples))
     problem = at_one_step([mass], BODIES["uneven"], GLASS, samples, rng)
     index, xi = np.array([3, 0, 7, 11]), rng.normal(size=(3, samples))
 
     def term(problem, xi):
         """(3, 4, B): rate of change of momentum, and its slopes in the true velocity."""
-        m = row(inertia(problem.sides.elements, problem.momenta))
+        m = row(frame_inertia(problem.sides.elements, problem.momentum_rate))
         nothing = Net(*[(np.zeros(xi.shape[-1]),) * 3] * 5)
         return np.stack([np.stack(column) for column in with_momentum(nothing, *xi, m, 1.0)[:4]], 1)
 
     assert_is_slope(lambda x: term(problem, x[:, 0])[:, :, None], xi[:, None])
     np.testing.assert_allclose(term(problem.take(index), xi[:, index]), term(problem, xi)[..., index], rtol=1e-14)
     e = problem.sides.elements
-    borne = on_elements(e, problem.momenta, plus((e.v_t, e.v_n, e.v_w), carried(e, *xi)))
+    borne = element_momentum_rates(e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
     np.testing.assert_allclose(borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13)
 
 

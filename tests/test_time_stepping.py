@@ -34,7 +34,7 @@ from rft import (
     work_done,
 )
 from rft.balance.solver import Accuracy
-from rft.bodies.base import halves
+from rft.bodies.base import half_lengths
 from rft.contact import assemble
 from rft.se2 import compose, exp
 from rft.stepping import Stepping
@@ -422,9 +422,9 @@ def test_what_is_left_is_the_sum_of_all_changes_to_come():
     """Two modes of a massless march, one of either sign, one in heading; the change of each cycle is known."""
     ratio, size = np.array([0.5, 0.8]), np.array([[1.0, 0.0], [0.0, 0.0], [0.0, -2.0]])
     cycles = limit_cycle.begin(2)
-    assert np.isinf(limit_cycle.light(cycles, size).drift).all()
+    assert np.isinf(limit_cycle.after_massless_cycle(cycles, size).drift).all()
     for k in range(6):
-        cycles = limit_cycle.light(cycles, 3.0 + size * ratio**k)
+        cycles = limit_cycle.after_massless_cycle(cycles, 3.0 + size * ratio**k)
     np.testing.assert_allclose(
         cycles.drift, np.abs(size).max(0) * ratio**4, rtol=1e-12
     )  # counted from the cycle before
@@ -437,7 +437,7 @@ def test_cells_of_the_ground_do_not_keep_a_march_from_settling():
     cells, cycles, settled = np.array([0.4e-4, 0.9e-4, 3e-4]), limit_cycle.begin(7), []
     for k in range(40):
         left = 0.02 * slow**k * np.array([[1.0], [-0.5], [0.2]])
-        cycles = limit_cycle.light(cycles, 0.3 + left + cells[:, None] * rng.normal(size=(3, 7)))
+        cycles = limit_cycle.after_massless_cycle(cycles, 0.3 + left + cells[:, None] * rng.normal(size=(3, 7)))
         settled.append((cycles.drift <= 1e-3).all())
         assert k < 2 or (cycles.drift > 0.4 * np.abs(left).max(0) - 2e-4).all(), k
     assert not any(settled[:10])
@@ -486,14 +486,16 @@ def test_a_kicked_body_coasts():
     alpha, alphadot = (x.T[:, :, None].transpose(1, 0, 2) for x in Circle(amplitude=1.0).cycle(64))
     body, effects = Chain(), (heavy(1e6),)
     assembly = assemble(Viscous(2.0), body, effects)
-    steps = Stepping(assembly, alpha, alphadot, Accuracy(1e-6, 1e-10), "numpy", True, halves(body))
-    over_ground = lambda s: s.pasts[0][-1][:, :, 0].sum(1)  # momentum, and its moment
+    steps = Stepping(assembly, alpha, alphadot, Accuracy(1e-6, 1e-10), "numpy", True, half_lengths(body))
+    over_ground = lambda s: s.effect_states[0][-1][:, :, 0].sum(1)  # momentum, and its moment
     state = steps.begin()
     for _ in range(5):
         site = steps.site(state)
         state, _ = steps.step(state)
     before, change = over_ground(state), np.array([[0.3], [-0.2], [0.4]])
-    state = steps.kicked(state._replace(cycles=state.cycles._replace(kick=change)), steps.problem(4), site)
+    state = steps.with_velocity_change(
+        state._replace(cycles=state.cycles._replace(extrapolation=change)), steps.problem(4), site
+    )
     kicked = over_ground(state)
     np.testing.assert_array_less(0.02, np.abs(kicked - before))
     after = []
@@ -519,7 +521,7 @@ def test_moments_of_a_heavy_body_move_its_elements(medium, off):
     ahead = np.concatenate([found.xi[:1], 1.5 * found.xi[1:-1] - 0.5 * found.xi[:-2]])  # mean of the last and the next
     pose = np.concatenate([found.pose[:1], compose(found.pose[:-2], exp(dt * ahead))])
     at, facing = pose[:, 0] + 1j * pose[:, 1], np.exp(1j * pose[:, 2])
-    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.place
+    along, half, place = facing * (motion.c + 1j * motion.s), motion.half, at + facing * motion.centres
     velocity = (motion.v[0] + 1j * motion.v[1]) * along + facing * (x + 1j * y) + 1j * turn * (place - at)
     spin = motion.v[2] / half + turn
     p = 2 * half * velocity
@@ -538,25 +540,25 @@ def test_a_kick_that_leads_astray_is_taken_back():
     kick. It goes on from the end of its calmest cycle, and both get there."""
     limit, zero = np.array([[1.0], [-1.0], [2.0]]), np.zeros((3, 2))
     halved = lambda x: x + 0.5 * (limit - x)
-    after = lambda c, start, end: limit_cycle.heavy(c._replace(start=start), end - limit, end, 0.0)
-    cycles = limit_cycle.heavy(limit_cycle.begin(2), zero, zero, 0.0)
+    after = lambda c, start, end: limit_cycle.after_heavy_cycle(c._replace(start=start), end - limit, end, 0.0)
+    cycles = limit_cycle.after_heavy_cycle(limit_cycle.begin(2), zero, zero, 0.0)
     assert np.isinf(cycles.drift).all()
     x = zero
     for _ in range(2):
         start, x = x, halved(x)
         cycles = after(cycles, start, x)
-    step = cycles.kick
+    step = cycles.extrapolation
     calm, wild = x, halved(x + step) + [[0.0, 30.0], [0.0, -20.0], [0.0, 10.0]]
     np.testing.assert_allclose(calm + step, limit * np.ones(2), atol=1e-12)
     cycles = after(cycles, calm + step, wild)
-    step, drift = cycles.kick, cycles.drift
+    step, drift = cycles.extrapolation, cycles.drift
     np.testing.assert_allclose(wild + step, np.hstack([limit, calm[:, 1:]]), atol=1e-12)
     assert drift[0] <= 0.5 < 10.0 < drift[1]
     x = wild + step
     for _ in range(3):
         start, x = x, halved(x)
         cycles = after(cycles, start, x)
-        x = x + cycles.kick
+        x = x + cycles.extrapolation
     np.testing.assert_allclose(x, limit * np.ones(2), atol=1e-9)
 
 
@@ -609,7 +611,7 @@ def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
         counted = lambda *args, f=original, what=what: made.append(what) or f(*args)
         monkeypatch.setattr(owner, what, counted)
     if not kept:
-        monkeypatch.setattr("rft.stepping.MOST_KEPT", 0)
+        monkeypatch.setattr("rft.stepping.MOST_STORED", 0)
     for phases in (8, 16):
         made.clear()
         found = time_steps(GLASS, Chain(), *HEAVY.cycle(phases), effects=effects, cycles=2, with_work=True)
@@ -623,7 +625,7 @@ def test_what_does_not_change_is_not_built_again(kept, monkeypatch):
 
 def test_halves_are_the_whole_body():
     for body in BODIES.values():
-        assert 2 * halves(body).sum() == pytest.approx(1)
+        assert 2 * half_lengths(body).sum() == pytest.approx(1)
 
 
 def random_march(rng):

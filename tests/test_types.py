@@ -75,7 +75,7 @@ RIGHT = {  # what looks wrong and is not
     ("Chain", "waves", "None"),
     ("closed", "true"), ("Path", "angle", "empty"),
     ("places", "list"), *itertools.product(("SpatialPath",), ("rx", "ry", "rz"), ("empty",)),
-    ("bends", "None"), ("body_length", "None"),
+    ("smooth_normals", "None"), ("body_length", "None"),
     *itertools.product(("name", "text", "matched"), ("text", "digits")),
 }  # fmt: skip
 

@@ -149,7 +149,7 @@ def test_a_survey_finds_what_drives_a_motion_on():
     face = np.sign(np.sin(beta + gamma).round(12))
     pulled = (-np.sin(beta) * a_x - np.cos(beta) * a_z) * face > 0
     assert bad.pulling == pytest.approx(pulled.mean(), abs=1e-12)
-    assert f"drives motion on over {100 * (power > 0).mean():.1f} % of the plane, most at beta = " in bad.told()
+    assert f"drives motion on over {100 * (power > 0).mean():.1f} % of the plane, most at beta = " in bad.description()
 
 
 # Lift over drag at one depth: DESIGN section 9, with and without the cut.
@@ -213,8 +213,8 @@ def test_a_turning_plate_against_adaptive_quadrature():
 @pytest.mark.parametrize("shape", OUTLINES)
 def test_the_mirrored_scene_has_the_mirrored_force(shape):
     outline = OUTLINES[shape].outline(60)
-    bends = None if outline.bends is None else outline.bends[::-1, ::-1] * [-1, 1]
-    mirrored = Outline(outline.points[::-1] * [-1, 1], outline.width, bends)
+    normals = None if outline.smooth_normals is None else outline.smooth_normals[::-1, ::-1] * [-1, 1]
+    mirrored = Outline(outline.points[::-1] * [-1, 1], outline.width, normals)
     pose, twist = random_motions(200, 3)
     for stress in (M0, STRESSES["jumping"]):
         there, here = (
@@ -349,7 +349,7 @@ def test_a_face_at_grazing_incidence_is_rounded_over_the_angle():
 def _under(stress, rod, gamma):
     """Upward force on the faces that look down."""
     at = contact.Motion(0.0, -0.3, 1.0, 0.0, np.cos(gamma), -np.sin(gamma), 0.0)
-    ground = Ground(sine=np.sin(stress.grazing))
+    ground = Ground(grazing_sine=np.sin(stress.grazing))
     force = contact.load(contact.record(stress), ground, contact.elements(rod), at, 1.0, True, False)
     return float(force.z[rod.normals[:, 1] < -0.5].sum())
 
@@ -393,11 +393,11 @@ def test_legs_of_any_curvature_have_the_same_projected_length_and_a_smooth_famil
 
 def test_a_leg_that_turns_forwards_drives_forwards():
     leg, loose = CLeg(0.038, 0.025).outline(), VERTICAL["poppy-seeds-loose"].stress
-    _, pose, twist = Rotate(hub_height=0.02).course(leg)
+    _, pose, twist = Rotate(hub_height=0.02).trajectory(leg)
     found = loads(loose, leg, pose, twist)
     assert found.force[:, 0].max() > 4 and found.force[:, 1].max() > 8
     assert found.moment.min() < -0.4 and found.moment.max() == 0  # against the rotation
-    other = Rotate(hub_height=0.02, rate=-2 * np.pi, start=np.pi, stop=-np.pi).course(leg)
+    other = Rotate(hub_height=0.02, rate=-2 * np.pi, start=np.pi, stop=-np.pi).trajectory(leg)
     assert loads(loose, leg, other.pose, other.twist).force[:, 0].min() < -2
 
 
@@ -410,17 +410,17 @@ def test_courses_have_the_velocities_of_their_poses():
         Rotate(hub_height=0.02, rate=-3.0, start=1.0, stop=-2.0, speed=0.1), Path(t, np.sin(t), np.cos(2 * t), t**2),
     ]  # fmt: skip
     for motion in motions:
-        t, pose, twist = motion.course(leg)
+        t, pose, twist = motion.trajectory(leg)
         np.testing.assert_allclose(np.gradient(pose, t, axis=0, edge_order=2), twist, atol=1e-9)
-    assert Drag(depth=0.03).course(leg).pose[0].tolist() == [0.0, -0.03, 0.0]
-    np.testing.assert_allclose(motions[3].course(leg).twist[2000], (np.cos(1.0), -2 * np.sin(2.0), 2.0), atol=1e-5)
+    assert Drag(depth=0.03).trajectory(leg).pose[0].tolist() == [0.0, -0.03, 0.0]
+    np.testing.assert_allclose(motions[3].trajectory(leg).twist[2000], (np.cos(1.0), -2 * np.sin(2.0), 2.0), atol=1e-5)
 
 
 def test_penetration_begins_at_the_surface_and_ends_at_its_depth():
     for name in ("half-cylinder", "c-leg", "wheel, lugs"):
         outline = OUTLINES[name].outline(300)
         motion = Penetrate(depth=0.04, attitude=0.7, direction=1.1)
-        pose = motion.course(outline).pose
+        pose = motion.trajectory(outline).pose
         lowest = lambda p: (p[1] + outline.points[:, 1] * np.cos(p[2]) - outline.points[:, 0] * np.sin(p[2])).min()
         assert lowest(pose[0]) == pytest.approx(0.0, abs=1e-15)
         assert lowest(pose[-1]) == pytest.approx(-0.04, abs=1e-15)

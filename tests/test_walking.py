@@ -21,13 +21,13 @@ from rft.balance.backend import preferring
 from rft.ground import Aeration, GrainInertia, Slope
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
-from rft.walking.limit import Found, Limit, _late, _Search, limit_cycle
+from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles
 from rft.walking.march import march, step
 from rft.walking.planar import GRAVITY, State
-from rft.walking.planar_walk import _speed, _strides, again, walk
-from rft.walking.robot import parts
+from rft.walking.planar_walk import _limit_fields, _strides, rerun, walk
+from rft.walking.robot import intervals
 from rft.walking.sdirk import EFFORT, Effort
-from rft.walking.stride import Walk, cycles_to_settle, from_rest, still_to_come
+from rft.walking.stride import Walk, cycles_to_settle, from_rest, remaining_change
 
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 ROBOT = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.06), hip_height=-0.004, axle=0.002)
@@ -83,8 +83,8 @@ def test_forces_are_the_sum_over_legs_and_belly(tension, robot):
     robots = _strides([walker], dataclasses.replace(QUICK, rounding=1e-7)).robots
     pose, twist, phase = np.array([0.3, 0.006, 0.15]), np.array([12.0, -25.0, -40.0]), 0.17
     twist = twist if robot is ROBOT else -twist
-    angle, rate = robots.turned(np.array([phase]), phase)
-    a, motors, ground = robots.forces(pose[None, None], twist[None, None], angle, rate)
+    angle, rate = robots.leg_motion(np.array([phase]), phase)
+    a, motors, ground = robots.accelerations(pose[None, None], twist[None, None], angle, rate)
     wrench, motor, into = np.zeros(3), 0.0, 0.0
     places = [(x, robot.hip_height, at) for x in robot.hips for at in (0.0, 0.5)]
     parts = [(robot.leg(8), x, z, at) for x, z, at in places] + [(robot.belly(8), 0.0, 0.0, None)]
@@ -112,7 +112,7 @@ def test_a_belly_feels_the_ground_by_degrees_and_robots_stand_on_their_lowest_po
     stress, sink, rounding = dataclasses.replace(SAND, grazing=math.radians(30)), 4e-3, 3e-3
     robots = _strides([Walker(high, Tripod(1.0), stress)], QUICK).robots
     pose, twist = np.array([0.0, 0.01, 0.0]), np.array([0.0, -sink, 0.0])
-    a = robots.forces(pose[None, None], twist[None, None], *robots.turned(np.zeros(1), 0.0))[0][0, 0]
+    a = robots.accelerations(pose[None, None], twist[None, None], *robots.leg_motion(np.zeros(1), 0.0))[0][0, 0]
     plain = loads(dataclasses.replace(stress, grazing=0.0), high.belly(8), pose, twist).force
     fast = math.hypot(sink, rounding)
     share = sink / fast * sink / math.hypot(sink, math.sin(stress.grazing) * fast)
@@ -125,13 +125,13 @@ def test_a_belly_feels_the_ground_by_degrees_and_robots_stand_on_their_lowest_po
     for at in (0.0, 0.5):
         (x, z), angle = ROBOT.leg(8).points.T, gait.angle(at, at)
         lowest.append((math.cos(angle) * z - math.sin(angle) * x).min() + ROBOT.hip_height)
-    assert robots.placed().pose[0, 1] == pytest.approx(-min(*lowest, -flat.height / 2), abs=1e-12)
+    assert robots.start().pose[0, 1] == pytest.approx(-min(*lowest, -flat.height / 2), abs=1e-12)
 
 
 def fall(steps: int, time: float = 0.12) -> tuple[State, State, object]:
     """Xplorer at 4 Hz for a while from rest."""
     robots = _strides([xplorer(frequency=4.0)], QUICK).robots
-    state = first = robots.placed()
+    state = first = robots.start()
     for k in range(steps):
         half = 4.0 * time / steps
         state = step(robots, state, k * half, (k + 0.5) * half, time / steps)
@@ -154,11 +154,11 @@ def test_steps_are_of_order_two_and_energy_is_kept_to_that():
 
 def test_what_falls_free_falls_as_galilei_says():
     robots = _strides([Walker(ROBOT, Tripod(2.0), SAND)], QUICK).robots
-    state = robots.placed()
+    state = robots.start()
     state = state._replace(pose=state.pose + [0, 5.0, 0], twist=np.array([[0.3, 1.0, 0.7]]))
     for k in range(10):
         state = step(robots, state, 0.02 * k, 0.02 * k + 0.01, 0.01)
-    z = -robots.placed().pose[0, 1]
+    z = -robots.start().pose[0, 1]
     assert state.pose[0, 0] == pytest.approx(0.03, abs=1e-9)
     assert state.pose[0, 1] + z == pytest.approx(5.0 + 0.1 - GRAVITY * 0.01 / 2, abs=1e-4)
     assert (state.pose[0, 2], state.work[0], state.loss[0]) == pytest.approx((0.07, 0.0, 0.0))
@@ -171,19 +171,19 @@ def test_a_box_pitches_about_its_width():
 def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
     """Of a map of one stride, and of two: all progress to come, and what defects move; stuck below 2 % of a reach a cycle."""
     strides, both = _strides([xplorer(1.0, 3.0)] * 2, QUICK), np.arange(2)
-    start = strides.robots.placed()
+    start = strides.robots.start()
     slopes, gains = np.diag([0.5, 0.2, 0.8, 0.1, -0.3]), np.array([0.2, 0.0, 0.05, 0.01, 0.0])
-    search = _Search(strides, [Limit(start.take([k]), fold, slopes, gains) for k, fold in enumerate((1, 2))])
-    left = np.array([[1e-3], [2e-3], [4e-3], [0.0], [1e-3]]) * [1.0, 1.0]
-    search._step(both, search.at.copy(), left, np.array([1e-3, 1e-3]))
+    search = _Search(strides, [Limit(start.take([k]), period, slopes, gains) for k, period in enumerate((1, 2))])
+    residual = np.array([[1e-3], [2e-3], [4e-3], [0.0], [1e-3]]) * [1.0, 1.0]
+    search._step(both, search.start.copy(), residual, np.array([1e-3, 1e-3]))
     np.testing.assert_allclose(search.drift, (0.2 * 1e-3 / 0.5 + 0.05 * 4e-3 / 0.2) / np.array([1, 2]))
-    np.testing.assert_allclose(search.off, 1e-3 * 0.05 / 0.2 / strides.fast / [1, 2])
+    np.testing.assert_allclose(search.unsolved_error, 1e-3 * 0.05 / 0.2 / strides.leg_speed / [1, 2])
     one = np.ones(1)
     for progress, status in ((4.0e-4, "stuck"), (4.2e-4, "walking")):
-        found = Found(progress * one, 2e-3 * one, 1e-3 * one, [True], 5 * one, [""], search.limits)
-        told = _speed(strides, found, 0)
-        assert told["status"] == status and told["cycles"] == 2.5
-        assert [told[x] for x in ("speed", "drift", "off")] == pytest.approx([6 * progress, 12e-3, 6e-3])
+        found = LimitCycles(progress * one, 2e-3 * one, 1e-3 * one, [True], 5 * one, [""], search.limits)
+        fields = _limit_fields(strides, found, 0)
+        assert fields["status"] == status and fields["cycles"] == 2.5
+        assert [fields[x] for x in ("speed", "drift", "unsolved_error")] == pytest.approx([6 * progress, 12e-3, 6e-3])
 
 
 def test_without_a_limit_cycle_the_mean_of_four_cycles_counts():
@@ -193,11 +193,13 @@ def test_without_a_limit_cycle_the_mean_of_four_cycles_counts():
         pose, defect = state.pose + np.array([1e-3 * (k + 1), 0, 0]), state.defect + 5e-4
         return None, State(*(x[None] for x in state._replace(pose=pose, defect=defect)))
 
-    fake = types.SimpleNamespace(cycle=2, period=0.5, frequency=np.array([3.0]), ended=lambda state, r: [""], run=run)
-    start = Limit(State.still(np.zeros((1, 3))), 1)
-    found = _late(fake, [start], np.array([0]), Found(*np.zeros((5, 1)), np.array([""]), [start]))
+    fake = types.SimpleNamespace(
+        cycle=2, period=0.5, frequency=np.array([3.0]), end_status=lambda state, r: [""], run=run
+    )
+    start = Limit(State.at_rest(np.zeros((1, 3))), 1)
+    found = _with_means(fake, [start], np.array([0]), LimitCycles(*np.zeros((5, 1)), np.array([""]), [start]))
     assert (found.progress[0], found.drift[0], found.strides[0]) == pytest.approx((4.5e-3, 6e-3, 8))
-    assert found.off[0] * 3.0 / 0.5 == pytest.approx(5e-4)
+    assert found.unsolved_error[0] * 3.0 / 0.5 == pytest.approx(5e-4)
 
 
 def test_the_limit_cycle_is_that_of_many_strides():
@@ -205,9 +207,9 @@ def test_the_limit_cycle_is_that_of_many_strides():
     and the first and the last get there by themselves."""
     walkers = [xplorer(c, f) for c, f in ((0.3, 3.0), (-0.6, 3.25), (1.0, 4.0))]
     strides, every = _strides(walkers, Fineness(steps=12, elements=6)), np.arange(3)
-    state, _, _, _, fold = from_rest(strides, 3 / strides.frequency)
-    assert fold.tolist() == [1, 1, 2]
-    found = limit_cycle(strides, [Limit(state.take([k]), fold[k]) for k in every])
+    state, _, _, _, period = from_rest(strides, 3 / strides.frequency)
+    assert period.tolist() == [1, 1, 2]
+    found = limit_cycles(strides, [Limit(state.take([k]), period[k]) for k in every])
     assert found.periodic.all() and (found.ends == "").all() and (found.strides <= 10).all()
     for _ in range(10):
         first, state = state, strides.run(state, 0, every)[1].take(-1)
@@ -220,7 +222,7 @@ def test_the_limit_cycle_is_that_of_many_strides():
     assert np.abs(strides.scaled(last, every) - strides.scaled(first, every)).max() < 2e-3
     np.testing.assert_allclose(last.pose[:, 0] - first.pose[:, 0], 2 * found.progress, rtol=5e-3)
     left = [found.limits[0]._replace(slopes=-1.5 * np.eye(5)), *found.limits[1:]]  # as if a push sent it away
-    pushed = limit_cycle(strides, left)
+    pushed = limit_cycles(strides, left)
     assert pushed.periodic.tolist() == [False, True, True]
     np.testing.assert_allclose(pushed.progress, found.progress, rtol=5e-3)
 
@@ -239,7 +241,7 @@ def test_a_walk_tells_when_it_is_near_its_limit_cycle():
     brief, long = (walk([swings], Fineness(steps=12, elements=6, duration=d))[0] for d in (2.0, 6.0))
     x = np.interp(np.arange(20) / 3.25, long.t, long.pose[:, 0])
     seen = cycles_to_settle(np.diff(x), long.speed / 3.25) / 3.25
-    assert 4.0 < seen == long.settled < 6.0 and abs(brief.settled - seen) < 1.5 / 3.25
+    assert 4.0 < seen == long.settling_time < 6.0 and abs(brief.settling_time - seen) < 1.5 / 3.25
 
 
 def test_what_is_told_of_a_walk():
@@ -247,7 +249,7 @@ def test_what_is_told_of_a_walk():
     t = np.linspace(0.0, 4.0, 33)
     zero, pose = np.zeros_like(t), np.stack([0.25 * t, 0.03 + 0 * t, 0 * t], -1)
     fields = t, pose, np.zeros_like(pose), 0.6 * t, 0.5 * t, zero, 0.25, "walking", 14.0, True, 0.0, None
-    one = walking.Walked(Walk(*fields, settled=1.5), 0.01)
+    one = walking.Walked(Walk(*fields, settling_time=1.5), 0.01)
     said, found = walks.told(XPLORER, one), json.loads(walks.as_json(one))
     assert said.startswith(
         "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
@@ -260,14 +262,14 @@ def test_what_is_told_of_a_walk():
         (np.inf, "does not come within 5 %"),
         (np.nan, "cycle)"),
     ):
-        other = one._replace(walk=one.walk._replace(settled=settled))
+        other = one._replace(walk=one.walk._replace(settling_time=settled))
         assert words in walks.told(XPLORER, other)
         assert json.loads(walks.as_json(other))["settled"] == (0.0 if settled == 0.0 else None)
     y = 0.25 * (1 - np.cos(0.1 * t)) / 0.1
     arc = np.stack([0.25 * np.sin(0.1 * t) / 0.1, pose[:, 1], 0 * t], -1)
     more = {"y": y, "roll": zero, "yaw": 0.1 * t}
     turns = one._replace(
-        walk=one.walk._replace(pose=arc, more=more, turning=0.1, aside=-0.02), turning=0.01, aside=0.003
+        walk=one.walk._replace(pose=arc, spatial=more, yaw_rate=0.1, lateral_speed=-0.02), turning=0.01, aside=0.003
     )
     said, found = walks.told(XPLORER, turns), json.loads(walks.as_json(turns))
     assert "\nturning at 5.7 +- 0.6 degrees/s, drifting aside at -0.02 +- 0.003 m/s (positive: to the left" in said
@@ -286,7 +288,7 @@ def test_robots_side_by_side_walk_as_alone():
         np.testing.assert_allclose(one.pose[-1], alone.pose[-1], atol=1e-9)
         assert one.speed == pytest.approx(alone.speed, abs=1e-9)
     assert len({round(w.speed, 3) for w in together}) == 3
-    assert together[0].settled == 0.5 and (together[0].aside, together[0].turning) == (0.0, 0.0)
+    assert together[0].settling_time == 0.5 and (together[0].lateral_speed, together[0].yaw_rate) == (0.0, 0.0)
 
 
 def test_every_end_has_its_status_and_no_nan():
@@ -302,11 +304,11 @@ def test_every_end_has_its_status_and_no_nan():
     }
     for status, walker in cases.items():
         found = walk([walker], QUICK, 2)[0]
-        assert found.status == status and np.isnan(found.settled) == (status != "walking")
+        assert found.status == status and np.isnan(found.settling_time) == (status != "walking")
         for values in found[:8]:
             if not isinstance(values, str):
                 assert np.isfinite(values).all(), status
-        more = again([walker], dataclasses.replace(QUICK, steps=12), [found], 2)[0]
+        more = rerun([walker], dataclasses.replace(QUICK, steps=12), [found], 2)[0]
         assert math.isfinite(more.speed)
 
 
@@ -326,7 +328,7 @@ def test_absurd_robots_end_with_a_status_and_numbers(what):
     one = Walker(dataclasses.replace(XPLORER.robot, **changes), gait, stress)
     (found,) = walk([one], Fineness(steps=8, elements=4), 1)
     assert found.status in walking.STATUSES
-    for values in (*found[:7], found.cycles, found.drift, found.residual, found.off, found.unaccounted):
+    for values in (*found[:7], found.cycles, found.drift, found.residual, found.unsolved_error, found.unaccounted):
         assert np.isfinite(values).all()
 
 
@@ -347,13 +349,13 @@ def test_a_walker_that_speeds_up_slowly_is_not_yet_periodic():
     assert 3 * found.twist[half, 0] < found.twist[-1, 0]
     change = np.array([[1e-4, 3e-4, 3e-4, 0.0]])
     np.testing.assert_allclose(
-        still_to_come(change, [[2e-4, 3e-4, 1e-4, 0.0]], 50), [2e-4, 1.5e-2, 1.5e-2, 0.0], rtol=1e-12
+        remaining_change(change, [[2e-4, 3e-4, 1e-4, 0.0]], 50), [2e-4, 1.5e-2, 1.5e-2, 0.0], rtol=1e-12
     )
 
 
 def test_what_is_to_come_is_asked_for_the_cycles_that_are_left(monkeypatch):
     left = []
-    monkeypatch.setattr("rft.walking.stride.still_to_come", lambda *x: left.append(x[2].tolist()) or np.ones(1))
+    monkeypatch.setattr("rft.walking.stride.remaining_change", lambda *x: left.append(x[2].tolist()) or np.ones(1))
     walk([xplorer(1.0, 4.0)], Fineness(steps=8, elements=4, duration=0.5))
     assert left == [[1.5], [1.0], [0.5], [0.0]]
 
@@ -391,12 +393,12 @@ def test_the_estimate_covers_the_error():
     done: list = []
     one = walking.walked([scene], settling=True, progress=done.append)[0]
     assert done == sorted(done) and 0 < done[0] < 0.5 and done[-1] == 1.0 and len(done) > 5
-    truth = again([scene.walker], dataclasses.replace(QUICK, steps=64, elements=32), [one.walk], 2)[0].speed
+    truth = rerun([scene.walker], dataclasses.replace(QUICK, steps=64, elements=32), [one.walk], 2)[0].speed
     assert abs(one.walk.speed - truth) < one.estimate < 0.15 * truth
     sandbot = scenes.load("sandbot")  # at 8 rad/s, where finer outlines rear up another way
     sandbot = dataclasses.replace(sandbot, gait=dataclasses.replace(sandbot.gait, frequency=8 / (2 * np.pi)))
     one = walking.walked([sandbot], settling=True)[0]
-    truth = again([sandbot.walker], dataclasses.replace(sandbot.numerics, elements=32), [one.walk], 2)[0].speed
+    truth = rerun([sandbot.walker], dataclasses.replace(sandbot.numerics, elements=32), [one.walk], 2)[0].speed
     assert 0.08 * truth < abs(one.walk.speed - truth) < one.estimate < 0.2 * truth
 
 
@@ -405,23 +407,23 @@ def test_a_short_stance_has_steps_enough():
     then told nothing of that."""
     for duty, few in ((0.05, 4), (0.9, 4), (0.375, 4)):
         gait = Tripod(2.0, duty)
-        counts, half, twice = ([n for *_, n in parts(gait.kinks, steps)] for steps in (32, 16, 64))
+        counts, half, twice = ([n for *_, n in intervals(gait.kinks, steps)] for steps in (32, 16, 64))
         assert min(counts) == few
         assert [2 * n for n in half[::2]] == counts[::2] == [n / 2 for n in twice[::2]]
     scene = dataclasses.replace(XPLORER, gait=dataclasses.replace(XPLORER.gait, duty=0.05))
     one = walking.walked([scene], settling=True)[0]
-    truth = again([scene.walker], dataclasses.replace(scene.numerics, steps=96), [one.walk], 2)[0].speed
+    truth = rerun([scene.walker], dataclasses.replace(scene.numerics, steps=96), [one.walk], 2)[0].speed
     assert abs(one.walk.speed - truth) < one.estimate < 0.1 * truth
 
 
 def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
     """Of half and three quarters of the steps the larger change counts, and that with twice the elements besides."""
     other = lambda numerics: {16: 0.0, 24: 0.3, 32: 0.02 if numerics.elements == 24 else 0.0}[numerics.steps]
-    means = lambda off: {"speed": 1.0 + off, "aside": 0.1 - 2 * off, "turning": 0.2 + 3 * off}
-    walk = types.SimpleNamespace(**means(0.0), drift=0.001, off=0.0)
+    means = lambda off: {"speed": 1.0 + off, "lateral_speed": 0.1 - 2 * off, "yaw_rate": 0.2 + 3 * off}
+    walk = types.SimpleNamespace(**means(0.0), drift=0.001, unsolved_error=0.0)
     how = types.SimpleNamespace(
         walk=lambda *args, **more: [walk],
-        again=lambda w, numerics, *rest, **more: [types.SimpleNamespace(**means(other(numerics)))],
+        rerun=lambda w, numerics, *rest, **more: [types.SimpleNamespace(**means(other(numerics)))],
     )
     monkeypatch.setattr(walking, "engine", lambda name: how)
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
@@ -540,7 +542,10 @@ def test_other_refusals(geomech, tmp_path):
     legless = SMALL[: SMALL.index("[robot.legs]")] + SMALL[SMALL.index("[gait]") :]
     (tmp_path / "bad.toml").write_text(legless)
     (tmp_path / "small.toml").write_text(SMALL)
+    weightless = SMALL[: SMALL.index("[robot]")] + '[robot]\nkind = "wheel"\n' + SMALL[SMALL.index("[robot.legs]") :]
+    (tmp_path / "wheel.toml").write_text(weightless)
     for args, said in (
+        (("walk", "wheel.toml"), "missing required field `mass`: add mass = ..., in kg"),
         (("walk", "bad.toml"), "the table [robot.legs] is missing: add it"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),
@@ -630,7 +635,7 @@ def test_compiled_steps_are_those_by_numpy(tension, effort, monkeypatch):
     lugs, unsolved, stopped = Wheel(0.05, 0.02, 5, 0.01, 0.006), [], []
     for walkers in (legged, [Walker(Roller(0.08, lugs), Tripod(0.7), medium)]):
         strides = _strides(walkers, QUICK)
-        at = strides.robots, np.arange(len(walkers)), strides.robots.placed(), strides.phases, strides.of
+        at = strides.robots, np.arange(len(walkers)), strides.robots.start(), strides.phases, strides.rate_phases
         ends, found = (strides.top, strides.out_of_reach * [1.0, 1.0, 0.1][: len(walkers)]), {}
         for backend in ("numpy", "numba"):
             with preferring(backend):
@@ -647,14 +652,14 @@ def test_steps_that_are_not_solved_are_told(monkeypatch):
     """With Newton's method cut short some are not; the walk tells how far that moves its speed, and it is no farther off."""
     robot, scene = xplorer(1.0, 2.0), dataclasses.replace(XPLORER, numerics=QUICK)
     (right,) = walk([robot], QUICK, 1)
-    assert (right.unsolved, right.off) == (0, 0.0) and 0 < right.residual <= 1e-3 * QUICK.rounding
+    assert (right.unsolved, right.unsolved_error) == (0, 0.0) and 0 < right.residual <= 1e-3 * QUICK.rounding
     for tries in (2.0, 4.0):
         monkeypatch.setattr("rft.walking.march.EFFORT", Effort(np.ones((1, 1)), tries, 0.5))
         (found,) = walk([robot], QUICK, 1)
         assert found.unsolved > 0 and found.residual > 0.01
-        assert 1e-4 < abs(found.speed - right.speed) < found.off < right.speed / 5
+        assert 1e-4 < abs(found.speed - right.speed) < found.unsolved_error < right.speed / 5
     one = walking.walked([scene], settling=True)[0]
-    assert one.estimate > one.walk.off > 0
+    assert one.estimate > one.walk.unsolved_error > 0
     said = walks.told(scene, one)
     assert f"{one.walk.unsolved} steps were taken unsolved, off by up to" in said
 

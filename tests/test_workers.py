@@ -31,8 +31,7 @@ from geomech.study.bench import Study
 from rft import threads as threaded
 from rft.balance import backend
 from rft.laws import LAWS
-from rft.threads import cores
-from rft.threads import workers as threads
+from rft.threads import cores, thread_count
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
@@ -66,7 +65,7 @@ def test_a_worker_takes_one_thread_and_one_back_end_and_no_workers_of_its_own(tw
     assert len(pids) == 2 and os.getpid() not in pids
     with backend.preferring("numba"):
         assert {x[:4] for x in each(None, who, None, range(2))} == {(os.getpid(), 1, "numba", None)}
-    assert threads(None, 100) == cores() and backend.preferred() == "numpy"  # and it is over
+    assert thread_count(None, 100) == cores() and backend.preferred() == "numpy"  # and it is over
 
 
 def test_what_is_small_is_done_here(two):
@@ -314,5 +313,5 @@ def test_a_signal_that_comes_as_a_thread_ends_is_no_reason_to_wait_for_ever(monk
     ended = []
     monkeypatch.setattr(threaded, "SimpleQueue", Deaf)
     with pytest.raises(terminal.Stopped):
-        threaded.each(lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5])
+        threaded.run_shares(lambda share, stop: stop.wait(0.2 * share) or ended.append(share), [0, 1, 5])
     assert ended == [0]  # the others were told to stop

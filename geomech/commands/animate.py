@@ -35,8 +35,8 @@ def animate(
     costs = [motion.cost(scene, count), *([price(connection(scene))] if mapped else [])]
     if film.is_film(out):
         costs.append(film.cost(scene.numerics.phases, count))
-    balances, seconds, memory = zip(*costs)
-    takes = type(costs[0])(sum(balances), sum(seconds), max(memory))
+    balances, seconds, memory, besides = zip(*costs)
+    takes = type(costs[0])(sum(balances), sum(seconds), max(memory), sum(besides))
     allow(scene, takes, yes)
     kept = storing(scene, out, command="animate", cycles=count)
     with kept, terminal.progress(f"motion of {scene.name}") as bar:

@@ -21,16 +21,22 @@ NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it
 
 def allow(scene, cost, yes: bool, worth_saying: float | None = None, less: str = "ask for less") -> None:
     """Say what is to come if it takes long, or so many seconds, or otherwise than expected; SceneError, which says what to do
-    else, if it takes too long to be begun without --yes. From here on "auto" is the back end for that many balances."""
+    else, if it takes too long to be begun without --yes: here, or in its first second (`geomech.run.cost.decide`). From here
+    on "auto" is the back end for that many balances."""
     from geomech.output.system import notes
     from geomech.run.backend import prefer_for
+    from geomech.run.cost import decide
 
-    cost.check(scene.name, yes, less)
     prefer_for(cost.as_balances)
     for line in notes(scene.system) if hasattr(scene, "system") else ():  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)  # once a command, however often it asks
-    if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
-        terminal.tell(f"{scene.name}: {cost}")
+
+    def judge(cost) -> None:
+        cost.check(scene.name, yes, less)
+        if not cost.small or (worth_saying is not None and cost.seconds >= worth_saying):
+            terminal.tell(f"{scene.name}: {cost}")
+
+    decide(cost, judge)
 
 
 def scene_with_gait(name: str | Scene) -> Scene:
@@ -110,7 +116,7 @@ def field(
     with_gait: and the gait, which is refused if it leaves the field. harmonics: with those of the velocity, where it has
     any beside the connection, and the metric, if it has one. metric: it must."""
     from geomech.study.bench import Study
-    from geomech.study.cost import connection, of_metric, price
+    from geomech.study.cost import connection, of_even_part, of_metric, price
     from geomech.study.cost import harmonics as of_harmonics
     from geomech.study.effort import shared, why_none
     from geomech.tiers.fitted import fits
@@ -130,6 +136,7 @@ def field(
         costed = metric or (harmonics and not why_none(scene.system))
         if costed:
             parts, jobs = [*parts, study.compute_metric], [*jobs, *of_metric(scene)]
+        jobs += of_even_part(scene) if harmonics else []
         if harmonics and study.has_harmonics:
             parts.append(study.compute_harmonics)
             jobs += [] if costed and shared(scene.system) else of_harmonics(scene)
@@ -150,7 +157,7 @@ def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
     from itertools import combinations
 
     from geomech.commands.options import numbers
-    from geomech.study.cost import of_planes, price
+    from geomech.study.cost import frame, of_planes, price
 
     scene, joints = study.scene, study.scene.system.joints
     with named(scene.name):
@@ -164,7 +171,7 @@ def planes(study, pair: str | None, slice_: str | None, yes: bool) -> list:
             )
         angles = numbers("--slice", slice_, angle=None) if slice_ is not None else None
         at = [_held(scene, one, angles, pair is not None) for one in pairs]
-        allow(scene, price(of_planes(scene, len(pairs))), yes, WORTH_SAYING)
+        allow(scene, price([*of_planes(scene, pairs, at), *frame(scene)]), yes, WORTH_SAYING)
     with terminal.progress(f"planes of {scene.name}") as bar:
         return [
             study.plane(one, shape, progress=lambda done, k=k: bar((k + done) / len(pairs)))

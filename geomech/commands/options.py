@@ -223,24 +223,28 @@ ExtentOption = Annotated[
 
 def amplitude_kind(scene) -> str | None:
     """Of `numbers`: what an amplitude of the scene's gait is, None if it is an angle."""
-    if "amplitude" in getattr(scene.gait, "angles", ()):
+    from geomech.scene.key import angles_of
+
+    if "amplitude" in angles_of(type(scene.gait)):
         return None
     return f"the amplitude of a {type(scene.gait).__name__.lower()} is none"
 
 
 def parameter_kind(scene, parameter: str) -> str | None:
     """Of `numbers`: what a scene's parameter is (`geomech.study.sweep`), None if it is an angle in rad."""
+    from geomech.scene.key import angles_of
+
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
     if hasattr(scene, "robot"):
         of = {"robot": getattr(scene.robot, "legs", None), "gait": scene.gait, "medium": scene.medium}.get(section)
-        angle = key in getattr(of, "angles", ())
+        angle = key in angles_of(type(of))
         return None if angle else "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
     if parameter == "gait.amplitude":
         return amplitude_kind(scene)
     system = scene.system
     owners = {"gait": [scene.gait], "system": [system], "effects": getattr(system, "effects", ())}
     of = owners.get(section, [getattr(system, section, None)])
-    if parameter == "numerics.extent" or any(key in getattr(owner, "angles", ()) for owner in of):
+    if parameter == "numerics.extent" or any(key in angles_of(type(owner)) for owner in of):
         return None
     return "this key takes degrees as they are" if key.endswith("_deg") else NO_ANGLE
 

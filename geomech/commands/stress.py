@@ -39,7 +39,7 @@ def stress(
         raise SceneError("--beta and --gamma must be finite angles in degrees, of at most 1e6")
     law = load_medium(medium)
     whole = survey(law)
-    told = f"{medium} {whole.told()}" + (", which is cut" if law.tension == "cut" else "")
+    told = f"{medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
     if plot:
         from geomech.output import plots
 

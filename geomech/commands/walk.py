@@ -31,9 +31,9 @@ def walk(
     """How a robot walks on grains: mean speed with its error, and its way from rest. SI units, pitch in rad, nose down."""
     from geomech.output import animate as film
     from geomech.output import walks
+    from geomech.run.cost import LONGEST
     from geomech.scene import inputs
     from geomech.study import walking
-    from geomech.study.cost import LONGEST
 
     scene = loaded_walker(name)
     walking.refuse_engine(scene, engine)

@@ -6,13 +6,15 @@ import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import Note, UnitWarning, number, short
+from geomech.core.errors import Note, UnitWarning, short
 from geomech.gaits import frames, midline
-from geomech.geometry.gait import GAITS, Gait
+from geomech.geometry.gait import GAITS, LARGEST, Gait
 from geomech.io.rows import LARGEST_NUMBER
+from rft.checks import Number
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
@@ -40,15 +42,10 @@ class Centreline(Gait):
     positive counter-clockwise and y runs upwards: pixels counted downwards give the mirror image. A midline keeps its
     length: each frame is scaled to its own, and where it lies and points to does not matter.
 
-    elements (-): as many as the body has. period (unit of t): of the gait. Left out, the frames run over it once if the last
-    repeats the first; else, if they are equally spaced, it is their number times their spacing. amplitude (-): scales the
-    bends.
-
     In time the bends are a periodic cubic spline, of order 4 in
     the spacing of the frames; along the body splines too, of order 4 in that of s, 3 in that of points.
 
-    keep_harmonics (-): smooth by least squares instead, with that many harmonics in time; 0 for none. keep_modes (-): and
-    with that many Legendre modes of the curvature along the body; 0 for none. sha256 (-): of the file, filled in if left
+    sha256 (-): of the file, filled in if left
     out; given, the file must have it. centre (rad): takes none.
 
     The file is read once, when the gait is made.
@@ -63,24 +60,37 @@ class Centreline(Gait):
     estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 
     file: str
-    elements: int = 100
-    period: float | None = None
-    keep_harmonics: int = 0
-    keep_modes: int = 0
+    elements: Annotated[int, Number(3, 2000, "-", "as many as the body has", whole=True)] = 100
+    period: Annotated[
+        float | None,
+        Number(
+            frames.SMALLEST_NUMBER, LARGEST_NUMBER, "unit of t",
+            "of the gait. Left out, the frames run over it once if the last repeats the first; else, if they are equally "
+            "spaced, it is their number times their spacing",
+        ),
+    ] = None  # fmt: skip
+    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "-", "scales the bends")] = 1.0
+    keep_harmonics: Annotated[
+        int,
+        Number(
+            0, 2000, "-", "smooth by least squares instead, with that many harmonics in time; 0 for none", whole=True
+        ),
+    ] = 0
+    keep_modes: Annotated[
+        int,
+        Number(
+            0, 2000, "-", "and with that many Legendre modes of the curvature along the body; 0 for none", whole=True
+        ),
+    ] = 0
     sha256: str = ""
 
     def __post_init__(self):
         if not isinstance(self.file, (str, Path)):
             raise ValueError(f"file must be the name of a CSV file, got {short(self.file)}")
         object.__setattr__(self, "file", str(self.file))
-        for name, low in (("elements", 3), ("keep_harmonics", 0), ("keep_modes", 0)):
-            number(name, getattr(self, name), low, 2000, whole=True)
-            object.__setattr__(self, name, int(getattr(self, name)))
         super().__post_init__()
         if self.centre:
             raise ValueError("a measured centreline takes no centre: it undulates about the straight body")
-        if self.period is not None:
-            number("period", self.period, frames.SMALLEST_NUMBER, LARGEST_NUMBER)
         if not isinstance(self.sha256, str):
             raise ValueError(f"sha256 must be text, got {short(self.sha256)}")
         data = frames.read(self.file)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import number, short
+from geomech.core.errors import short
 from geomech.geometry.gait import GAITS, LARGEST, Gait, finite_array
+from rft.checks import Number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,14 +45,11 @@ class Series(Gait):
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Circle(Series):
-    """alpha = centre + amplitude (cos t, sin t): counter-clockwise.
+    """alpha = centre + amplitude (cos t, sin t): counter-clockwise."""
 
-    amplitude (rad): its radius.
-    """
+    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "its radius")] = 1.0
 
     kind = "circle"
-
-    angles = ("centre", "amplitude")
 
     @property
     def amplitude_label(self) -> str:
@@ -65,20 +64,20 @@ class Circle(Series):
 class Ellipse(Series):
     """Counter-clockwise about its centre.
 
-    semi_axes (rad): at amplitude 1. tilt (rad): by which the first is turned counter-clockwise from alpha_1.
+    semi_axes (rad): at amplitude 1.
     """
 
     kind = "ellipse"
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
-    tilt: float = 0.0
-    angles = ("centre", "semi_axes", "tilt")
+    tilt: Annotated[
+        float, Number(-LARGEST, LARGEST, "rad", "by which the first is turned counter-clockwise from alpha_1")
+    ] = 0.0
 
     def __post_init__(self):
         axes = finite_array("semi_axes", self.semi_axes, 1)
         if axes.size != 2:
             raise ValueError(f"an ellipse needs two semi_axes, got {short(self.semi_axes)}")
-        number("tilt", self.tilt, -LARGEST, LARGEST)
         super().__post_init__()
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
@@ -113,7 +112,6 @@ class Fourier(Series):
 
     cos: tuple[tuple[float, ...], ...]
     sin: tuple[tuple[float, ...], ...]
-    angles = ("centre", "cos", "sin")
 
     def __post_init__(self):
         cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)

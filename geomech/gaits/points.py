@@ -21,7 +21,6 @@ class Points(Gait):
     kind = "points"
 
     points: tuple[tuple[float, ...], ...]
-    angles = ("centre", "points")
 
     def __post_init__(self):
         points = finite_array("points", self.points, 2)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import number, real_array
+from geomech.core.errors import real_array
 from geomech.gaits.fourier import Series
 from geomech.geometry.gait import GAITS, LARGEST, Gait
+from rft.checks import Number, in_range
 
 
 @GAITS.register
@@ -18,28 +20,21 @@ class Wave(Series):
     the tail. It runs from head to tail, which drives the body head first where drag across exceeds that along; with
     waves < 0, or reverse, from tail to head; with waves = 0 all joints move alike.
 
-    amplitude (rad): of each joint. waves (-): on the body, at most half as many as links. offset (rad): of all joints, which
-    turns the body. joints (-): of the body, one fewer than links.
-
     In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
     reverse.
     """
 
     kind = "wave"
 
-    amplitude: float = 0.5
-    waves: float = 1.0
-    offset: float = 0.0
-    joints: int = 6
-    angles = ("centre", "amplitude", "offset")
+    amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of each joint")] = 0.5
+    waves: Annotated[float, Number(-5000.5, 5000.5, "-", "on the body, at most half as many as links")] = 1.0
+    offset: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of all joints, which turns the body")] = 0.0
+    joints: Annotated[int, Number(1, 10_000, "-", "of the body, one fewer than links", whole=True)] = 6
 
     def __post_init__(self):
-        number("joints", self.joints, 1, 10_000, whole=True)
-        object.__setattr__(self, "joints", int(self.joints))
-        half = (self.joints + 1) / 2  # more look like fewer that run the other way
-        number("waves", self.waves, -half, half)
-        number("offset", self.offset, -LARGEST, LARGEST)
         super().__post_init__()
+        half = (self.joints + 1) / 2  # more look like fewer that run the other way
+        in_range("waves", self.waves, -half, half)
 
     @property
     def middle(self) -> np.ndarray:
@@ -95,29 +90,26 @@ class Sine(Gait):
     """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
     tail. Its arc length is fixed, whatever the amplitude.
 
-    amplitude (-): A / lambda, the sine's amplitude over its wavelength, 0 to 10. elements (-): as many as the body has.
-    waves (-): wavelengths of arc on the body, > 0 and at most elements / 4. centre (rad): takes none.
+    centre (rad): takes none.
 
     The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
     """
 
     kind = "sine"
 
-    amplitude: float = 0.2
-    waves: float = 1.0
-    elements: int = 100
+    amplitude: Annotated[
+        float, Number(-10, 10, "-", "A / lambda, the sine's amplitude over its wavelength, 0 to 10")
+    ] = 0.2
+    waves: Annotated[float, Number(0, 500, "-", "wavelengths of arc on the body, > 0 and at most elements / 4")] = 1.0
+    elements: Annotated[int, Number(3, 2000, "-", "as many as the body has", whole=True)] = 100
 
     def __post_init__(self):
-        number("elements", self.elements, 3, 2000, whole=True)
-        object.__setattr__(self, "elements", int(self.elements))
         super().__post_init__()
         if self.centre:
             raise ValueError("a sine wave takes no centre: it undulates about the straight body")
-        number("waves", self.waves, 0, self.elements / 4)
+        in_range("waves", self.waves, 0, self.elements / 4)
         if not self.waves > 0:
             raise ValueError(f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
-        if not abs(self.amplitude) <= 10:
-            raise ValueError(f"amplitude (A / lambda) must lie from -10 to 10, got {self.amplitude!r}")
 
     @property
     def joints(self) -> int:

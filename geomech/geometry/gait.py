@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import is_whole, number, real_array, short
+from geomech.core.errors import is_whole, real_array, short
 from geomech.core.registry import Registry, subclasses
+from rft.checks import Number, check_numbers
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 FASTEST = 1e4  # Hz, as of the effects that have a frequency
@@ -18,26 +20,36 @@ FASTEST = 1e4  # Hz, as of the effects that have a frequency
 class Gait:
     """alpha(t) = centre + amplitude * unit(t). Subclasses give `joints`, `unit` and `unit_rate`.
 
-    amplitude (-): scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve
-    reflected through the centre, alpha - centre -> centre - alpha at every phase. All gaits and tiers keep to that.
     centre (rad): shape angles, the origin if left empty. reverse (-): run the curve backwards, t -> -t, from the same
-    start. frequency (Hz): cycles per second, unknown if left out; it makes displacements speeds, and changes them only
-    through effects that have a frequency.
+    start.
 
-    angles: names of what is in rad and may be told in degrees, the amplitude among them unless it is a scale or ratio.
-    estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
+    An amplitude of 0 is rest at the centre, and a negative one is the curve reflected through the centre. All gaits and
+    tiers keep to that. estimate_is: what an estimated error leaves out for such a gait, in words; empty for nothing.
     """
 
-    amplitude: float = 1.0
+    amplitude: Annotated[
+        float,
+        Number(
+            -LARGEST, LARGEST, "-",
+            "scales the curve about its centre; 0 is rest there, which moves nothing, and a negative one is the curve "
+            "reflected through the centre, alpha - centre -> centre - alpha at every phase",
+        ),
+    ] = 1.0  # fmt: skip
     centre: tuple[float, ...] = ()
     reverse: bool = False
-    frequency: float | None = None
-    angles = ("centre",)
+    frequency: Annotated[
+        float | None,
+        Number(
+            0, FASTEST, "Hz",
+            "cycles per second, unknown if left out; it makes displacements speeds, and changes them only through effects "
+            "that have a frequency",
+        ),
+    ] = None  # fmt: skip
     harmonics = 1
     estimate_is = ""
 
     def __post_init__(self):
-        number("amplitude", self.amplitude, -LARGEST, LARGEST)
+        check_numbers(self)
         object.__setattr__(self, "amplitude", float(self.amplitude))
         centre = real_array("centre", self.centre)
         if centre.ndim != 1 or centre.size not in (0, self.joints):
@@ -48,7 +60,6 @@ class Gait:
         if not isinstance(self.reverse, (bool, np.bool_)):
             raise ValueError(f"reverse must be True or False, got {short(self.reverse)}")
         if self.frequency is not None:
-            number("frequency", self.frequency, 0, FASTEST)
             object.__setattr__(self, "frequency", float(self.frequency))
 
     @property

@@ -75,6 +75,13 @@ def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
     return int(pair[0]), int(pair[1])
 
 
+def shapes_of(axes, pair: tuple[int, int], at: np.ndarray) -> np.ndarray:
+    """Return the shapes (N_i, N_j, d) of the plane of two joints, ``axes`` of each, through the shape ``at`` (d,)."""
+    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
+    alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
+    return alpha
+
+
 def plane(
     velocity: Velocity,
     axes,
@@ -95,8 +102,7 @@ def plane(
     if at.ndim != 1 or not np.isfinite(at).all():
         raise ValueError(f"at must be one finite shape, got {short(at.tolist())}")
     pair = checked_pair(pair, len(at))
-    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
-    alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
+    alpha = shapes_of(axes, pair, at)
     rates = directions(len(at), count)
     alike = mirrored(alpha.reshape(-1, len(at)), count) if traits.halved else ()
     A, residual, speed = sampled_on(
@@ -111,8 +117,7 @@ def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
     reach. ValueError off the field, or for a plane that meets nothing of it."""
     at, pair = fitted.field.inside(real_array("at", at)), checked_pair(pair, len(fitted.axes))
     axes = tuple(fitted.axes[k] for k in pair)
-    alpha = np.broadcast_to(at, (len(axes[0]), len(axes[1]), len(at))).copy()
-    alpha[..., pair[0]], alpha[..., pair[1]] = np.meshgrid(*axes, indexing="ij")
+    alpha = shapes_of(axes, pair, at)
     A = fitted.known.reached(alpha) if isinstance(fitted, Tube) else fitted(alpha)
     if np.isnan(A).all():
         held = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)

@@ -149,8 +149,8 @@ class Request:
             steps = self.starts * (RUNS if self.whole else NEAR)
         gaits = int(steps * TRIES * each)
         jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, every=True)
-        found = cost.price(jobs)
-        return found._replace(seconds=found.seconds + CLIMB * (self.climbs + 1))
+        found, climbs = cost.price(jobs), CLIMB * (self.climbs + 1)
+        return found._replace(seconds=found.seconds + climbs, besides=found.besides + climbs)
 
     @property
     def climbs(self) -> int:

@@ -13,8 +13,8 @@ from geomech.core.errors import SceneError
 from geomech.io.files import whole_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
+from geomech.run.cost import Cost
 from geomech.run.progress import told
-from geomech.study.cost import Cost
 from geomech.study.motion import Motion
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
@@ -47,7 +47,7 @@ def rows(phases: int, cycles: int) -> np.ndarray:
 def cost(phases: int, cycles: int) -> Cost:
     """Of a film."""
     frames = len(rows(phases, cycles))
-    return Cost(0, DRAWING * frames, FRAME * frames)
+    return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
 
 def save(path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None) -> None:

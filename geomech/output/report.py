@@ -17,11 +17,12 @@ from geomech.gaits import Butterfly, Circle, Gait
 from geomech.io.files import read, refuse_inputs
 from geomech.output import plots
 from geomech.output.netcdf import save_connection
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort, tables, uncertainty
 from geomech.study.bench import Study
-from geomech.study.cost import Cost, Job, of_metric, of_planes, price
+from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.systems import Swimmer
 from geomech.systems.base import System, length_unit, refuse_singular, shape_labels
@@ -31,7 +32,6 @@ from geomech.tiers import TIERS
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
-from geomech.tiers.harmonic import HARMONIC
 from geomech.tiers.path import PATH
 
 AMPLITUDES = 10  # or so, in the study that `run` makes of each gait
@@ -105,9 +105,9 @@ def cost(scene: Scene) -> Cost:
         plans = {m: study.plan(m, gait, amplitudes) for m in study.methods}
         found += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
     if is_mapped(system):
-        found += of_planes(scene, 3) if system.joints == 3 else []
-        metric = [] if effort.why_none(system) else of_metric(scene)
-        found += [job for job in metric if job.what != "balances" or not HARMONIC.is_offered(system)]
+        pairs = [*combinations(range(3), 2)] if system.joints == 3 else []
+        found += of_even_part(scene) + of_planes(scene, pairs, [scene.gait.middle] * len(pairs))
+        found += [] if effort.why_none(system) or effort.shared(system) else of_metric(scene)
     return price(found)
 
 

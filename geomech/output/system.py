@@ -17,7 +17,7 @@ from rft.effects import KINDS as EFFECTS
 from rft.effects import engine as engine_of
 from rft.laws import LAWS
 from rft.laws.records import is_compilable, record
-from rft.premise import SHAPE_ALONE, not_so
+from rft.premise import SHAPE_ALONE, negated
 from rft.quadrature import QUADRATURE
 
 NO_PAST = "nothing remembers, places are alike, no mass"
@@ -44,7 +44,7 @@ def engine(system: System) -> str:
     if isinstance(system, Swimmer):
         name = engine_of(system.effects)
         broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in system.effects if e.breaks & SHAPE_ALONE]
-        reasons = [f"with {kind} the scene is {not_so(lost)}" for kind, lost in broken]
+        reasons = [f"with {kind} the scene is {negated(lost)}" for kind, lost in broken]
         return f"{name} ({ENGINES[name]}): {'; '.join(reasons) or NO_PAST}"
     if isinstance(system, Table):
         return "algebraic (the velocity at every shape, looked up)"
@@ -72,7 +72,7 @@ def _swimmer(system: Swimmer) -> list[str]:
     for effect in system.effects:
         cost = f"; costs {effect.cost}" if effect.cost else ""
         gone = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
-        premises = not_so(effect.breaks) or "keeps every premise"
+        premises = negated(effect.breaks) or "keeps every premise"
         lines.append(f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{gone}")
         if assumed := effect.assumes(system.medium):
             lines.append(f"     assumes {assumed}")

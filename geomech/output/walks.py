@@ -23,7 +23,7 @@ COLUMNS = ("t", "x", "z", "pitch", "v_x", "v_z", "rate", "work", "loss", "energy
 def columns(found: Walked) -> dict[str, np.ndarray]:
     """Of the table: SI units, radians, a positive pitch nose down; y, roll and yaw too of three dimensions."""
     w = found.walk
-    more = {name: values for name, values in (w.more or {}).items() if values.ndim == 1}
+    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
     return dict(zip(COLUMNS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
 
 
@@ -33,7 +33,11 @@ def as_json(found: Walked) -> str:
     series = {name: values.tolist() for name, values in columns(found).items() if name in ("t", "x", "z", "pitch")}
     numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
     numbers |= {"residual": w.residual, "unaccounted": w.unaccounted}
-    numbers |= {"settled": w.settled if np.isfinite(w.settled) else None, "aside": w.aside, "turning": w.turning}
+    numbers |= {
+        "settled": w.settling_time if np.isfinite(w.settling_time) else None,
+        "aside": w.lateral_speed,
+        "turning": w.yaw_rate,
+    }
     numbers |= {"estimate_aside": found.aside, "estimate_turning": found.turning, "estimate_elements": found.elements}
     return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
 
@@ -62,34 +66,36 @@ def _regular(walk) -> str:
 
 def _settled(walk) -> str:
     """When a robot that starts from rest goes on as the limit cycle does."""
-    if np.isnan(walk.settled):
+    if np.isnan(walk.settling_time):
         return ""
     within = f"within {100 * walking.NEAR:g} % of it"
-    if np.isinf(walk.settled):
+    if np.isinf(walk.settling_time):
         return f"; from rest it does not come {within}"
-    return f"; from rest {within} after {walk.settled:.2g} s" if walk.settled else f"; {within} from the start"
+    return (
+        f"; from rest {within} after {walk.settling_time:.2g} s" if walk.settling_time else f"; {within} from the start"
+    )
 
 
 def _turning(found: Walked) -> list[str]:
     """How a robot of three dimensions leaves its heading."""
     w = found.walk
-    if not w.more:
+    if not w.spatial:
         return []
-    turning, error = np.degrees([w.turning, found.turning])
-    aside = f"drifting aside at {w.aside:.2g} +- {found.aside:.1g} m/s"
+    turning, error = np.degrees([w.yaw_rate, found.turning])
+    aside = f"drifting aside at {w.lateral_speed:.2g} +- {found.aside:.1g} m/s"
     return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {aside} (positive: to the left of its heading)"]
 
 
 def _unsolved(walk) -> str:
-    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.off:.1g} m/s"
+    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.unsolved_error:.1g} m/s"
     return f"{walk.unsolved} steps were taken unsolved, {off}: raise [numerics] steps or rounding"
 
 
 def _aside(walk) -> list[str]:
     """What a walk of three dimensions does besides."""
-    if not walk.more:
+    if not walk.spatial:
         return []
-    y, roll, yaw = (walk.more[name] for name in ("y", "roll", "yaw"))
+    y, roll, yaw = (walk.spatial[name] for name in ("y", "roll", "yaw"))
     angles = ", ".join(
         f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}" for name, a in (("roll", roll), ("yaw", yaw))
     )
@@ -154,7 +160,7 @@ def _frames(scene: WalkerScene, found: Walked) -> Iterator[np.ndarray]:
     last = min(w.t[-1], FRAMES / animate.RATE)
     times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES)) if last else np.zeros(1)
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
-    pictures = w.more and walking.view(scene).pictures(w.more["states"][rows])
+    pictures = w.spatial and walking.view(scene).pictures(w.spatial["states"][rows])
     return pictures or _drawn(scene, found, rows)
 
 
@@ -174,7 +180,7 @@ def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray) -> Iterator[np.n
 
 def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray):
     """Ground and axes that hold the robot at these rows of its walk; a function that puts it there at one."""
-    shown = _Solid(scene, found) if found.walk.more else _Flat(scene, found)
+    shown = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
     room, reach = shown.room * 1.1, shown.reach
     x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
@@ -200,14 +206,14 @@ class _Flat:
         self.room = max(away)
 
     def on(self, ax):
-        legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.apart]
+        legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.hip_phases]
         lines = [ax.plot([], [], color=TRIPODS[int((k + 2 * at) % 2)], lw=1.2)[0] for k, at in legs]
         box = ax.plot([], [], color="black", lw=1.2)[0]
 
         def draw(row):
             pose, t = self.walk.pose[row], self.walk.t[row]
             for line, (k, at) in zip(lines, legs):
-                phase = self.gait.frequency * t + (k * self.robot.apart[-1] + at) % 1.0
+                phase = self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
                 hip = _turned(np.array([self.hips[k]]), pose[2]) + pose[:2]
                 line.set_data(*(_turned(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
             if self.belly is not None:
@@ -221,18 +227,18 @@ class _Solid:
 
     def __init__(self, scene: WalkerScene, found: Walked):
         self.view, self.walk = walking.view(scene), found.walk
-        first = self.view.triangles(self.walk.more["states"][0]).reshape(-1, 3)
+        first = self.view.triangles(self.walk.spatial["states"][0]).reshape(-1, 3)
         self.room = float(np.abs(first[:, [0, 1]] - [self.walk.pose[0, 0], 0.0]).max())
         self.reach = max(float(np.ptp(first[:, 2])), self.room / 4) / 2
 
     def on(self, ax):
         from matplotlib.collections import PolyCollection
 
-        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.of]
+        colours = np.array([to_rgba(c) for c in ("0.75", *TRIPODS)])[self.view.groups]
         drawn = ax.add_collection(PolyCollection([], lw=1.0))  # sheets are seen by their edges
 
         def draw(row):
-            triangles = self.view.triangles(self.walk.more["states"][row])
+            triangles = self.view.triangles(self.walk.spatial["states"][row])
             order = np.argsort(-triangles[..., 1].mean(1), kind="stable")  # what is farther off first
             drawn.set_verts(triangles[order][..., [0, 2]])
             drawn.set_facecolor(colours[order])

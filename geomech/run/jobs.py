@@ -28,6 +28,7 @@ from typing import Any, Protocol
 from geomech.core.errors import Note, SceneError
 from geomech.core.work import working
 from geomech.run.backend import BACKENDS, VERSION, at_most, fastest, preferred
+from geomech.run.cost import TooLong, is_undecided
 from geomech.run.digest import Undigestible, digest
 from geomech.run.executors import undisturbed
 from geomech.run.store import CHECKPOINT, Busy, Store
@@ -212,7 +213,10 @@ class _Queue:
         return found[0]
 
     def _is_shared(self) -> bool:
-        """Return whether others are to compute the next task; once they do, they go on."""
+        """Return whether others are to compute the next task; once they do, they go on. They begin when it is decided that
+        the request does."""
+        if is_undecided():
+            return False
         if self.executor is None or self.order is not None:
             return self.order is not None
         if not (self.executor.remote or self._is_worth_it(self.total - self.begun + 1)):
@@ -319,7 +323,7 @@ def storing(path: Path | None, context: tuple = (), output: Path | None = None, 
     context: all that they follow from besides the tasks, such as files and code of one's own. output: of which there may
     be one computation at a time: SceneError while another is under way. A resumed request takes no back end that those who
     began it had not. What is raised, a signal among others, says in a note what is kept; an error leaves nothing, unless it
-    came after the first write."""
+    came after the first write, and a refusal nothing at all."""
     try:
         store = Store(path, output is not None, BACKENDS.index(fastest()))
     except Busy:
@@ -330,6 +334,9 @@ def storing(path: Path | None, context: tuple = (), output: Path | None = None, 
         try:
             with running(dataclasses.replace(runner(), store=store, context=(VERSION, *context))) as some:
                 yield some
+        except TooLong:
+            store.close(done=True)
+            raise
         except BaseException as error:
             if not isinstance(error, Exception) or store.written:
                 store.commit()

@@ -51,13 +51,13 @@ class IntruderScene(Intruding):
     """A stress map, a body and its motion, and effects. elements: of the outline. files: those that the scene names. text: its
     TOML."""
 
-    medium: Annotated[PlateStress, Keys(StressKeys, of=" of an intruder scene")]
+    medium: Annotated[PlateStress, Keys(StressKeys, owner="an intruder scene")]
     intruder: Annotated[Shape, OUTLINES]
     motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE})]
     elements: Annotated[
-        int, Within("numerics", of=" of an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
+        int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
     ] = 100
-    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS, of=" of an intruder scene"))] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -106,7 +106,7 @@ class IntruderScene(Intruding):
     def run(self, elements: int | None = None) -> Intrusion:
         """Forces along the motion, with as many elements if told so."""
         outline = self.outline if elements is None else self.intruder.outline(elements)
-        t, pose, twist = self.motion.course(outline)
+        t, pose, twist = self.motion.trajectory(outline)
         found: Loads = loads(self.medium, outline, pose, twist, self.effects)
         return Intrusion(t, pose, twist, self.weighed(found.force), found.moment, found.power(twist))
 

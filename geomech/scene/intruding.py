@@ -11,8 +11,8 @@ import numpy as np
 from geomech.core.errors import named, short
 from geomech.core.summary import part
 from rft.checks import check_numbers
-from rft.ground import KINDS, GroundEffect, checked, weight
-from rft.premise import not_so
+from rft.ground import KINDS, GroundEffect, checked_effects, weight
+from rft.premise import negated
 
 
 class Intruding:
@@ -36,7 +36,7 @@ class Intruding:
             raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
         check_numbers(self)
         with named("[[effects]]"):
-            object.__setattr__(self, "effects", checked(self.effects))
+            object.__setattr__(self, "effects", checked_effects(self.effects))
 
     @property
     def count(self) -> int:
@@ -91,7 +91,7 @@ def of_effects(effects) -> list[str]:
     lines = []
     for effect in effects:
         lines.append(
-            f"on:  {part(effect.kind, effect)}; {not_so(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
             f"gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:

@@ -62,19 +62,21 @@ def text_key(name: str, meaning: str, required: bool = False) -> Key:
 
 def keys_of(kind: type) -> list[Key]:
     """Return the keys of a section that a class is read from."""
-    shapes, told, shown = _shapes(kind), meanings(kind), aliases(kind)
-    made = []
+    schemas, shown, words, numbers = _schemas(kind), aliases(kind), words_of(kind), numbers_of(kind)
+    keys = []
     for field in dataclasses.fields(kind):
         if field.init and field.name != "solver":
             required = field.default is field.default_factory is dataclasses.MISSING
             default = None if required else _default(field)
-            schema, (unit, meaning) = _plain(shapes.get(field.name, {})), told.get(field.name, ("", ""))
-            if word := words_of(kind).get(field.name):
+            schema, (unit, meaning) = _plain(schemas.get(field.name, {})), meanings(kind).get(field.name, ("", ""))
+            if number := numbers.get(field.name):
+                schema = schema | {"minimum": number.low, "maximum": number.high}
+            if word := words.get(field.name):
                 schema, unit, meaning = schema | {"enum": [*word.known]}, "-", word.meaning
             name, alias = (shown[field.name], field.name) if field.name in shown else (field.name, "")
             degrees = field.name in angles_of(kind)
-            made.append(Key(name, schema, unit, meaning, required, default, degrees, alias))
-    return made
+            keys.append(Key(name, schema, unit, meaning, required, default, degrees, alias))
+    return keys
 
 
 def aliases(kind: type) -> Mapping[str, str]:
@@ -84,17 +86,19 @@ def aliases(kind: type) -> Mapping[str, str]:
 
 @functools.cache
 def angles_of(kind: type) -> frozenset[str]:
-    """Return the fields in rad, which a file may give in degrees."""
+    """Return the fields in rad, which a file may give in degrees; none of what is no dataclass."""
+    if not dataclasses.is_dataclass(kind):
+        return frozenset()
     return frozenset(name for name, (unit, _) in meanings(kind).items() if unit == "rad")
 
 
 @functools.cache
 def spellings(kind: type) -> dict[str, tuple[str, bool]]:
     """Return, by key as a file may have it, the field of a class and whether it is in degrees."""
-    names = [field.name for field in dataclasses.fields(kind) if field.init]
-    found = {name: (name, False) for name in names}
-    found |= {shown: (name, False) for name, shown in aliases(kind).items()}
-    return found | {f"{name}_deg": (name, True) for name in names if name in angles_of(kind)}
+    names = [field.name for field in dataclasses.fields(kind) if field.init and field.name != "solver"]
+    fields = {name: (name, False) for name in names}
+    fields |= {shown: (name, False) for name, shown in aliases(kind).items()}
+    return fields | {f"{name}_deg": (name, True) for name in names if name in angles_of(kind)}
 
 
 @functools.cache
@@ -107,7 +111,7 @@ def words_of(kind: type) -> dict[str, Word]:
     return {name: found[0] for name, found in marked.items() if found}
 
 
-def _shapes(kind: type) -> dict[str, dict]:
+def _schemas(kind: type) -> dict[str, dict]:
     """Return JSON Schema of the fields; empty for types that no scene file can hold, and for a class of one's own with
     such."""
     try:
@@ -143,8 +147,8 @@ def meanings(kind: type) -> dict[str, tuple[str, str]]:
     return found | {name: (number.unit, number.meaning) for name, number in numbers_of(kind).items()}
 
 
-def first(kind: type) -> str:
+def first_sentence(kind: type) -> str:
     """Return the first sentence of a class's docstring; nothing where that tells a key."""
-    first = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0].replace("`", "")
-    sentence = re.split(r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s", " ".join(first.split()))[0]
-    return "" if MARK.match(first) else f"{sentence.rstrip('.:;')}."
+    paragraph = inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0].replace("`", "")
+    sentence = re.split(r"(?<!Fig\.)(?<!Eqs\.)(?<!Eq\.)(?<!Sec\.)(?<=[.:;])\s", " ".join(paragraph.split()))[0]
+    return "" if MARK.match(paragraph) else f"{sentence.rstrip('.:;')}."

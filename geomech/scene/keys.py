@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from geomech.core.errors import choose
 from geomech.core.registry import Registry
 from geomech.scene.intruder import IntruderScene
-from geomech.scene.key import Key, first
+from geomech.scene.key import Key, first_sentence
 from geomech.scene.model import Scene
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, keys_in, variants
 from geomech.scene.solid import MeshScene
@@ -34,62 +34,62 @@ class Part(NamedTuple):
 
 def sections() -> dict[str, list[Part]]:
     """Return what every section of a scene file may be: a class that several kinds of scene have is listed once."""
-    found: dict[str, list[Part]] = {"frame": []}
+    parts_of: dict[str, list[Part]] = {"frame": []}
     listed = set()
     for scene in SCENES.values():
-        for name, (how, *_) in file_sections(scene).items():
-            parts = found.setdefault(name, [])
-            if isinstance(how, Key):
-                parts.append(Part("above all tables", "", [how]))
+        for name, (section, *_) in file_sections(scene).items():
+            parts = parts_of.setdefault(name, [])
+            if isinstance(section, Key):
+                parts.append(Part("above all tables", "", [section]))
                 continue
-            one = how.one if isinstance(how, Each) else how
-            if isinstance(one, OneOf) and one.meaning:
-                law = Key(one.key, {"type": "string", "enum": [*one.kinds]}, "-", one.meaning, False, None, False)
-                parts.append(Part(f"[{name}]{one.of}", "Besides the keys above.", [law]))
+            if isinstance(section, OneOf) and section.meaning:
+                names = {"type": "string", "enum": [*section.kinds]}
+                key = Key(section.key, names, "-", section.meaning, False, None, False)
+                parts.append(Part(f"[{name}] of {section.owner}", "Besides the keys above.", [key]))
                 continue
-            for variant in all_variants(one):
-                if (name, variant.told, variant.kind) not in listed:
-                    parts.append(_part(name, how, variant))
-                    listed.add((name, variant.told, variant.kind))
-            parts += _of_packages(one)
-    return found
+            for variant in all_variants(section):
+                if (name, variant.label, variant.kind) not in listed:
+                    parts.append(_part(name, section, variant))
+                    listed.add((name, variant.label, variant.kind))
+            parts += _of_packages(section)
+    return parts_of
 
 
-def all_variants(how: Keys | OneOf) -> list[Variant]:
+def all_variants(section: Section) -> list[Variant]:
     """Return what a section may be; [numerics] is of the tiers and of systems' solvers at once."""
-    kinds = [Numerics, *solvers()] if isinstance(how, Keys) and how.kind is Numerics else []
-    return [Variant({}, kind) for kind in kinds] or [*variants(how)]
+    kinds = [Numerics, *solvers()] if isinstance(section, Keys) and section.kind is Numerics else []
+    return [Variant({}, kind) for kind in kinds] or [*variants(section)]
 
 
-def _part(name: str, how: Section, variant: Variant) -> Part:
-    one = how.one if isinstance(how, Each) else how
-    head = f"[[{name}]]" if isinstance(how, Each) else f"[{name}]"
-    about = [first(variant.kind)]
-    if isinstance(one, OneOf) and one.short and one.short in variant.named.values():
-        inner = ", ".join(f"[[{part}]]" if isinstance(of, Each) else f"[{part}]" for part, of in variant.inner.items())
+def _part(name: str, section: Section, variant: Variant) -> Part:
+    head = f"[[{name}]]" if isinstance(section, Each) else f"[{name}]"
+    about = [first_sentence(variant.kind)]
+    if isinstance(section, OneOf) and section.short in variant.named.values():
+        inner = ", ".join(f"[[{x}]]" if isinstance(part, Each) else f"[{x}]" for x, part in variant.inner.items())
         about.append(f"Its tables, {inner}, may as well stand by themselves.")
     elif variant.inner:
         inner = " and ".join(f"[{name}.{part}]" for part in variant.inner)
         about.append(f"'geomech keys intruder' has the keys of {inner}.")
     if variant.implied:
-        about.append(f"It need not say its {one.key}.")
-    return Part(f"{head} {variant.told}".strip() + one.of, " ".join(about).strip(), keys_in(variant))
+        about.append(f"It need not say its {section.key}.")
+    owner = f" of {section.owner}" if section.owner else ""
+    return Part(f"{head} {variant.label}".strip() + owner, " ".join(about).strip(), keys_in(variant))
 
 
-def _of_packages(one: Keys | OneOf) -> Iterator[Part]:
+def _of_packages(section: Section) -> Iterator[Part]:
     """Yield what installed packages offer."""
-    if (registry := registry_of(one)) is not None:
+    if (registry := registry_of(section)) is not None:
         new, refused = registry.unloaded()
         for name, package in new.items():
-            yield Part(f'{one.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
+            yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
         for name, package in refused.items():
             why = f"Not that of {package}, which is refused: the one that is built in has this name."
-            yield Part(f'{one.key} = "{name}"', why, [])
+            yield Part(f'{section.key} = "{name}"', why, [])
 
 
-def registry_of(how: Section) -> Registry | None:
+def registry_of(section: Section) -> Registry | None:
     """Return the registry of what a section may name, None if that is fixed."""
-    return how.kinds if isinstance(how, OneOf) and isinstance(how.kinds, Registry) else None
+    return section.kinds if isinstance(section, OneOf) and isinstance(section.kinds, Registry) else None
 
 
 def names() -> list[str]:
@@ -99,12 +99,12 @@ def names() -> list[str]:
 
 def text(section: str | None = None) -> str:
     """Return all keys, or those of one section, to be read."""
-    found = sections()
-    chosen = [*found] if section is None else [choose("SECTION", section, found)]
-    return "\n\n".join(told(part) for name in chosen for part in found[name]) + "\n"
+    parts = sections()
+    names = [*parts] if section is None else [choose("SECTION", section, parts)]
+    return "\n\n".join(_lines(part) for name in names for part in parts[name]) + "\n"
 
 
-def told(part: Part) -> str:
+def _lines(part: Part) -> str:
     """Return the keys of a part as lines."""
     rows = [(key.name, worded(key.schema), key.unit, key.value) for key in part.keys]
     widths = [max(map(len, column)) for column in zip(*rows)]  # none without keys

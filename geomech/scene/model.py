@@ -31,7 +31,7 @@ SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
 SWIMMER = {
     "medium": OneOf(PARTS["medium"], "law", otherwise=(NamedMedium, MediumFile)),
     "body": OneOf(PARTS["body"], sized=True),
-    "effects": Each(OneOf(PARTS["effects"], sized=True)),
+    "effects": Each(PARTS["effects"], sized=True),
 }
 
 

@@ -22,7 +22,7 @@ from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sec
 from geomech.scene.sizes import Sizes
 
 FILES = ("file", "mjcf")  # keys that name a file, looked for from the folder of the scene's
-Made = TypeVar("Made")
+Built = TypeVar("Built")
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Source:
         return table
 
 
-def read(scene: type[Made], tables: Mapping, name: str, text: str) -> Made:
+def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
     """Return the scene of the tables of a TOML text; SceneError, which names the place, if they make none."""
     source = Source(name, scene.example)
     check(scene, tables, source)
@@ -62,102 +62,104 @@ def check(scene: type, tables: Mapping, source: Source) -> None:
     declared = file_sections(scene)
     for table in tables:
         choose(f"{source.name}: table", table, declared)
-    for section, (how, required, instead) in declared.items():
-        if section in tables:
-            _check_form(source, section, tables[section], how)
+    for name, (section, required, instead) in declared.items():
+        if name in tables:
+            _check_form(source, name, tables[name], section)
         elif required and instead not in tables:
-            raise SceneError(f"{source.name}: the table [{section}] is missing: add it, {source.cure}")
+            raise SceneError(f"{source.name}: the table [{name}] is missing: add it, {source.cure}")
 
 
-def _check_form(source: Source, path: str, table: Any, how: Section | Key) -> None:
+def _check_form(source: Source, path: str, table: Any, section: Section | Key) -> None:
     """Raise SceneError unless a table is one, or a list of tables where a section is one for each part."""
-    if isinstance(how, Each):
+    if isinstance(section, Each):
         if not (isinstance(table, list) and all(isinstance(each, Mapping) for each in table)):
             raise SceneError(f"{source.name}: {path} must be tables [[{path}]], one for each")
-    elif not isinstance(how, Key) and not isinstance(table, Mapping):
+    elif not isinstance(section, Key) and not isinstance(table, Mapping):
         raise SceneError(f"{source.name}: {path} must be a table [{path}], got {type(table).__name__}: {source.cure}")
 
 
 def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any]:
     """Return the fields of a scene that its sections make; those of a section that is left out have their defaults."""
     parts = {}
-    for name, (how, *_) in sections_of(scene).items():
+    for name, (section, *_) in sections_of(scene).items():
         if name in tables:
-            part = read_section(source, name, tables[name], how)
-            parts |= part if isinstance(how, Keys) and how.spread else {name: part}
+            part = read_section(source, name, tables[name], section)
+            parts |= part if isinstance(section, Keys) and section.spread else {name: part}
     return parts
 
 
-def read_section(source: Source, path: str, table: Any, how: Section) -> Any:
+def read_section(source: Source, path: str, table: Any, section: Section) -> Any:
     """Return the part of a scene that a section makes. path: its name, after those of the sections that it is within."""
-    if isinstance(how, Each):
-        return tuple(read_section(source, f"[{path}]", each, how.one) for each in table)
+    if isinstance(section, Each):
+        return tuple(_read_one(source, f"[{path}]", each, section) for each in table)
+    return _read_one(source, path, table, section)
+
+
+def _read_one(source: Source, path: str, table: Mapping, section: Section) -> Any:
     place = f"{source.name}: [{path}]"
-    variant, table = _chosen(place, source.located(table), how)
-    if isinstance(how, OneOf) and how.sized and source.sizes:
+    variant, table = _chosen(place, source.located(table), section)
+    if isinstance(section, OneOf) and section.sized and source.sizes:
         table = source.sizes.fill(place, table, variant.kind)
-    told, inner = variant.told or _unnamed(how), {}
+    label, inner = variant.label or (f"no {section.key!r}" if isinstance(section, OneOf) else ""), {}
     if variant.inner:
-        _check_keys(place, table, variant.kind, told)
-    for field, section in variant.inner.items():
-        within = field if variant.named.get("kind") == how.short else f"{path}.{field}"
+        _check_keys(place, table, variant.kind, label)
+    for field, part in variant.inner.items():
+        within = field if variant.named.get("kind") == section.short else f"{path}.{field}"
         if field in table:
-            _check_form(source, within, table[field], section)
-            inner[field] = read_section(source, within, table.pop(field), section)
-        elif not isinstance(section, Each):
+            _check_form(source, within, table[field], part)
+            inner[field] = read_section(source, within, table.pop(field), part)
+        elif not isinstance(part, Each):
             raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
     if variant.columns:
         table = _from_columns(place, table, variant)
-    return build(place, table, variant.kind, inner, told)
+    return build(place, table, variant.kind, inner, label)
 
 
 def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
     return kinds.choose(place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
 
 
-def _chosen(place: str, table: dict, how: Keys | OneOf) -> tuple[Variant, dict]:
+def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
     """Return which of the classes a section names, and its other keys."""
-    if isinstance(how, Keys):
-        return Variant({}, how.kind), table
-    if how.key in table:
-        name = _choose(f"{place} {how.key}", table[how.key], how.kinds)
-        table = {key: value for key, value in table.items() if key != how.key}
-        if not isinstance(how.kinds[name], OneOf):
-            return variant_of(how, name), table
-        variant, table = _chosen(place, table, how.kinds[name])
-        return variant._replace(named={how.key: name} | dict(variant.named)), table
-    others = {dataclasses.fields(kind)[0].name: kind for kind in how.otherwise}
+    if isinstance(section, Keys):
+        return Variant({}, section.kind), table
+    if section.key in table:
+        name = _choose(f"{place} {section.key}", table[section.key], section.kinds)
+        table = {key: value for key, value in table.items() if key != section.key}
+        if not isinstance(section.kinds[name], OneOf):
+            return variant_of(section, name), table
+        variant, table = _chosen(place, table, section.kinds[name])
+        return variant._replace(named={section.key: name} | dict(variant.named)), table
+    others = {dataclasses.fields(kind)[0].name: kind for kind in section.otherwise}
     for key, kind in others.items():
         if key in table:
             return Variant({}, kind), table
     instead = "".join(f", or {key}" for key in others)
-    raise SceneError(f"{place} has no {how.key!r}: add {how.key} = one of {', '.join(how.kinds)}{instead}")
-
-
-def _unnamed(how: Keys | OneOf) -> str:
-    return f"no {how.key!r}" if isinstance(how, OneOf) else ""
+    raise SceneError(f"{place} has no {section.key!r}: add {section.key} = one of {', '.join(section.kinds)}{instead}")
 
 
 def _from_columns(place: str, table: dict, variant: Variant) -> dict:
     """Return the keys of a section with columns of its file in place of the file."""
     wanted, meaning, optional, rows = variant.columns
     if not rows and {*table} != {"file"}:
-        raise SceneError(f"{place}: {variant.told} takes 'file' and nothing else: a {meaning}")
+        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {meaning}")
     if "file" not in table:
         return table
     if rows in table:
         raise SceneError(f"{place}: {rows} are given twice: keep one of {rows} and file")
-    found = columns(place, table.pop("file"), wanted, optional)
+    numbers = columns(place, table.pop("file"), wanted, optional)
     if rows:
-        return table | {rows: np.stack([*found.values()], -1).tolist()}
-    return {key: values.tolist() for key, values in found.items()}
+        return table | {rows: np.stack([*numbers.values()], -1).tolist()}
+    return {key: values.tolist() for key, values in numbers.items()}
 
 
-def build(place: str, table: Mapping, kind: type[Made], inner: Mapping[str, Any] | None = None, told: str = "") -> Made:
+def build(
+    place: str, table: Mapping, kind: type[Built], inner: Mapping[str, Any] | None = None, label: str = ""
+) -> Built:
     """Return a part of a class, or what a form of its keys makes, from a table of keys; else SceneError.
 
-    inner: fields that are made already. told: how the table names the class."""
-    _check_keys(place, table, kind, told)
+    inner: fields that are read already. label: how the table names the class."""
+    _check_keys(place, table, kind, label)
     values: dict[str, Any] = {}
     for key, value in table.items():
         field, in_degrees = spellings(kind)[key]
@@ -170,34 +172,34 @@ def build(place: str, table: Mapping, kind: type[Made], inner: Mapping[str, Any]
     for field, word in words_of(kind).items():
         if field in values:
             choose(f"{place} {field}", values[field], word.known)
-    if ways := getattr(kind, "ways", None):
-        ways.check(place, values)
-    if inner and not values:  # of types that a file cannot hold
-        return kind(**inner)
+    if alternatives := getattr(kind, "alternatives", None):
+        alternatives.check(place, values)
+    if inner and {f.name for f in dataclasses.fields(kind) if f.default is f.default_factory} <= {*inner}:
+        return kind(**inner | values)  # a swimmer, of types that msgspec does not know
     try:
-        made = msgspec.convert({**values, **(inner or {})}, kind)
-        return made.to_part(place, {*values}) if hasattr(kind, "to_part") else made
+        part = msgspec.convert({**values, **(inner or {})}, kind)
+        return part.to_part(place, {*values}) if hasattr(kind, "to_part") else part
     except SceneError:
         raise
     except (ValueError, OverflowError) as error:
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        raise SceneError(f"{place} {reason}{slips.of_value(reason, table, kind)}") from None
+        raise SceneError(f"{place} {reason}{slips.cure_of_value(reason, table, kind)}") from None
 
 
-def _check_keys(place: str, table: Mapping, kind: type, told: str) -> None:
-    """Raise SceneError for a key that a class has not. told: how the table names the class."""
+def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
+    """Raise SceneError for a key that a class has not. label: how the table names the class."""
     try:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
     except SceneError as error:
-        raise SceneError(f"{error}; it has {told}" if told else str(error)) from None
+        raise SceneError(f"{error}; it has {label}" if label else str(error)) from None
 
 
 def _check_degrees(place: str, value) -> None:
     """UnitWarning for an angle of grains below a degree: measured ones are of ten to twenty."""
     if isinstance(value, (int, float)) and 0 < value < 1:
-        told = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
-        warnings.warn(told, UnitWarning, stacklevel=2)
+        text = f"{place} = {value:g} is less than a degree: if that is in rad, write gamma0 = {value:g}"
+        warnings.warn(text, UnitWarning, stacklevel=2)
 
 
 def _radians(degrees):

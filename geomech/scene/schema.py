@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Collection, Iterator
 from typing import Any
 
-from geomech.scene.key import Key, first, keys_of
+from geomech.scene.key import Key, first_sentence, keys_of
 from geomech.scene.keys import SCENES, all_variants, registry_of
-from geomech.scene.sections import Declared, Each, OneOf, Section, Variant, Ways, file_sections, keys_in
+from geomech.scene.sections import Alternatives, Declared, Each, OneOf, Section, Variant, file_sections, keys_in
 from geomech.scene.sizes import NOT_OF_THE_BODY, Physical
 from geomech.scene.solid import KINDS as SOLIDS
 
@@ -17,7 +18,7 @@ from geomech.scene.solid import KINDS as SOLIDS
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file, with a gait, an intruder or a robot that walks, its classes those known now."""
     declared = {group: file_sections(scene) for group, scene in SCENES.items()}
-    groups = {group: {name: _section(how) for name, (how, *_) in of.items()} for group, of in declared.items()}
+    groups = {group: {name: _section(section) for name, (section, *_) in of.items()} for group, of in declared.items()}
     named = {group: {name: {"$ref": f"#/$defs/{group}/{name}"} for name in of} for group, of in groups.items()}
     whole = {group: _whole(named[group], declared[group]) for group in groups}
     solid = {"required": ["kind"], "properties": {"kind": {"enum": [*SOLIDS]}}}
@@ -45,62 +46,62 @@ def schema() -> dict[str, Any]:
 
 def _whole(named: dict[str, Any], declared: dict[str, Declared]) -> dict[str, Any]:
     """Return the schema of a scene of sections, by the names that they have here."""
-    made = _table("", named, [name for name, (_, required, instead) in declared.items() if required and not instead])
+    scene = _table("", named, [name for name, (_, required, instead) in declared.items() if required and not instead])
     for name in {each.instead for each in declared.values() if each.instead}:
         parts = [part for part, (_, required, instead) in declared.items() if required and instead == name]
-        made |= {"if": {"required": [name]}, "else": {"required": parts}}
-    sizes = [rule for name, (how, *_) in declared.items() for rule in _sizes_needed(name, how)]
-    return made | ({"allOf": sizes} if sizes else {})
+        scene |= {"if": {"required": [name]}, "else": {"required": parts}}
+    sizes = [rule for name, (section, *_) in declared.items() for rule in _sizes_needed(name, section)]
+    return scene | ({"allOf": sizes} if sizes else {})
 
 
-def _section(how: Section | Key) -> dict[str, Any]:
-    if isinstance(how, Key):
-        return {**how.schema, "description": how.meaning}
-    if isinstance(how, Each):
-        return {"type": "array", "items": _section(how.one)}
-    if not isinstance(how, OneOf):
-        one, *others = (_variant(variant) for variant in all_variants(how))
+def _section(section: Section | Key) -> dict[str, Any]:
+    if isinstance(section, Key):
+        return {**section.schema, "description": section.meaning}
+    if not isinstance(section, OneOf):
+        one, *others = (_variant(variant) for variant in all_variants(section))
         for other in others:
             one["properties"] |= other["properties"]
         return one
-    found = [_variant(each, _shared(each) if how.sized else (), how.short) for each in all_variants(how)]
-    if (registry := registry_of(how)) is not None:  # the keys of what packages offer are known when it is loaded
+    kinds = [_variant(each, _shared(each) if section.sized else (), section.short) for each in all_variants(section)]
+    if (registry := registry_of(section)) is not None:  # the keys of what packages offer are known when it is loaded
         for other in registry.unloaded()[0]:
-            found.append({"type": "object", "properties": {how.key: {"const": other}}, "required": [how.key]})
-    return {"anyOf" if len(how.implied) > 1 else "oneOf": found}
+            kinds.append({"type": "object", "properties": {section.key: {"const": other}}, "required": [section.key]})
+    one = {"anyOf" if len(section.implied) > 1 else "oneOf": kinds}
+    return {"type": "array", "items": one} if isinstance(section, Each) else one
 
 
 def _variant(variant: Variant, elsewhere: Collection[str] = (), short: str = "") -> dict[str, Any]:
     """Return the schema of a section of one class. elsewhere: keys that may be given in another section. short: the kind
     whose inner sections may be, too."""
-    keys, ways = keys_in(variant), getattr(variant.kind, "ways", None)
+    keys, alternatives = keys_in(variant), getattr(variant.kind, "alternatives", None)
     named = {key: {"const": name} for key, name in variant.named.items()}
-    inner = {field: _section(how) for field, how in variant.inner.items()}
+    inner = {field: _section(section) for field, section in variant.inner.items()}
     needed = [*(named if not variant.implied else ())]
     needed += [key.name for key in keys if key.required and not key.degrees and key.name not in elsewhere]
     if short not in variant.named.values():
-        needed += [field for field, how in variant.inner.items() if not isinstance(how, Each)]
+        needed += [field for field, section in variant.inner.items() if not isinstance(section, Each)]
     rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
     if variant.columns and variant.columns.rows:
         needed.remove(variant.columns.rows)
         rules.append({"oneOf": [{"required": [key]} for key in (variant.columns.rows, "file")]})
-    if ways:
-        rules.append(_ways(ways, {key.alias or key.name: key for key in keys}))
-    made = _table(first(variant.kind), {**named, **_properties(keys), **inner}, needed)
-    return made | ({"allOf": rules} if rules else {})
+    if alternatives:
+        rules.append(_alternatives(alternatives, {key.alias or key.name: key for key in keys}))
+    table = _table(first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed)
+    return table | ({"allOf": rules} if rules else {})
 
 
 def _properties(keys: list[Key]) -> dict[str, Any]:
     """Return the schemas of keys by name, and by their other spellings."""
-    made = {}
+    schemas = {}
     for key in keys:
         unit = f" ({key.unit})" if key.unit not in ("", "-") else ""
         more = {} if key.required or key.default is None else {"default": json.loads(key.value)}
         for name in (key.name, *[key.alias] * bool(key.alias)):
-            made[name] = {**key.schema, "description": f"{key.meaning}{unit}", **more}
+            schemas[name] = {**key.schema, "description": f"{key.meaning}{unit}", **more}
         if key.degrees:
-            made[f"{key.name}_deg"] = {**key.schema, "description": f"{key.meaning} (degrees)"}
-    return made
+            bounds = {x: math.degrees(key.schema[x]) for x in ("minimum", "maximum") if x in key.schema}
+            schemas[f"{key.name}_deg"] = {**key.schema, **bounds, "description": f"{key.meaning} (degrees)"}
+    return schemas
 
 
 def _spelled(key: Key) -> dict[str, Any]:
@@ -109,11 +110,13 @@ def _spelled(key: Key) -> dict[str, Any]:
     return {"oneOf": given} if key.required else {"not": {"allOf": given}}
 
 
-def _ways(ways: Ways, keys: dict[str, Key]) -> dict[str, Any]:
+def _alternatives(alternatives: Alternatives, keys: dict[str, Key]) -> dict[str, Any]:
     """Return the rule that one group of keys is given, and none of the others."""
-    given = {name: [{"required": [spelling]} for spelling in keys[name].spellings] for name in sorted(ways.keys)}
+    given = {
+        name: [{"required": [spelling]} for spelling in keys[name].spellings] for name in sorted(alternatives.keys)
+    }
     groups = []
-    for needed, allowed in ways.groups:
+    for needed, allowed in alternatives.groups:
         several = [{"anyOf": given[name]} for name in sorted(needed) if len(given[name]) > 1]
         others = [rule for name in given if name not in needed | allowed for rule in given[name]]
         groups.append({"required": sorted(name for name in needed if len(given[name]) == 1), "not": {"anyOf": others}})
@@ -127,19 +130,18 @@ def _shared(variant: Variant) -> set[str]:
     return {f.name for f in dataclasses.fields(Physical) if not names & {*NOT_OF_THE_BODY.get(f.name, ())}}
 
 
-def _sizes_needed(section: str, how: Section | Key) -> Iterator[dict[str, Any]]:
+def _sizes_needed(name: str, section: Section | Key) -> Iterator[dict[str, Any]]:
     """Yield the rules that a size which a kind must have is given there or in [physical]."""
-    one = how.one if isinstance(how, Each) else how
-    for variant in all_variants(one) if isinstance(one, OneOf) and one.sized else ():
+    for variant in all_variants(section) if isinstance(section, OneOf) and section.sized else ():
         for size in keys_of(variant.kind):
             if size.required and size.name in _shared(variant):
                 given = {"required": ["physical"], "properties": {"physical": {"required": [size.name]}}}
-                named = {key: {"const": name} for key, name in variant.named.items()}
+                named = {key: {"const": kind} for key, kind in variant.named.items()}
                 rule = {"if": {"required": [*named], "properties": named}, "then": {"required": [size.name]}}
-                within = {"items": rule} if isinstance(how, Each) else rule
-                yield {"if": {"not": given}, "then": {"properties": {section: within}}}
+                within = {"items": rule} if isinstance(section, Each) else rule
+                yield {"if": {"not": given}, "then": {"properties": {name: within}}}
 
 
 def _table(about: str, values: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    made = {"type": "object", "properties": values, "required": required, "additionalProperties": False}
-    return {"description": about, **made} if about else made
+    schema = {"type": "object", "properties": values, "required": required, "additionalProperties": False}
+    return {"description": about, **schema} if about else schema

@@ -7,7 +7,7 @@ A scene is a dataclass whose fields say so in their annotations:
         medium: Annotated[PlateStress, Keys(StressKeys)]
         intruder: Annotated[Shape, OneOf(SHAPES)]
         elements: Annotated[int, Within("numerics"), Number(1, 5000, "-", "of the outline", whole=True)] = 100
-        effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS))] = ()
+        effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS)] = ()
 
 `reader`, `write`, `keys` and `schema` walk over these declarations. The keys of a section are the fields of a class, whose
 units, bounds and meanings stand there (`geomech.scene.key`). A class that is not itself the part, but a form of its keys,
@@ -40,12 +40,12 @@ class Columns(NamedTuple):
 class Keys:
     """A section whose keys are the fields of a class.
 
-    of: what the lists of keys say of whose section it is. spread: it makes a mapping of several fields of the scene.
-    within: its keys are fields of the scene itself.
+    owner: whose section it is, for lists of keys, where scenes of several kinds have one. spread: it makes a mapping of
+    several fields of the scene. within: its keys are fields of the scene itself.
     """
 
     kind: type
-    of: str = ""
+    owner: str = ""
     spread: bool = False
     within: bool = False
 
@@ -58,7 +58,7 @@ class OneOf:
     otherwise: classes of sections without that key, each known by its first field. inner: sections within those of a kind,
     by kind and field. columns: files that take the place of keys, by kind. sized: keys that the scene gives once for all its
     parts are put in. short: the kind whose inner sections may stand alone, in place of the section. implied: names that a
-    file may leave out. of: as `Keys.of`. meaning: of the key, where other sections' lists of keys have the rest.
+    file may leave out. owner: as `Keys.owner`. meaning: of the key, where other sections' lists of keys have the rest.
     """
 
     kinds: Mapping[str, Any]
@@ -69,33 +69,30 @@ class OneOf:
     sized: bool = False
     short: str = ""
     implied: tuple[str, ...] = ()
-    of: str = ""
+    owner: str = ""
     meaning: str = ""
 
 
-@dataclass(frozen=True)
-class Each:
-    """A list of sections, one for each part."""
-
-    one: OneOf
+class Each(OneOf):
+    """A list of such sections, one for each part."""
 
 
-Section = Keys | OneOf | Each
+Section = Keys | OneOf
 
 
 @dataclass(frozen=True)
-class Ways:
-    """Keys of which a section may have one group or another.
+class Alternatives:
+    """Groups of keys of which a section has one.
 
-    groups: of each, the keys that it must have and those that it may have beside them. told: what to give.
+    groups: the keys that each must have, and those that it may have. cure: what to give.
     """
 
     groups: tuple[tuple[set[str], set[str]], ...]
-    told: str
+    cure: str
 
     @property
     def keys(self) -> set[str]:
-        """All that some groups have and others have not."""
+        """The keys of all groups."""
         return set().union(*(needed | allowed for needed, allowed in self.groups))
 
     def check(self, place: str, given: Collection[str]) -> None:
@@ -104,15 +101,15 @@ class Ways:
         if any(needed <= own <= needed | allowed for needed, allowed in self.groups):
             return
         lacking = [sorted(needed - own) for needed, allowed in self.groups if own <= needed | allowed]
-        told = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
-        raise SceneError(f"{place}{told}: {self.told}")
+        reason = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
+        raise SceneError(f"{place}{reason}: {self.cure}")
 
 
 class Within(NamedTuple):
-    """The field is a key of a section. of: as `Keys.of`."""
+    """The field is a key of a section. owner: as `Keys.owner`."""
 
     section: str
-    of: str = ""
+    owner: str = ""
 
 
 class Variant(NamedTuple):
@@ -125,7 +122,8 @@ class Variant(NamedTuple):
     implied: bool = False
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
+        """The keys that name it, as a file has them."""
         return ", ".join(f'{key} = "{name}"' for key, name in self.named.items())
 
 
@@ -172,29 +170,29 @@ def sections_of(scene: type) -> dict[str, Declared]:
     """Return the sections that the fields of a scene declare, by name. Fields within one section make one, of a class of
     their own."""
     hints = get_type_hints(scene, include_extras=True)
-    found: dict[str, Declared] = {}
+    declared: dict[str, Declared] = {}
     within: dict[Within, list] = {}
     for part in dataclasses.fields(scene):
         for mark in get_args(hints[part.name])[1:]:
             if isinstance(mark, Section):
                 required = part.default is part.default_factory is dataclasses.MISSING
-                found[part.name] = Declared(mark, required)
+                declared[part.name] = Declared(mark, required)
             elif isinstance(mark, Within):
                 within.setdefault(mark, []).append((part.name, hints[part.name], part.default))
-    for (name, of), keys in within.items():
+    for (name, owner), keys in within.items():
         methods = {"to_part": lambda self, place, given: vars(self)}
         kind = dataclasses.make_dataclass(name.title(), keys, namespace=methods)
         kind.__doc__ = ""  # in place of a signature
-        found[name] = Declared(Keys(kind, of, spread=True, within=True))
-    return found
+        declared[name] = Declared(Keys(kind, owner, spread=True, within=True))
+    return declared
 
 
 def file_sections(scene: type) -> dict[str, Declared]:
     """Return the sections that a scene's file may have: those of its fields, those that may stand in place of another one,
     and those that hold for the whole scene (``once``)."""
-    found: dict[str, Declared] = {}
-    for name, (how, required, _) in sections_of(scene).items():
-        parts = how.inner[how.short] if isinstance(how, OneOf) and how.short else {}
-        found |= {part: Declared(inner, not isinstance(inner, Each), name) for part, inner in parts.items()}
-        found[name] = Declared(how, required and not parts)
-    return found | {name: Declared(how) for name, how in getattr(scene, "once", {}).items()}
+    declared: dict[str, Declared] = {}
+    for name, (section, required, _) in sections_of(scene).items():
+        parts = section.inner[section.short] if isinstance(section, OneOf) and section.short else {}
+        declared |= {part: Declared(inner, not isinstance(inner, Each), name) for part, inner in parts.items()}
+        declared[name] = Declared(section, required and not parts)
+    return declared | {name: Declared(section) for name, section in getattr(scene, "once", {}).items()}

@@ -36,7 +36,7 @@ def at_line(text: str, error: Exception) -> str:
     return f": {short(line.strip())}{cure}"
 
 
-def of_value(told: str, table: Mapping, kind: type) -> str:
+def cure_of_value(told: str, table: Mapping, kind: type) -> str:
     """What to give in place of a value that is refused, as ``told``; empty if that says it all. kind: the class of the
     keys."""
     if missing := re.search(r"missing required field `(\w+)`", told):

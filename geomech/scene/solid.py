@@ -16,7 +16,20 @@ from geomech.scene.stress import MatchedKeys
 from rft.checks import Number
 from rft.ground import KINDS as EFFECTS
 from rft.ground import GroundEffect
-from rft.meshes import MOTIONS, SOLIDS, Faces, Mesh, MeshFile, Motion, Passage, Solid, Spatial, bearing, below, wrench
+from rft.meshes import (
+    MOTIONS,
+    SOLIDS,
+    Faces,
+    Mesh,
+    MeshFile,
+    Motion,
+    Solid,
+    Spatial,
+    Trajectory,
+    bearing,
+    below,
+    wrench,
+)
 
 KINDS = {
     **{k: v for k, v in SOLIDS.items() if k != "c-leg"},
@@ -36,14 +49,14 @@ class Passed(NamedTuple):
     """Forces along a motion. force, moment (T, 3), N and N m about the mesh's origin, told in the world; power (T,) W of the
     grains on the body. With effects that have a weight the force is that of both."""
 
-    passage: Passage
+    trajectory: Trajectory
     force: np.ndarray
     moment: np.ndarray
     power: np.ndarray
 
     @property
     def t(self) -> np.ndarray:
-        return self.passage.t
+        return self.trajectory.t
 
     def __repr__(self) -> str:
         span = summary.span
@@ -57,15 +70,15 @@ class MeshScene(Intruding):
     """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
     the medium's strength was taken from, where it was told by a name of the vertical plane."""
 
-    medium: Annotated[Spatial, Keys(MatchedKeys, of=" of an intruder scene of a mesh", spread=True)]
+    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh", spread=True)]
     intruder: Annotated[Solid, OneOf(KINDS)]
-    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, of=" of a mesh")]
+    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, owner="a mesh")]
     triangles: Annotated[
         int,
-        Within("numerics", of=" of an intruder scene of a mesh"),
+        Within("numerics", owner="an intruder scene of a mesh"),
         Number(1, 2_000_000, "-", TRIANGLES, whole=True),
     ] = 5000
-    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(EFFECTS, of=" of an intruder scene"))] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -108,13 +121,13 @@ class MeshScene(Intruding):
     def run(self, triangles: int | None = None) -> Passed:
         """Forces along the motion, with as many triangles if told so."""
         mesh = self.mesh if triangles is None else self.intruder.mesh(triangles)
-        passage = self.motion.passage(mesh)
-        found = wrench(self.medium, mesh, *passage[2:0:-1], *passage[3:5], self.effects)
-        return Passed(passage, self.weighed(found.force), found.moment, found.power)
+        trajectory = self.motion.trajectory(mesh)
+        found = wrench(self.medium, mesh, *trajectory[2:0:-1], *trajectory[3:5], self.effects)
+        return Passed(trajectory, self.weighed(found.force), found.moment, found.power)
 
     def faces(self, found: Passed, k: int) -> tuple[Faces, np.ndarray]:
         """What each face below the surface bears at step k; and the triangles (Q, 3, 3) above it."""
-        _, place, rotation, velocity, spin, _ = (x[k] for x in found.passage)
+        _, place, rotation, velocity, spin, _ = (x[k] for x in found.trajectory)
         world = (self.mesh.vertices @ rotation.T + place)[self.mesh.faces]
         above = below(world, -world[..., 2])[0]
         return bearing(self.medium, self.mesh, rotation, place, velocity, spin, self.effects), above
@@ -122,8 +135,8 @@ class MeshScene(Intruding):
     def table(self, found: Passed) -> dict[str, np.ndarray]:
         """The columns of a result: t, angle (or x, y, z, if the body does not turn about a hub), force_x, force_y, force_z,
         moment_x, moment_y, moment_z, and once more the one about y as moment."""
-        passage = found.passage
-        place = {"angle": passage.angle} if self.motion.turns else dict(zip("xyz", passage.place.T))
+        trajectory = found.trajectory
+        place = {"angle": trajectory.angle} if self.motion.turns else dict(zip("xyz", trajectory.place.T))
         force = {f"force_{a}": f for a, f in zip("xyz", found.force.T)}
         moment = {f"moment_{a}": m for a, m in zip("xyz", found.moment.T)}
-        return {"t": passage.t, **place, **force, **moment, "moment": found.moment[:, 1]}
+        return {"t": trajectory.t, **place, **force, **moment, "moment": found.moment[:, 1]}

@@ -17,7 +17,7 @@ from geomech.io.files import read_text
 from geomech.scene.columns import columns
 from geomech.scene.key import Word
 from geomech.scene.reader import build
-from geomech.scene.sections import Ways
+from geomech.scene.sections import Alternatives
 from rft.checks import Number
 from rft.meshes import Spatial
 from rft.plates import VERTICAL, PlateDrags, PlateStress, StressMap
@@ -34,9 +34,10 @@ def _left_out(kind: type, name: str):
     return Annotated[(get_args(hint)[0] | None, *hint.__metadata__)]
 
 
-def _ways(*groups: Collection[str], beside: Collection[str] = (), told: str) -> Ways:
-    """Return ways to give a strength, by name or file or the other groups of keys. beside: keys that go with the first two."""
-    return Ways((*(({key}, {*beside}) for key in ("name", "file")), *(({*group}, set()) for group in groups)), told)
+def _strengths(*groups: Collection[str], more: Collection[str] = (), cure: str) -> Alternatives:
+    """Return the keys that a strength is given by: a name or a file, either with ``more``, or one of the groups."""
+    by_name = [({key}, {*more}) for key in ("name", "file")]
+    return Alternatives((*by_name, *(({*group}, set()) for group in groups)), cure)
 
 
 _Coefficients = dataclasses.make_dataclass(
@@ -59,8 +60,8 @@ class StressKeys(_Coefficients):
     file: str | None = None
     aliases = {key: key.replace("m", "-") for key in COEFFICIENTS if "m" in key}
     makes = StressMap
-    ways = _ways(
-        COEFFICIENTS, (), told="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone"
+    alternatives = _strengths(
+        COEFFICIENTS, (), cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone"
     )
 
     def to_part(self, place: str, given: Collection[str]) -> PlateStress:
@@ -96,20 +97,20 @@ class SpatialKeys(Spatial):
         ),
     ] = None  # fmt: skip
     makes = Spatial
-    ways = _ways(
+    alternatives = _strengths(
         ["xi_n"],
         ["density", "internal_friction"],
-        beside=["zeta"],
-        told="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'",
+        more=["zeta"],
+        cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'",
     )
 
     def to_part(self, place: str, given: Collection[str]) -> Spatial:
         """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
         more = {key: getattr(self, key) for key in ("surface_friction", "tension", "grazing")}
         if self.density is not None:
-            return Spatial.of_grains(self.density, self.internal_friction, **more)
-        if told := {*given} & {"name", "file", "zeta"}:
-            vertical = build(place, {key: getattr(self, key) for key in told}, StressKeys)
+            return Spatial.from_grains(self.density, self.internal_friction, **more)
+        if strength := {*given} & {"name", "file", "zeta"}:
+            vertical = build(place, {key: getattr(self, key) for key in strength}, StressKeys)
             return Spatial(matched_strength(vertical), **more)
         return Spatial(self.xi_n, **more)
 
@@ -122,8 +123,10 @@ class MatchedKeys(SpatialKeys):
         medium = super().to_part(place, given)
         of = self.name or Path(self.file or "").name
         times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
-        told = f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) of {of} in the vertical plane"
-        return {"medium": medium, "matched": told if of else ""}
+        match = (
+            f"xi_n = {medium.xi_n:.4g} N/m^3, matched to {times}alpha_z(0, 90 degrees) of {of} in the vertical plane"
+        )
+        return {"medium": medium, "matched": match if of else ""}
 
 
 def matched_strength(stress: PlateStress) -> float:
@@ -134,8 +137,8 @@ def matched_strength(stress: PlateStress) -> float:
 
 def plate_rows(place: str, file) -> np.ndarray:
     """Return plate drags of a CSV file, (4, N): beta, gamma in degrees, alpha_x, alpha_z in N/cm^3."""
-    found = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
-    rows = np.stack(list(found.values()))
+    drags = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
+    rows = np.stack(list(drags.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
         raise SceneError(f"{place}: {Path(file).name}: beta and gamma look like radians: give degrees")
     if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
@@ -171,8 +174,8 @@ def _of_file(place: str, file: str) -> PlateStress:
         tables = tomllib.loads(read_text(path, LARGEST))
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "it is not TOML"
-        told = f"{reason}; give a TOML or CSV file or one of {', '.join(VERTICAL)}"
-        raise SceneError(f"{place}: cannot read {file!r}: {told}") from None
+        cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
+        raise SceneError(f"{place}: cannot read {file!r}: {reason}; {cure}") from None
     table = tables.get("medium", tables)
     if not isinstance(table, Mapping):
         raise SceneError(f"{place}: {path.name}: medium must be a table [medium], got {type(table).__name__}")

@@ -46,8 +46,7 @@ def _system(tables: Mapping, name: str) -> dict:
     table = tables.get("system", {"kind": SHORT})
     short, kind = {part: tables[part] for part in SWIMMER if part in tables}, table.get("kind")
     if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
-        told = f"a {kind} takes no {sorted(short)[0]!r}: drop it, or the table [system]"
-        raise SceneError(f"{name}: {told}")
+        raise SceneError(f"{name}: a {kind} takes no {sorted(short)[0]!r}: drop it, or the table [system]")
     return short | dict(table)
 
 

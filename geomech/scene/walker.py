@@ -24,7 +24,7 @@ OF_THREE = {"xi_n", "density", "internal_friction", "surface_friction"}  # keys 
 LEGS = {"legs": OUTLINES}
 SCREW = {"screw": OneOf({"screw": Screw}, implied=("screw",))}
 LAW = "stress maps of the vertical plane, or the law of three dimensions, for the engine mujoco; if left out what the keys tell"
-OF = " of a robot that walks"
+OWNER = "a robot that walks"
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class WalkerScene:
     """A stress map or a law of three dimensions, a robot and its gait, and effects on the ground. numerics: how finely. text:
     its TOML. files: those that the scene names."""
 
-    medium: Annotated[PlateStress | Spatial, OneOf(LAWS, "law", implied=tuple(LAWS), of=OF, meaning=LAW)]
+    medium: Annotated[PlateStress | Spatial, OneOf(LAWS, "law", implied=tuple(LAWS), owner=OWNER, meaning=LAW)]
     robot: Annotated[
         Robot,
         OneOf(ROBOTS | {"mjcf": Mjcf}, inner={"rhex": LEGS, "wheel": LEGS, "screws": SCREW}, implied=("mjcf",)),
     ]
-    gait: Annotated[Tripod, Keys(Tripod, of=OF)]
-    effects: Annotated[tuple[GroundEffect, ...], Each(OneOf(KINDS))] = ()
-    numerics: Annotated[Fineness, Keys(Fineness, of=OF)] = field(default_factory=Fineness)
+    gait: Annotated[Tripod, Keys(Tripod, owner=OWNER)]
+    effects: Annotated[tuple[GroundEffect, ...], Each(KINDS)] = ()
+    numerics: Annotated[Fineness, Keys(Fineness, owner=OWNER)] = field(default_factory=Fineness)
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)

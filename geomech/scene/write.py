@@ -57,7 +57,7 @@ def table(name: str, values: dict) -> str:
 
 def gait_table(gait: Gait) -> dict:
     """Return what stands in [gait]."""
-    return section(gait, sections_of(Scene)["gait"].section)
+    return _section(gait, sections_of(Scene)["gait"].section)
 
 
 def medium_toml(name: str, entry) -> str:
@@ -69,7 +69,7 @@ def medium_toml(name: str, entry) -> str:
         f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in sorted(angles_of(type(entry.medium)))
     ]
     head = "".join(f"# {line}\n" for line in [*lines, *angles])
-    return head + table("medium", section(entry.medium, SWIMMER["medium"]))
+    return head + table("medium", _section(entry.medium, SWIMMER["medium"]))
 
 
 def vertical_toml(name: str, entry) -> str:
@@ -96,16 +96,16 @@ def spelled_out(tables: dict, scene: Scene) -> dict:
     """The scene's tables with the law and its parameters in place of the name of its medium."""
     if "name" not in tables.get("medium", {}):
         return tables
-    return {**tables, "medium": section(scene.system.medium, SWIMMER["medium"])}
+    return {**tables, "medium": _section(scene.system.medium, SWIMMER["medium"])}
 
 
 def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
     """Return the tables that a scene's parts make; SceneError if a file cannot name one of them."""
     with named(scene.name):
         out = {}
-        for name, (how, *_) in sections_of(type(scene)).items():
+        for name, (section, *_) in sections_of(type(scene)).items():
             part = getattr(scene, name, scene)  # the scene itself where its own fields are keys
-            if table := section(_named(part), how):
+            if table := section_tables(_named(part), section):
                 out[name] = table
         if isinstance(scene, Scene):
             out = _short(out, scene)
@@ -114,22 +114,24 @@ def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
         return out
 
 
-def section(part: Any, how: Section) -> Any:
+def section_tables(part: Any, section: Section) -> dict | list[dict]:
     """Return the table of a section, or the tables of one for each part; ValueError if no file can name the part."""
-    if isinstance(how, Each):
-        return [section(each, how.one) for each in part]
-    for variant in variants(how):
+    return [_section(each, section) for each in part] if isinstance(section, Each) else _section(part, section)
+
+
+def _section(part: Any, section: Section) -> dict:
+    for variant in variants(section):
         kind = getattr(variant.kind, "makes", variant.kind)
         of_file = variant.columns and not variant.columns.rows
-        if (type(part) is kind and not of_file) or (isinstance(how, Keys) and how.within):
-            inner = {field: section(getattr(part, field), one) for field, one in variant.inner.items()}
+        if (type(part) is kind and not of_file) or (isinstance(section, Keys) and section.within):
+            inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
             return {**variant.named, **_fields(part, kind, inner), **inner}
-        if type(part) is kind or isinstance(how, Keys):
+        if type(part) is kind or isinstance(section, Keys):
             raise ValueError(
                 f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
             )
-    told = f"a {name_in(how.kinds, part)} is of no kind that a scene file can name"
-    raise ValueError(f"{told}: use one of {', '.join(how.kinds)}")
+    reason = f"a {name_in(section.kinds, part)} is of no kind that a scene file can name"
+    raise ValueError(f"{reason}: use one of {', '.join(section.kinds)}")
 
 
 def _short(tables: dict, scene: Scene) -> dict:

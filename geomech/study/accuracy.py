@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.run.cost import Cost
 from geomech.run.jobs import runner
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.study.cost import Cost
 from geomech.study.offer import tiers
 from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic

@@ -9,7 +9,7 @@ import numpy as np
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.systems import Swimmer
-from rft.effects import side_by_side
+from rft.effects import batched_effect
 
 
 def kind(scene: Scene) -> str:
@@ -30,7 +30,7 @@ def beside(scenes: list[Scene], amplitudes=None) -> Scene:
     joined = dataclasses.replace(scenes[0], gait=gaits)
     if not isinstance(joined.system, Swimmer):
         return joined
-    effects = tuple(side_by_side(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
+    effects = tuple(batched_effect(same, [count] * len(scenes)) for same in zip(*(s.system.effects for s in scenes)))
     return joined.changed(effects=effects)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Dissipative, OwnMetric, at_once, capability, driven, pieces_of, power, stored
 from geomech.systems.premises import because, listed
 from geomech.tiers import harmonic
-from geomech.tiers.base import Numerics, in_groups
+from geomech.tiers.base import Numerics, Table, in_groups
 from geomech.tiers.fitted import axes
 from geomech.tiers.harmonic import HARMONIC
 from rft.premise import ALL, SHAPE_ALONE
@@ -62,6 +62,7 @@ def _who(system: System) -> str:
     return listed(system, ALL)
 
 
+@lru_cache(maxsize=16)
 def _even(system: System) -> bool:
     """Whether power is the same for alphadot and -alphadot, at a few shapes that stand for all."""
     if system.traits.linear:
@@ -91,6 +92,11 @@ def shared(system: System) -> bool:
     """Whether a metric takes the very velocities of the harmonic table."""
     of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored(system, "connection")
     return not of_its_own and HARMONIC.is_offered(system)
+
+
+def shared_table(system: System, numerics: Numerics) -> Table:
+    """Return the harmonic table as it is built with the metric."""
+    return harmonic.table(_Watched(system), numerics)
 
 
 def with_harmonics(
@@ -157,7 +163,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     number("phases", phases or 8, 8, 1e6, whole=True)
-    phases = max(32 if system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
+    phases = phases_of(scene, phases)
     finer = scene.with_numerics(pieces=min(2 * pieces_of(system), MOST_PIECES)).system if pieces_of(system) else None
 
     integral = lambda rates: 2 * np.pi * rates.mean(-1)
@@ -179,6 +185,11 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
 
     names = ("path_length", "work", "path_length_error", "work_error")
     return dict(zip(names, in_groups(told, amplitudes, at_once(system, phases))[:, :4].T))
+
+
+def phases_of(scene: Scene, phases: int | None = None) -> int:
+    """Return the phases that `effort` takes where so many are asked for, or the scene's own."""
+    return max(32 if scene.system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
 
 
 def _rates(system: System, alpha, alphadot) -> np.ndarray:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geomech.run.cost import BASE, Cost
 from geomech.run.jobs import runner
 from geomech.scene.intruding import Intruding
-from geomech.study.cost import BASE, Cost
 
 TOLERANCES = 10.0 ** -np.arange(1, 7)
 ROUNDING = 1e-13  # errors below say nothing
@@ -141,7 +141,8 @@ def price(scene: Intruding, count: int | None = None) -> Elements:
     """Of runs with so many parts in all, or of one with the scene's own."""
     parts = scene.motion.samples * (count or scene.count)
     kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
-    return kind(parts, parts * scene.per_part, BASE)
+    seconds = parts * scene.per_part
+    return kind(parts, seconds, BASE, seconds)
 
 
 def sentences(results: dict) -> list[str]:

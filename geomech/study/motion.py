@@ -9,10 +9,12 @@ import numpy as np
 
 from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.geometry.reconstruct import poses, repeated
+from geomech.run.cost import Cost
 from geomech.scene.model import Scene
-from geomech.study.cost import Cost, direct, price
+from geomech.study.cost import cycles_of, direct, price
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
+from rft.premise import Premise
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -96,9 +98,13 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if system.traits.steps and not settling(system):  # each goes on from the one before
-        jobs = [job._replace(count=job.count * cycles) for job in jobs]
+    if system.traits.steps and not settling(system):
+        # Each goes on from the one before; cycles that are alike are run first.
+        alike = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
+        times = (alike + cycles_of(system) - 1 + cycles) / cycles_of(system)
+        jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
     width = 2 * (costed(system).elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
-    return Cost(found.balances, found.seconds + WORDS * rows * width, found.memory + memory)
+    words = WORDS * rows * width
+    return Cost(found.balances, found.seconds + words, found.memory + memory, found.besides + words)

@@ -76,7 +76,7 @@ class OfPlates:
                 f"known at beta = {beta}, gamma = {gamma} degrees"
             )
         if whole.pushing:
-            out.append(f"{self.name}: the fitted map {whole.told()}")
+            out.append(f"{self.name}: the fitted map {whole.description()}")
         return out
 
     def toml(self) -> str:
@@ -99,7 +99,7 @@ class OfPlates:
         for key, value, (low, high), share, generic in zip(KEYS, f.values, f.intervals, f.resolution, f.zeta * GENERIC):
             lines.append(f"{key:5}{value:10.4f}   {low:7.4f} to {high:7.4f}{100 * abs(share):13.0f} %{generic:16.4f}")
         lines.append(f"zeta of the generic set that comes nearest: {f.zeta:.4g}; rms residual {self.rms:.3g} N/cm^3")
-        lines.append(f"the map {survey(f.stress).told()}")
+        lines.append(f"the map {survey(f.stress).description()}")
         if self.beta_deg.size > MOST_LINES:
             return "\n".join([*lines, "residuals: with --json"])
         lines.append("    beta   gamma   alpha_x       map   alpha_z       map")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -13,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from geomech.core.errors import SceneError, real_array, short
-from geomech.run.backend import suiting
-from geomech.run.jobs import context_of, runner, storing, unaided
+from geomech.run.cost import Cost
+from geomech.run.jobs import context_of, runner, storing
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
 from geomech.scene.read import from_tables, inputs
 from geomech.study import estimate, uncertainty
 from geomech.study.batch import beside, kind
-from geomech.study.cost import Cost, direct, of_medium, price
+from geomech.study.cost import direct, of_medium, price
 from geomech.study.results import Swept
 from geomech.study.tables import of_pose
 from geomech.systems.base import length_unit
@@ -28,7 +27,7 @@ from geomech.systems.capabilities import at_once
 
 LARGEST = 100_000_000  # points
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
-MOST_BATCHES = 10  # that are taken for nothing in a forecast
+MAKING = 3e-4  # s that a scene takes to be made of its tables; assumed
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
@@ -171,26 +170,14 @@ def cost(scene: Scene, over: Mapping[str, list[float]]) -> Cost:
     """Of `sweep`, by some of its points; SceneError as there."""
     tables, names, values, points = _grid(scene, over)
     total, at = points.total * len(values.get(AMPLITUDE, [0])), _At(tables, scene, tuple(names))
-    start, first = time.process_time(), [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
-    seconds = (time.process_time() - start) / len(first) * points.total
+    first = [at(points[k]) for k in range(min(points.total, SAMPLES_TOGETHER))]
     together = max(1, min(SAMPLES_TOGETHER, total // points.total * len(first) // len(set(map(kind, first)))))
     some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
-    jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total) for s in some]
-    balances, each, _ = np.array(list(map(price, jobs))).T
-    if not scene.system.traits.steps and total > MOST_BATCHES * together:
-        with suiting(balances.mean()):
-            seconds += total / together * _of_a_batch(at, ([points[0]], values.get(AMPLITUDE, [])[:1] or None))
+    jobs = [direct(s, s.gait, total, s.numerics.phases, together) + of_medium(s, s.gait, total, together) for s in some]
+    balances, seconds, _, besides = np.mean(list(map(price, jobs)), 0).tolist()
     held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
-    return Cost(round(balances.mean()), float(each.mean()) + seconds, max(held) + HELD * total)
-
-
-def _of_a_batch(at: _At, part: tuple) -> float:
-    """Seconds that a batch takes, however small it is."""
-    with unaided():
-        _part(at, part)  # loads what the first one loads
-        start = time.process_time()
-        _part(at, part)
-        return time.process_time() - start
+    making = MAKING * points.total
+    return Cost(round(balances), seconds + making, max(held) + HELD * total, besides + making)
 
 
 def _grid(scene: Scene, over: Mapping[str, list[float]]):

@@ -16,16 +16,17 @@ import numpy as np
 from geomech.core.errors import SceneError, named
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
+from geomech.run.cost import BASE, Cost
 from geomech.scene import write as written
 from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
-from geomech.study.cost import BASE, PILOT, Cost
 from geomech.study.sweep import LARGEST, Points, changed, listed, stored_in
 from rft.laws.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
 
+PILOT = 0.05  # s of time steps that tell how long others take
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots side by side
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
@@ -76,26 +77,26 @@ def walked(
     changes = []
     for k, (name, other) in enumerate(others):
         finer = dataclasses.replace(numerics, **{name: other})
-        there = how.again(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
+        there = how.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
         changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(there, walks)]))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
     half, most, finer = changes
     error = np.maximum(half, most) + TO_COME * finer
-    error[:, 0] += [w.drift + w.off for w in walks]
+    error[:, 0] += [w.drift + w.unsolved_error for w in walks]
     return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
     """What is told of a walk with an error."""
-    return walk.speed, walk.aside, walk.turning
+    return walk.speed, walk.lateral_speed, walk.yaw_rate
 
 
 def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
     """Work of the motors over weight times way, from rest to the end; the way is in the chords of the cycles. inf of one that
     makes none."""
     at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
-    y = walk.more["y"] if walk.more else np.zeros_like(walk.t)
+    y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
     way = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
     return float(walk.work[-1] / (scene.robot.mass * GRAVITY * way)) if way > 0.0 else math.inf
 
@@ -145,13 +146,13 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     with named(scene.name), suiting(STEP * least if planar else 0.0):
         per_step, more = PER_STEP[preferred()], MORE[preferred()]
         usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
-        pace, tries = engine(how).pace(scene.walker, numerics, PILOT)
+        pace, tries = engine(how).step_cost(scene.walker, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
     each = usual if together > 1 and tries <= HARD else max(pace, usual)
     seconds = each * steps * (batches + (count - batches) * more)
-    return Steps(round(steps * count), seconds, BASE)
+    return Steps(round(steps * count), seconds, BASE, seconds)
 
 
 def _speeding_up(scene: WalkerScene) -> float:
@@ -257,7 +258,7 @@ def _answer(common: tuple, setting: tuple[str, float]) -> tuple[float, float]:
     """(speed, seconds) of (engine, walker, numerics, its walk) with one knob at another value."""
     (by, walker, numerics, walk), (name, value) = common, setting
     start = time.thread_time()
-    (found,) = engine(by).again([walker], dataclasses.replace(numerics, **{name: value}), [walk], SETTLING)
+    (found,) = engine(by).rerun([walker], dataclasses.replace(numerics, **{name: value}), [walk], SETTLING)
     return found.speed, time.thread_time() - start
 
 
@@ -276,7 +277,8 @@ def cost(scene: WalkerScene) -> Steps:
     shares = sum(v / scene.numerics.steps for v in (*KNOBS["steps"], FINEST["steps"]))
     shares += sum(0.5 + v / 32 for v in (*KNOBS["elements"], FINEST["elements"])) + 2 * len(KNOBS["rounding"])
     one = price(scene, settling=True)
-    return Steps(round(one.balances * shares / 2), one.seconds * shares / 2, BASE)
+    seconds = one.seconds * shares / 2
+    return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
 
 
 def table(results: dict) -> str:

@@ -17,7 +17,10 @@ from geomech.systems.base import System, kind_of
 from rft.premise import Premise
 
 T = TypeVar("T")
-VALUES_TOGETHER = 1 << 22  # of gaits run side by side, angles and velocities: some 500 MB with what is made of them
+# Of gaits run side by side, angles and velocities, a batch of which takes some 30 MB with what is made of them: more take
+# no less time each, and the first of a long request is soon done, which tells how long the others take.
+VALUES_TOGETHER = 1 << 18
+STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its time however few gaits take it
 
 
 def capability(system: System, kind: type[T]) -> T | None:
@@ -112,13 +115,9 @@ class Costed(Protocol):
     evaluations: int  # places at which forces are evaluated for one velocity
     held: int  # numbers that time stepping remembers for each sample
     batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
-    cost_key: str  # the same for systems whose balances take the same time
 
     def solved(self, alpha, alphadot) -> int:
         """Return at how many phases of cycles (..., N, d) a balance is solved: the others are images of these."""
-
-    def solve(self, alpha, alphadot) -> Any:
-        """Return solutions at shapes and rates (..., d), whether or not they converged."""
 
 
 @runtime_checkable
@@ -224,9 +223,10 @@ def at_once(system: System, phases: int) -> int:
     cost = costed(system)
     if cost.batched:
         return sys.maxsize
+    if not system.traits.steps:
+        return max(1, VALUES_TOGETHER // (phases * (system.joints + 6)))
     # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-    stepped = 4 * cost.elements + cost.held // 8 if system.traits.steps else 0
-    return max(1, VALUES_TOGETHER // max(phases * (system.joints + 6), stepped))
+    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.held // 8))
 
 
 def near(system: System) -> str:
@@ -255,13 +255,9 @@ class ClosedForm:
     elements = evaluations = 1
     held = 0
     batched = False
-    cost_key = property(lambda self: repr(self.system))
 
     def solved(self, alpha, alphadot) -> int:
         return np.shape(alpha)[-2]
-
-    def solve(self, alpha, alphadot) -> np.ndarray:
-        return self.system.velocity(alpha, alphadot)
 
 
 def costed(system: System) -> Costed:

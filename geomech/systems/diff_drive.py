@@ -8,13 +8,14 @@ Int. J. Robotics Research 30, 988 (2011), Sec. 2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import choose, number
+from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
+from rft.checks import Number, check_numbers
 
 
 @SYSTEMS.register
@@ -22,12 +23,14 @@ from geomech.systems.base import SYSTEMS, integrated
 class DifferentialDrive:
     """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
 
-    wheel_radius (m): of both, in the unit of track. track (m): between the wheels, in the unit wanted for displacement;
-    1 for body lengths. frame (-): "mean", midway between the wheels and heading forwards.
+    frame (-): "mean", midway between the wheels and heading forwards.
     """
 
-    wheel_radius: float = 0.5
-    track: float = 1.0
+    wheel_radius: Annotated[float, Number(1e-9, 1e9, "m", "of both, in the unit of track")] = 0.5
+    track: Annotated[
+        float,
+        Number(1e-9, 1e9, "m", "between the wheels, in the unit wanted for displacement; 1 for body lengths"),
+    ] = 1.0
     frame: str = "mean"
 
     kind = "differential-drive"
@@ -36,8 +39,7 @@ class DifferentialDrive:
     traits = Traits(linear=True, labels=(("left wheel", "rad"), ("right wheel", "rad")))
 
     def __post_init__(self):
-        number("track", self.track, 1e-9, 1e9)
-        number("wheel_radius", self.wheel_radius, 1e-9, 1e9)
+        check_numbers(self)
         choose("frame", self.frame, ["mean"])
 
     length = property(lambda self: self.track)

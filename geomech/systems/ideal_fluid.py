@@ -9,11 +9,11 @@ SIAM J. Applied Dynamical Systems 5, 650 (2006), and R. L. Hatton and H. Choset,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from geomech.core.errors import number as checked
 from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
+from rft.checks import Number
 
 
 @SYSTEMS.register
@@ -21,7 +21,7 @@ from geomech.systems.momentum import Momentum
 class IdealFluidSwimmer(Momentum):
     """Elliptical links joined at their tips.
 
-    aspect (-): width over length of every link, 0.001 to 1. masses (-): of each link, over that of the fluid in its place;
+    masses (-): of each link, over that of the fluid in its place;
     1, neutrally buoyant, if left out. inertias (-): of each link about its centre, over its mass and the square of its
     length; (1 + aspect^2) / 16, that of a uniform ellipse, if left out.
 
@@ -29,14 +29,13 @@ class IdealFluidSwimmer(Momentum):
     pi rho (a^2 - b^2)^2 / 8 about the centre (H. Lamb, Hydrodynamics, 6th ed., Art. 71).
     """
 
-    aspect: float = 0.1
+    aspect: Annotated[float, Number(1e-3, 1, "-", "width over length of every link, 0.001 to 1")] = 0.1
     masses: tuple[float, ...] = ()
     inertias: tuple[float, ...] = ()
 
     kind = "ideal-fluid-swimmer"
 
     def __post_init__(self):
-        checked("aspect", self.aspect, 1e-3, 1)
         super().__post_init__()
         self.of_links("masses", 1e-9, 1e9)
         self.of_links("inertias", 1e-6, 1e6)

@@ -19,9 +19,10 @@ import numpy as np
 from geomech.core.errors import real_array, short
 from geomech.geometry.traits import Traits
 from geomech.systems.base import integrated
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 from rft.bodies import Chain
-from rft.bodies.base import Elements
+from rft.bodies.base import Elements, Length
+from rft.checks import check_numbers
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Linkage(Chain):
 
     masses: tuple[float, ...] = ()
 
-    def _of_link(self, x: np.ndarray, link: int | None) -> np.ndarray:
+    def _frame_value(self, x: np.ndarray, link: int | None) -> np.ndarray:
         masses = np.asarray(self.masses)
         return x[link] if link is not None else masses @ x / masses.sum()
 
@@ -39,18 +40,18 @@ class Linkage(Chain):
 class Momentum:
     """Base of chains without momentum.
 
-    lengths (-): relative link lengths, tail to head, all > 0, at least two. length (m): the whole body, in the unit wanted
-    for displacement; 1 for body lengths. frame (-): "mean", centre of mass and mass-weighted mean heading, or "link-1",
-    "link-2" ..., those of that link.
+    lengths (-): relative link lengths, tail to head, all > 0, at least two. frame (-): "mean", centre of mass and
+    mass-weighted mean heading, or "link-1", "link-2" ..., those of that link.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
-    length: float = 1.0
+    length: Length = 1.0
     frame: str = "mean"
 
     run = integrated
 
     def __post_init__(self):
+        check_numbers(self)
         object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
     def of_links(self, name: str, least: float, most: float) -> None:
@@ -124,7 +125,7 @@ class Momentum:
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)
         return (
-            (weights * (motion.v + np.stack(np.broadcast_arrays(*carried(motion, *xi)))) ** 2)
+            (weights * (motion.v + np.stack(np.broadcast_arrays(*to_element(motion, *xi)))) ** 2)
             .sum((0, 1))
             .reshape(shape)
         )

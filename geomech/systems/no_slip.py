@@ -14,6 +14,7 @@ import numpy as np
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
+from rft.bodies.base import Length
 
 
 @SYSTEMS.register
@@ -21,15 +22,15 @@ from rft.bodies import Chain
 class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
-    lengths (-): relative. length (m): the whole body, in the unit wanted for displacement; 1 for body lengths. frame (-):
-    "mean", centre of mass and mean heading, or "link-1", "link-2", "link-3", those of that link.
+    lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2", "link-3", those of
+    that link.
 
     Where the wheels' axles meet in one point, or are parallel, the snake can turn about it without rolling any wheel
     sideways: the shape is singular. For equal links that is alpha_1 = alpha_2, the straight snake and arcs of a circle.
     """
 
     lengths: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    length: float = 1.0
+    length: Length = 1.0
     frame: str = "mean"
 
     kind = "no-slip-snake"

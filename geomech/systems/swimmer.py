@@ -20,13 +20,12 @@ from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
 from geomech.systems.capabilities import Drawable, Part, Stepped, Uncertain
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
-from rft.balance.solver import ELEMENTS_TOGETHER
 from rft.bodies import KINDS as BODIES
-from rft.bodies.base import checked_body, halves, is_reversible, pace
+from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
 from rft.contact import Assembly, assemble
 from rft.effects import KINDS as EFFECTS
-from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, power_of
-from rft.laws.base import is_central, require_law
+from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
+from rft.laws.base import is_odd, require_law
 from rft.laws.records import record, rule_for
 from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
@@ -52,13 +51,12 @@ class Swimmer:
     solver: Solver = field(default=Solver())
 
     kind = "swimmer"
-    together = ELEMENTS_TOGETHER
 
     def __post_init__(self):
         require_law(self.medium)
         checked_body(self.body)
         refuse_mutable(self.medium, self.body)
-        rft.effects.broken(self.effects)
+        rft.effects.broken_premises(self.effects)
         object.__setattr__(self, "effects", tuple(self.effects))  # a list has no hash, by which tables are kept
         if not isinstance(self.solver, Solver):
             raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
@@ -93,20 +91,20 @@ class Swimmer:
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
     closed = property(lambda self: is_closed(self.medium))
-    held = property(lambda self: sum(e.held for e in self.effects))
+    held = property(lambda self: sum(e.memory_size for e in self.effects))
 
     @cached_property
     def traits(self) -> Traits:
         medium, body, effects = self.medium, self.body, self.effects
-        lawful, central = is_rate_independent(medium), is_central(medium)
-        lacks = rft.effects.broken(effects) | (NONE if lawful else RATES)
+        lawful, central = is_rate_independent(medium), is_odd(medium)
+        lacks = rft.effects.broken_premises(effects) | (NONE if lawful else RATES)
         return Traits(
             linear=is_linear(medium) and not effects,
             odd=central and all(e.odd for e in effects),
             mirror=is_mirror(medium),
             reversible=not effects and central and is_reversible(body),
             smooth=is_linear(medium),
-            power_degree=None if lacks & RATES else power_of(medium) + 1.0,
+            power_degree=None if lacks & RATES else speed_exponent(medium) + 1.0,
             lacks=lacks,
             joint_angles=_has_joint_angles(body),
             frame=getattr(body, "frame", MEAN),
@@ -171,32 +169,28 @@ class Swimmer:
     def settling(self) -> float:
         place_matters = self.traits.lacks & Premise.SE2_SYMMETRIC
         runs_on = self.traits.steps and self.solver.cycles is None and not place_matters
-        return max(e.settles for e in self.effects) if runs_on else 0.0
+        return max(e.drift_tolerance for e in self.effects) if runs_on else 0.0
 
     @property
     def cut(self) -> int:
         """Pieces to a body length that effects which vary along elements see: as asked for, or whole elements where these
         are shorter; 0 without such effects."""
-        if not any(e.varies for e in self.effects):
+        if not any(e.varies_along for e in self.effects):
             return 0
-        return max(self.solver.pieces, int(np.ceil(0.5 / halves(self.body).max() - 1e-9)))
+        return max(self.solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
 
     @property
     def elements(self) -> int:
         """Straight elements of the body, as its effects cut it."""
-        return self._assembly.elements
+        return self._assembly.n_elements
 
     @property
     def evaluations(self) -> int:
-        return self._assembly.points
+        return self._assembly.n_law_points
 
     @property
     def _assembly(self) -> Assembly:
         return assemble(self.medium, self.body, self.effects, self.solver.loads, self.solver.pieces)
-
-    @property
-    def cost_key(self) -> str:
-        return repr((self.medium, self.body, self.effects, self.solver.loads))
 
     def with_solver(self, solver: Solver) -> Swimmer:
         return dataclasses.replace(self, solver=solver)
@@ -259,7 +253,7 @@ class Swimmer:
         right; balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a force
         balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
-        speed = pace(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
+        speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
             images = around(alpha, alphadot, self.traits)
             asked = (images.some(x) for x in (alpha, alphadot, start))

@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import number, short
+from geomech.core.errors import short
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, trajectory
 from geomech.geometry.traits import Traits
@@ -22,6 +22,7 @@ from geomech.geometry.velocity import evaluate
 from geomech.io import tables
 from geomech.systems.base import SYSTEMS, integrated
 from geomech.systems.capabilities import Dissipative, OwnMetric
+from rft.checks import Number, check_numbers
 
 LENGTHS = (
     "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
@@ -35,8 +36,7 @@ class Table:
 
     file (-): in a scene from a file relative to that file's folder, else to the current one. sign (-): "+" or "-" for
     xi = + or - A alphadot in the file; order (-): "ndgrid" or "meshgrid"; if left out as the file says or shows
-    (`tables.load`). body_length (the file's unit): of the body, where the file does not say it; results are then
-    in body lengths, as which, with a note, its lengths are taken if left out. sha256 (-): of the file, filled in if left out;
+    (`tables.load`). sha256 (-): of the file, filled in if left out;
     given, the file must have it.
 
     A file of `geomech fit` holds A near a mean gait alone: gaits that leave the data are refused, and there is no area tier.
@@ -48,7 +48,14 @@ class Table:
     file: str
     sign: str = ""
     order: str = ""
-    body_length: float | None = None
+    body_length: Annotated[
+        float | None,
+        Number(
+            1e-9, 1e9, "the file's unit",
+            "of the body, where the file does not say it; results are then in body lengths, as which, with a note, its "
+            "lengths are taken if left out",
+        ),
+    ] = None  # fmt: skip
     sha256: str = ""
 
     kind = "table"
@@ -61,8 +68,7 @@ class Table:
         for name in ("sign", "order", "sha256"):
             if not isinstance(getattr(self, name), str):
                 raise ValueError(f"{name} must be text, got {short(getattr(self, name))}")
-        if self.body_length is not None:
-            number("body_length", self.body_length, 1e-9, 1e9)
+        check_numbers(self)
         held = tables.load(self.file, self.sign, self.order)
         if self.sha256.lower() not in ("", held.sha256):
             raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")

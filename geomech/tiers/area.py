@@ -53,7 +53,8 @@ def _plan(system, numerics, gait, amplitudes) -> Plan:
     A = fitted.at_shapes(system, numerics)
 
     def balances(count, phases):
-        shapes = 2 * phases + (2 + TIPS) * RADII * AROUND  # for the displacement, and once more with its spread
+        on_cones = RADII * max(AROUND, 4 * gait.harmonics + 2)
+        shapes = 2 * phases + (2 + TIPS) * on_cones  # for the displacement, and once more with its spread
         return count * shapes * fitted.solved_at(system, numerics)
 
     surfaces = lambda table, some, tips: spanned_by(A, gait, some, phases, tips, AROUND)

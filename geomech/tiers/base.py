@@ -7,50 +7,47 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import number, real_array
+from geomech.core.errors import real_array
 from geomech.core.registry import Registry
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import costed, near
 from geomech.systems.premises import refuse
+from rft.checks import Number, check_numbers
 from rft.premise import ALL, Premise
-
-WHOLE = {  # numbers of [numerics], from and to
-    "directions": (2, 4096), "grid": (4, 4096), "interpolation": (1, 5), "phases": (8, 1_000_000),
-    "harmonics": (1, 999), "curves": (4, 4096),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Numerics:
-    """How finely tiers compute; all optional, and part of [numerics] beside the system's own.
+    """How finely tiers compute; all optional, and part of [numerics] beside the system's own."""
 
-    directions (-): of alphadot in the least-squares fit; if left out 8 for up to two joints, beyond 16 a joint, or
-    4 where xi is linear in alphadot.
-    grid (-): points per joint. extent (rad): of the field, on either side of 0. interpolation (-): degree of its splines.
-    phases (-): per cycle. harmonics (-): the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond.
-    curves (-): in the table of a family of gaits.
-    """
-
-    directions: int | None = None
-    grid: int = 31
-    extent: float = 2.5
-    interpolation: int = 3
-    phases: int = 256
-    harmonics: int | None = None
-    curves: int = 24
-
-    angles = ("extent",)
+    directions: Annotated[
+        int | None,
+        Number(
+            2, 4096, "-",
+            "of alphadot in the least-squares fit; if left out 8 for up to two joints, beyond 16 a joint, or 4 where xi is "
+            "linear in alphadot", whole=True,
+        ),
+    ] = None  # fmt: skip
+    grid: Annotated[int, Number(4, 4096, "-", "points per joint", whole=True)] = 31
+    extent: Annotated[float, Number(1e-6, 100, "rad", "of the field, on either side of 0")] = 2.5
+    interpolation: Annotated[int, Number(1, 5, "-", "degree of the field's splines", whole=True)] = 3
+    phases: Annotated[int, Number(8, 1_000_000, "-", "per cycle", whole=True)] = 256
+    harmonics: Annotated[
+        int | None,
+        Number(
+            1, 999, "-",
+            "the highest kept, odd; if left out 15 of two joint rates, 9 of three, 5 beyond", whole=True,
+        ),
+    ] = None  # fmt: skip
+    curves: Annotated[int, Number(4, 4096, "-", "in the table of a family of gaits", whole=True)] = 24
 
     def __post_init__(self):
-        number("extent", self.extent, 1e-6, 100)
-        for name, (low, high) in WHOLE.items():
-            if name not in ("directions", "harmonics") or getattr(self, name) is not None:
-                number(name, getattr(self, name), low, high, whole=True)
+        check_numbers(self)
         if self.harmonics is not None and self.harmonics % 2 == 0:
             raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
         if self.interpolation >= self.grid:

@@ -11,8 +11,8 @@ import numpy as np
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
-from geomech.geometry.images import images, to_solve
-from geomech.geometry.plane import Plane, looked_up
+from geomech.geometry.images import images, mirrored, to_solve
+from geomech.geometry.plane import Plane, looked_up, shapes_of
 from geomech.geometry.plane import plane as fit_plane
 from geomech.geometry.traits import Traits
 from geomech.systems import premises
@@ -70,7 +70,7 @@ def table(system: System, numerics: Numerics) -> Table:
     return Table(
         "connection",
         key(numerics, DEPENDS_ON),
-        solved_shapes(system, numerics, count) * count,
+        solved_shapes(system.inner if isinstance(system, Framed) else system, numerics, count) * count,
         (d + 3) * 3 * numerics.grid**d,
         partial(_build, system, numerics),
         partial(axes, system, numerics),
@@ -114,6 +114,15 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
     count = directions(system, numerics)
     known = {"traits": system.traits, "unit": length_unit(system), "length": system.length}
     return fit_plane(system.velocity, (axis, axis), pair, at, count, numerics.interpolation, progress, **known)
+
+
+def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int], at) -> int:
+    """Return the velocities that `plane` takes."""
+    if stored(system, "connection"):
+        return 0
+    axis, count = connection.grid(1, numerics.grid, numerics.extent)[0], directions(system, numerics)
+    alpha = shapes_of((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
+    return int(to_solve(mirrored(alpha, count) if system.traits.halved else (), len(alpha)).sum()) * count
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:

@@ -1,4 +1,4 @@
-"""The balance of forces: one formula of Newton's step, two drivers, and the body velocity that they find."""
+"""The balance of forces: one formula of a Newton step, two drivers that apply it, and `body_velocity`."""
 
 from rft.balance.velocity import Solution, body_velocity, checked_input
 

@@ -1,4 +1,4 @@
-"""The NumPy driver: all samples take their steps side by side, by the very formulas of the compiled driver."""
+"""The NumPy driver: a batch of samples takes each step together, by the formulas that the compiled driver compiles."""
 
 from __future__ import annotations
 
@@ -11,60 +11,59 @@ from rft.balance.newton import (
     Iterate,
     Limits,
     Net,
-    begun,
-    carried,
+    element_net,
+    first_iterate,
     newton_step,
-    on_frame,
     plus,
     times,
+    to_element,
     with_momentum,
 )
 from rft.contact import Problem, mapped, take
 from rft.link import point_load, side_load
-from rft.momentum import inertia
+from rft.momentum import frame_inertia
 
-CROWDED = 0.65  # part of the samples that are still active, below which the others leave the arrays
-FEW = 200  # elements x samples, of which fewer take no less time
+# Samples that have ended leave the arrays where less than COMPACT_BELOW of them are active, and where the arrays have more
+# than COMPACT_ABOVE elements x samples: smaller arrays take as long.
+COMPACT_BELOW, COMPACT_ABOVE = 0.65, 200
 
 
 def velocities(problem: Problem) -> tuple[tuple, tuple]:
-    """Return (v_t, v_n, v_w), over the scale, of the body's sides and of points with the frame held."""
-    speed = problem.frame.speed
+    """Return (v_t, v_n, v_w) over the scale of speed, of the body's sides and of its points, with the frame held."""
+    speed = problem.frame.speed_scale
     return tuple(tuple(x / speed for x in contact.elements[6:]) for contact in (problem.sides, problem.points))
 
 
-def moved(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]:
-    """Return the velocities of sides and points after a change (x, y, theta) of the frame's velocity."""
+def with_frame_velocity(problem: Problem, v, x, y, theta) -> tuple[tuple, tuple]:
+    """Return the velocities v of sides and points plus those due to a velocity (x, y, theta) of the frame."""
     contacts = problem.sides, problem.points
-    return tuple(plus(u, carried(contact.elements, x, y, theta)) for u, contact in zip(v, contacts))
+    return tuple(plus(u, to_element(contact.elements, x, y, theta)) for u, contact in zip(v, contacts))
 
 
 def loads(problem: Problem, v, rounding) -> list:
-    """Return pairs of elements and `Load`, of the sides and, if there are any, of the points, at velocities over the
-    scale."""
-    sides, points, speed = problem.sides, problem.points, problem.speed
-    true = [times(speed, u) for u in v]
-    rounding, acts = rounding * speed, problem.acts
-    load = side_load(problem.law, true[0], rounding, sides.factor, sides.incline, problem.square, problem.memory, acts)
-    found = [(sides.elements, load)]
-    if len(points.station):
-        found.append(
-            (points.elements, point_load(problem.point_terms, true[1], rounding, points.factor, points.incline, acts))
-        )
-    return found
+    """Return pairs of `Elements` and their `Load`, for the sides and, if there are any, for the points, at velocities v
+    over the scale of speed."""
+    p, sides, points, speed = problem, problem.sides, problem.points, problem.law_speed_scale
+    v_sides, v_points = (times(speed, u) for u in v)
+    rounding, additions = rounding * speed, p.additions
+    load = side_load(p.law, v_sides, rounding, sides.factor, sides.incline, p.quadratic_drag, p.memory, additions)
+    if not len(points.station):
+        return [(sides.elements, load)]
+    on_points = point_load(p.point_terms, v_points, rounding, points.factor, points.incline, additions)
+    return [(sides.elements, load), (points.elements, on_points)]
 
 
 def net_of(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
-    """Return what loads, and momentum, come to on the frame at velocities v of elements and (x, y, theta) of the frame.
+    """Return the sum of loads, and of the rate of change of momentum, on the frame; entries (B,).
 
-    Every entry is (B,); velocities are over the scale of speed. mass: `rft.momentum.inertia`, computed if it is not
-    given."""
-    speed = problem.speed
-    net, *others = (summed(on_frame(e, f, u, speed)) for (e, f), u in zip(loads(problem, v, rounding), v))
-    for other in others:
+    v, (x, y, theta): velocities of elements and of the frame, over the scale of speed. mass: `rft.momentum.frame_inertia`,
+    computed by default."""
+    speed = problem.law_speed_scale
+    net, *of_points = (sum_elements(element_net(e, f, u, speed)) for (e, f), u in zip(loads(problem, v, rounding), v))
+    for other in of_points:
         net = Net(*map(plus, net, other))
-    if problem.momenta is not None:
-        mass = inertia(problem.sides.elements, problem.momenta) if mass is None else mass
+    if problem.momentum_rate is not None:
+        mass = frame_inertia(problem.sides.elements, problem.momentum_rate) if mass is None else mass
         net = with_momentum(net, x, y, theta, row(mass), speed[0])
     return net
 
@@ -76,8 +75,8 @@ def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) 
     return np.array(net_of(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi))
 
 
-def summed(net: Net) -> Net:
-    """Return the sum over elements of what they do to the frame."""
+def sum_elements(net: Net) -> Net:
+    """Return the sum of a `Net` over its elements."""
     return Net(*[tuple([np.add.reduce(term, 0) for term in triple]) for triple in net])
 
 
@@ -88,48 +87,44 @@ def slowest2(v) -> np.ndarray:
 
 
 def row(record) -> Any:
-    """Return a record of arrays (1, B) as one of arrays (B,)."""
+    """Return a record of arrays (1, B) as a record of arrays (B,)."""
     return mapped(lambda x: x[0], record)
 
 
 def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> tuple:
-    """Solve all samples by one descent: (xi (3, B) over the scale, residual, evaluations, slowest element's speed).
+    """Solve all samples by one descent: (xi (3, B) over the scale of speed, residual, evaluations, speed of the slowest
+    element).
 
-    guess: (3, B), over the scale, or None. The residual is infinite where the wanted rounding was not reached.
+    guess: (3, B), over the scale of speed, or None. The residual is infinite where the last level was not reached.
     """
-    size, fresh = problem.size, guess is None
-    it = begun(*(np.zeros((3, size)) if fresh else guess), descent.first, np.full(size, float(fresh)))
-    mass = None if problem.momenta is None else inertia(problem.sides.elements, problem.momenta)
+    size, fresh = problem.n_samples, guess is None
+    iterate = first_iterate(*(np.zeros((3, size)) if fresh else guess), descent.first, np.full(size, float(fresh)))
+    mass = None if problem.momentum_rate is None else frame_inertia(problem.sides.elements, problem.momentum_rate)
     active, index, v = np.ones(size, bool), np.arange(size), velocities(problem)
-    xi, rest = np.zeros((3, size)), np.full((3, size), np.inf)
+    xi, measures = np.zeros((3, size)), np.full((3, size), np.inf)
     while index.size:
-        tried = moved(problem, v, it.dx, it.dy, it.dtheta)
-        x, y, theta = it.x + it.dx, it.y + it.dy, it.theta + it.dtheta
-        net = net_of(problem, tried, it.rounding_next, x, y, theta, mass)
-        it, accepted, done = newton_step(it, net, slowest2(tried), row(problem.frame), descent, limits)
-        v = tried if accepted.all() else mapped(lambda a, b: np.where(accepted, a, b), tried, v)
+        step = iterate.dx, iterate.dy, iterate.dtheta
+        v_next = with_frame_velocity(problem, v, *step)
+        xi_next = plus((iterate.x, iterate.y, iterate.theta), step)
+        net = net_of(problem, v_next, iterate.rounding_next, *xi_next, mass)
+        iterate, accepted, done = newton_step(iterate, net, slowest2(v_next), row(problem.frame), descent, limits)
+        v = v_next if accepted.all() else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
         ended = done & active
         if ended.any():
             i = index[ended]
-            xi[:, i] = np.stack([it.x, it.y, it.theta])[:, ended]
-            rest[:, i] = np.stack([residual_at(it, limits), it.evaluations, it.slowest])[:, ended]
+            xi[:, i] = np.stack([iterate.x, iterate.y, iterate.theta])[:, ended]
+            measures[:, i] = np.stack([residual_at(iterate, limits), iterate.evaluations, iterate.slowest])[:, ended]
             active &= ~ended
             count = np.count_nonzero(active)
             if count == 0:
                 break
-            if count < CROWDED * active.size and v[0][0].size > FEW:
-                keep = np.flatnonzero(active)
-                index, problem, it, v, mass = (
-                    index[keep],
-                    problem.take(keep),
-                    take(it, keep),
-                    take(v, keep),
-                    take(mass, keep),
-                )
-                active = active[keep]
-    return xi, rest[0], rest[1].astype(int), rest[2]
+            if count < COMPACT_BELOW * active.size and v[0][0].size > COMPACT_ABOVE:
+                rest = np.flatnonzero(active)
+                problem, index, active = problem.take(rest), index[rest], active[rest]
+                iterate, v, mass = take(iterate, rest), take(v, rest), take(mass, rest)
+    return xi, measures[0], measures[1].astype(int), measures[2]
 
 
-def residual_at(it: Iterate, limits: Limits) -> np.ndarray:
-    """Return the residuals; infinite at a wider rounding, whose balance is not the one that was asked for."""
-    return np.where(it.rounding <= limits.last, it.residual, np.inf)
+def residual_at(iterate: Iterate, limits: Limits) -> np.ndarray:
+    """Return the residuals; infinite where the rounding is still wider than required."""
+    return np.where(iterate.rounding <= limits.rounding, iterate.residual, np.inf)

@@ -1,8 +1,8 @@
-"""Which driver solves the balance of forces: compiled code, or NumPy by the same formulas.
+"""The choice of the driver that solves balances of forces: compiled code, or NumPy by the same formulas.
 
-"auto" is compiled code where numba is installed, else NumPy. Whoever has little to compute may prefer NumPy, whose
-first call takes half a second less (`preferring`). No clock and no state of a cache decides. `python -m rft` compiles
-beforehand."""
+"auto" is compiled code where numba is installed, else NumPy. A caller with little to compute may prefer NumPy, whose
+first call takes half a second less (`preferring`). Neither a clock nor the state of a cache decides. `python -m rft`
+compiles beforehand."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ BACKENDS = ("auto", "numpy", "numba")
 
 
 class Note(UserWarning):
-    """Something beside the computing that went wrong and is made good; on the command line a line on standard error."""
+    """A warning of a fault that changes no result; the command line prints it as one line on standard error."""
 
 
 def check(backend: str) -> None:
-    """ValueError for no back end, and for one that is not installed."""
+    """Raise ValueError unless a back end exists and is installed."""
     if not (isinstance(backend, str) and backend in BACKENDS):
         raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {shown(backend)}")
     require(
@@ -33,7 +33,7 @@ def check(backend: str) -> None:
 
 @functools.cache
 def installed() -> bool:
-    """Return whether numba is."""
+    """Return whether numba is installed."""
     return importlib.util.find_spec("numba") is not None
 
 
@@ -42,7 +42,7 @@ _preferred: ContextVar[str] = ContextVar("preferred", default="")
 
 @contextlib.contextmanager
 def preferring(backend: str) -> Iterator[None]:
-    """Let "auto" be this back end in the body of the statement; "" leaves it as it is."""
+    """Let "auto" be this back end in the body of the statement; "" changes nothing."""
     token = _preferred.set(backend or _preferred.get())
     try:
         yield
@@ -51,21 +51,21 @@ def preferring(backend: str) -> Iterator[None]:
 
 
 def prefer(backend: str) -> None:
-    """Let "auto" be this back end from here on."""
+    """Let "auto" be this back end from now on."""
     _preferred.set(backend)
 
 
 def fastest() -> str:
-    """Return the back end for much to compute: "numba" where it is installed, else "numpy"."""
+    """Return the fastest back end for many balances: "numba" where it is installed, else "numpy"."""
     return "numba" if installed() else "numpy"
 
 
 def preferred() -> str:
-    """Return the back end that "auto" is here."""
+    """Return the back end that "auto" stands for."""
     return _preferred.get() or fastest()
 
 
 def compiles(backend: str, law) -> bool:
-    """Return whether the balances of a law, given its record, are solved by compiled code."""
+    """Return whether compiled code solves the balances of a law, given by its record."""
     chosen = preferred() if backend == "auto" else backend
     return chosen == "numba" and installed() and is_compilable(law)

@@ -1,8 +1,8 @@
-"""Compiled kernels on disk, each under a digest of everything it is computed with.
+"""Compiled kernels on disk, each under a digest of everything that it computes with.
 
-numba's own cache knows the file of the function alone: a changed formula in another file, or another law, would be
-given the old code. The key here covers the code and the constants of every function that a kernel names, the versions
-of numba and LLVM, and the processor. A file that is damaged, or cannot be read or written, counts as none."""
+numba's own cache depends on the file of the function alone: after a change of a formula in another file, or with another
+law, it would return old code. The digest here covers the code and the constants of every function that a kernel names,
+the versions of numba and LLVM, and the processor. A file that is damaged, or cannot be read or written, is ignored."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def folder() -> Path:
 
 
 class Cache(_Cache):
-    """The compiled code of one function in one file, as numba asks for it; whatever goes wrong with the file, the
-    function runs."""
+    """The compiled code of one function in one file, with the interface of numba's cache; no fault of the file keeps the
+    function from running."""
 
     def __init__(self, function):
         self.key = digest(function)
@@ -58,18 +58,18 @@ class Cache(_Cache):
         return raw[32:]
 
     def load_overload(self, sig, target_context) -> CompileResult | None:
-        """Return the compiled code for a signature; None if it has to be compiled."""
+        """Return the compiled code for a signature; None if it has yet to be compiled."""
         if (data := self.read()) is None:
             return None
         target_context.refresh()
         try:
             saved, reduced = pickle.loads(data)
             return CompileResult._rebuild(target_context, *reduced) if saved == str(sig) else None
-        except Exception as error:  # undamaged, and yet nothing that LLVM or pickle can load
+        except Exception as error:  # an undamaged file may still be one that LLVM or pickle cannot load
             return self.rename(f"it cannot be loaded ({type(error).__name__})")
 
     def save_overload(self, sig, data) -> None:
-        """Write the compiled code whole, if there is a folder that has room for it."""
+        """Write the compiled code at once (a part is never read); a note if it cannot be written."""
         body = dumps((str(sig), data._reduce()))
         part = self.path.with_name(f"{self.path.name}.{secrets.token_hex(8)}")
         try:
@@ -84,17 +84,17 @@ class Cache(_Cache):
                 part.unlink(missing_ok=True)
 
     def rename(self, why: str) -> None:
-        """Give a file that is not taken another name, and say so."""
+        """Rename a file that cannot be used, with a note."""
         other = self.path.with_name(self.path.name + ".damaged")
         try:
             os.replace(self.path, other)
-        except FileNotFoundError:  # another process has
+        except FileNotFoundError:  # another process has renamed it
             return
         except OSError as error:
-            done = f"it cannot be renamed ({error.strerror}): remove it"
+            action = f"it cannot be renamed ({error.strerror}): remove it"
         else:
-            done = f"renamed {other.name}; it is compiled anew, python -m rft does that at once"
-        note(f"the compiled code in {self.path} is not taken, {why}: {done}")
+            action = f"renamed {other.name}; it is compiled anew, python -m rft does that at once"
+        note(f"the compiled code in {self.path} is not taken, {why}: {action}")
 
     def enable(self) -> None:
         """Do nothing: the file is always used."""
@@ -107,11 +107,12 @@ class Cache(_Cache):
         self.path.unlink(missing_ok=True)
 
 
-def cached(kernel, what: str):
-    """Return a kernel whose compiled code is kept on disk; say so in one line if it has yet to be compiled."""
+def cached(kernel, purpose: str):
+    """Return a kernel whose compiled code is stored on disk; print one line with its purpose if it has yet to be
+    compiled."""
     kernel._cache = Cache(kernel.py_func)
     if not kernel._cache.path.exists():
-        print(f"compiling {what}: some seconds, once", file=sys.stderr)
+        print(f"compiling {purpose}: some seconds, once", file=sys.stderr)
     return kernel
 
 
@@ -121,8 +122,7 @@ def note(text: str) -> None:
 
 
 def digest(function) -> str:
-    """Return a digest of all that a function computes with: code, constants and every function that it names,
-    recursively."""
+    """Return a digest of the code and the constants of a function and, recursively, of every function that it names."""
     parts, seen = [Path(module.__file__).read_bytes() for module in (vectors, simd)], set()
 
     def visit(x):
@@ -135,7 +135,8 @@ def digest(function) -> str:
                     visit(cell.cell_contents)
                 visit(x.__defaults__)
         elif isinstance(x, type) and issubclass(x, tuple):
-            parts.append(repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode())  # code names its module
+            # Compiled code refers to the module of a record's class.
+            parts.append(repr((x.__module__, x.__name__, getattr(x, "_fields", ()))).encode())
             for name, value in sorted(vars(x).items()):
                 if isinstance(value, types.FunctionType) and not name.startswith("_"):
                     parts.append(name.encode())

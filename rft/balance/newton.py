@@ -1,11 +1,13 @@
 """One step of Newton's method on a balance of forces, for numbers, arrays or the vectors of compiled code.
 
-A dry medium is first taken with its kinks rounded off widely (``rounding``, a speed), where the problem is easy, then
-with less and less rounding down to the wanted one; the tangent dx / d(rounding) carries the solution from one level to
-the next. On a level the steps are Newton's, halved while the residual does not fall. Element velocities are carried
-beside xi and updated by small steps, so that an element at rest keeps all its digits. What decides about a step, or an
-end, is the same in every frame of the body. Velocities here are over a scale of each sample, so that they are of size
-1."""
+The dry friction of a medium is first rounded off widely (``rounding``, a speed), where the problem is easy, then less
+and less, level by level, down to the required rounding; the tangent dx / d(rounding) predicts the solution on the next
+level. On a level the steps are Newton's, halved while the residual does not fall. Element velocities are stored beside
+xi and updated by small steps, so that an element at rest keeps all its digits. Steps are accepted, and ended, by
+measures that are the same in every frame of the body. All velocities here are over a scale of each sample, so that they
+are of size 1.
+
+In the formulas ``e`` are straight elements, `rft.bodies.base.Elements`."""
 
 from __future__ import annotations
 
@@ -15,39 +17,21 @@ import numpy as np
 
 from rft.vectors import absolute, formula, maximum, minimum, sqrt, where
 
-VISCOUS = 1e8  # rounding at which every law is a viscous one to the last digit
-
-
-class Elements(NamedTuple):
-    """Straight elements in the body frame, lengths in body lengths.
-
-    c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
-    turning rate of the frame. half: half length, 0 for a point. weight: factor of the drag per length, which is the
-    length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre, and turning
-    rate times half length."""
-
-    c: float
-    s: float
-    r_t: float
-    r_n: float
-    half: float
-    weight: float
-    v_t: float
-    v_n: float
-    v_w: float
+VISCOUS = 1e8  # rounding at which every law is viscous to the last digit
 
 
 class Frame(NamedTuple):
-    """Measures of a sample. x, y: the body's mean place. force: unit of force. speed: the scale of velocities."""
+    """Mean and scales of a sample. x, y: mean of the body's centres of mass in the frame. force_scale: unit of residuals.
+    speed_scale: unit of velocities."""
 
     x: float
     y: float
-    force: float
-    speed: float
+    force_scale: float
+    speed_scale: float
 
 
 class Inertia(NamedTuple):
-    """Rate of change of momentum, strength (M xi + held), on the frame: M by rows, held (x, y, theta)."""
+    """Rate of change of momentum on the frame, strength (M xi + offset): M by rows, then the offset (x, y, theta)."""
 
     xx: float
     xy: float
@@ -58,53 +42,59 @@ class Inertia(NamedTuple):
     tx: float
     ty: float
     tt: float
-    held_x: float
-    held_y: float
-    held_t: float
+    offset_x: float
+    offset_y: float
+    offset_t: float
     strength: float
 
 
 class Net(NamedTuple):
-    """Force and moment on the frame, their slopes in x, y and theta, and the sum of J^T H v, which follows the
-    rounding."""
+    """Force and moment on the frame, as triples (x, y, theta).
+
+    by_x, by_y, by_theta: slopes in the frame's velocity. by_speed: slope in the logarithm of all velocities together, the
+    sum of J^T H v; in a law of degree 0 it is minus the slope in the logarithm of the rounding."""
 
     force: tuple
     by_x: tuple
     by_y: tuple
     by_theta: tuple
-    drift: tuple
+    by_speed: tuple
 
 
 class Descent(NamedTuple):
-    """Levels of rounding of one attempt.
+    """A sequence of levels of rounding.
 
-    first: rounding of the first level, body lengths per radian. ratio: of the rounding from one level to the next.
-    loose: residual at which a level is left. free: speed over rounding beyond which an element does not feel it.
-    budget: evaluations."""
+    first: rounding of the first level, over the scale of speed. ratio: of the rounding from one level to the next.
+    level_residual: residual that ends a level. free_ratio: speed over rounding above which rounding no longer matters to
+    an element. budget: most evaluations."""
 
     first: float
     ratio: float
-    loose: float
-    free: float
+    level_residual: float
+    free_ratio: float
     budget: float
 
 
 class Limits(NamedTuple):
-    """Goals and guards. last: the wanted rounding. residual: the wanted residual.
+    """Required accuracy, and limits of the steps.
 
-    largest: step of the body's mean place and heading, per radian; no body moves that fast. shortest: damping that is
-    taken whether it helps or not. lengthen: factor of the damping after a success."""
+    rounding: of the last level. residual: of a solution. largest_step: of the body's mean place and heading; no body moves
+    that fast. least_damping: a step with so little is accepted though the residual grows. damping_growth: factor of the
+    damping after an accepted step."""
 
-    last: float
+    rounding: float
     residual: float
-    largest: float = 3.0
-    shortest: float = 2.0**-12
-    lengthen: float = 2.0
+    largest_step: float = 3.0
+    least_damping: float = 2.0**-12
+    damping_growth: float = 2.0
 
 
 class Iterate(NamedTuple):
-    """A sample under way: velocity of the frame, the step to try, the roundings of both, damping of the step, residual,
-    speed of the slowest element, evaluations, and 1 before the first step."""
+    """State of a sample in a descent.
+
+    x, y, theta: velocity of the frame. dx, dy, dtheta: the next step. rounding, rounding_next: of the level before and
+    after it. damping: factor of Newton's step, at most 1. residual: after the last accepted step. slowest: speed of the
+    slowest element then. evaluations: number of them. fresh: 1 before the first step, else 0."""
 
     x: float
     y: float
@@ -157,27 +147,28 @@ def solve3(a, b, c, right):
     return dot(right, bc) * inverse, dot(right, cross(c, a)) * inverse, dot(right, cross(a, b)) * inverse
 
 
-# From elements to the frame.
+# Between elements and the frame.
 
 
 @formula
-def carried(e, x, y, theta):
-    """Return what a velocity of the frame adds to an element's (v_t, v_n, v_w): J xi."""
+def to_element(e, x, y, theta):
+    """Return the contribution J xi of the frame's velocity xi = (x, y, theta) to an element's velocity (v_t, v_n, v_w)."""
     return e.c * x + e.s * y + e.r_t * theta, e.c * y - e.s * x + e.r_n * theta, e.half * theta
 
 
 @formula
 def to_frame(e, t, n, w):
-    """Return force and moment on the frame of averages on an element: J^T f."""
+    """Return force and moment on the frame, J^T f, from averages f = (t, n, w) on an element."""
     return e.c * t - e.s * n, e.s * t + e.c * n, e.r_t * t + e.r_n * n + e.half * w
 
 
 @formula
-def on_frame(e, f, v, speed):
-    """Return what an element's load f at velocities v does to the frame: J^T f, J^T H J and J^T H v, H the slopes of
-    f."""
+def element_net(e, f, v, speed):
+    """Return the `Net` of an element with load f at velocities v: J^T f, J^T H J and J^T H v, with H the slopes of f.
+
+    speed: scale of the velocities that the load is computed at."""
     t, n, w = to_frame(e, f.t_t, f.t_n, f.t_w), to_frame(e, f.n_t, f.n_n, f.n_w), to_frame(e, f.w_t, f.w_n, f.w_w)
-    drift = to_frame(
+    by_speed = to_frame(
         e,
         f.t_t * v[0] + f.t_n * v[1] + f.t_w * v[2],
         f.n_t * v[0] + f.n_n * v[1] + f.n_w * v[2],
@@ -189,92 +180,95 @@ def on_frame(e, f, v, speed):
         times(slope, to_frame(e, t[0], n[0], w[0])),
         times(slope, to_frame(e, t[1], n[1], w[1])),
         times(slope, to_frame(e, t[2], n[2], w[2])),
-        times(slope, drift),
+        times(slope, by_speed),
     )
 
 
 @formula
 def with_momentum(net, x, y, theta, inertia, speed):
-    """Return the balance with the rate of change of momentum at a velocity of the frame."""
+    """Return a net with the rate of change of momentum at a velocity (x, y, theta) of the frame."""
     m, slope = inertia, inertia.strength * speed
     by_x, by_y, by_theta = (m.xx, m.yx, m.tx), (m.xy, m.yy, m.ty), (m.xt, m.yt, m.tt)
-    moved = plus(plus(times(x, by_x), times(y, by_y)), times(theta, by_theta))
+    M_xi = plus(plus(times(x, by_x), times(y, by_y)), times(theta, by_theta))
     return Net(
-        plus(net.force, plus(times(slope, moved), times(m.strength, (m.held_x, m.held_y, m.held_t)))),
+        plus(net.force, plus(times(slope, M_xi), times(m.strength, (m.offset_x, m.offset_y, m.offset_t)))),
         plus(net.by_x, times(slope, by_x)),
         plus(net.by_y, times(slope, by_y)),
         plus(net.by_theta, times(slope, by_theta)),
-        net.drift,
+        net.by_speed,
     )
 
 
 @formula
 def residual_of(force, frame):
-    """Return the larger of force and moment about the body's mean place, over the unit of force."""
+    """Return the larger of force and moment about the body's mean place, over the scale of force."""
     f_x, f_y, moment = force
-    about = moment - frame.x * f_y + frame.y * f_x
-    return maximum(sqrt(f_x * f_x + f_y * f_y), absolute(about)) / frame.force
+    moment = moment - frame.x * f_y + frame.y * f_x
+    return maximum(sqrt(f_x * f_x + f_y * f_y), absolute(moment)) / frame.force_scale
 
 
 # The step.
 
 
 @formula
-def newton_step(it, net, slowest2, frame, descent, limits):
+def newton_step(iterate, net, slowest2, frame, descent, limits):
     """Return the next iterate, whether the step that led to ``net`` is accepted, and whether the sample has ended.
 
-    slowest2: the square of the slowest element's speed after that step.
+    slowest2: square of the slowest element's speed after that step.
     """
-    last = limits.last
+    last = limits.rounding
     residual, slowest = residual_of(net.force, frame), sqrt(slowest2)
-    fresh = it.fresh > 0.0
-    helps = (it.rounding_next < it.rounding) | (residual < it.residual) | (it.damping <= limits.shortest)
+    fresh = iterate.fresh > 0.0
+    rounding = iterate.rounding_next
+    helps = (rounding < iterate.rounding) | (residual < iterate.residual) | (iterate.damping <= limits.least_damping)
     accepted = where(fresh, 0.0, where(helps, 1.0, 0.0)) > 0.0
-    # Where every element moves much faster than the rounding its kinks no longer matter: go all the way. An element at rest
-    # creeps in proportion to the rounding, one that slides feels its square.
-    down = accepted & (it.rounding_next > last) & (residual < descent.loose)
-    free = slowest > descent.free * it.rounding_next
-    lower = where(free, last, maximum(descent.ratio * it.rounding_next, last))
-    change = lower / it.rounding_next
-    pull = where(down, where(free, 0.5 * (change * change - 1.0), change - 1.0), 0.0)
-    damping = where(fresh, it.damping, minimum(1.0, limits.lengthen * it.damping))
-    right = plus(times(pull, net.drift), times(-damping, net.force))
+    # Where every element moves much faster than the rounding, its kinks no longer matter and the next level is the last. The
+    # velocity of an element at rest is linear in the rounding, that of a sliding element quadratic.
+    ends_level = accepted & (rounding > last) & (residual < descent.level_residual)
+    free = slowest > descent.free_ratio * rounding
+    lower = where(free, last, maximum(descent.ratio * rounding, last))
+    ratio = lower / rounding
+    prediction = where(ends_level, where(free, 0.5 * (ratio * ratio - 1.0), ratio - 1.0), 0.0)
+    damping = where(fresh, iterate.damping, minimum(1.0, limits.damping_growth * iterate.damping))
+    right = plus(times(prediction, net.by_speed), times(-damping, net.force))
     x, y, theta = solve3(net.by_x, net.by_y, net.by_theta, right)
-    cut = where(fresh, 1.0, shortened(x, y, theta, frame, limits.largest))
-    go_on, taken = accepted | fresh, where(accepted, 1.0, 0.0)
-    evaluations = it.evaluations + where(fresh, 0.0, 1.0)
-    done = (accepted & (it.rounding_next <= last) & (residual <= limits.residual)) | (evaluations >= descent.budget)
+    fraction = where(fresh, 1.0, step_fraction(x, y, theta, frame, limits.largest_step))
+    new_step, moved = accepted | fresh, where(accepted, 1.0, 0.0)
+    evaluations = iterate.evaluations + where(fresh, 0.0, 1.0)
+    solved = accepted & (rounding <= last) & (residual <= limits.residual)
     after = Iterate(
-        it.x + taken * it.dx,
-        it.y + taken * it.dy,
-        it.theta + taken * it.dtheta,
-        where(go_on, cut * x, 0.5 * it.dx),
-        where(go_on, cut * y, 0.5 * it.dy),
-        where(go_on, cut * theta, 0.5 * it.dtheta),
-        where(fresh, descent.first, it.rounding_next),
-        where(fresh, descent.first, where(down, lower, it.rounding_next)),
-        where(go_on, damping, 0.5 * it.damping),
-        where(accepted, residual, it.residual),
-        where(accepted, slowest, it.slowest),
+        iterate.x + moved * iterate.dx,
+        iterate.y + moved * iterate.dy,
+        iterate.theta + moved * iterate.dtheta,
+        where(new_step, fraction * x, 0.5 * iterate.dx),
+        where(new_step, fraction * y, 0.5 * iterate.dy),
+        where(new_step, fraction * theta, 0.5 * iterate.dtheta),
+        where(fresh, descent.first, rounding),
+        where(fresh, descent.first, where(ends_level, lower, rounding)),
+        where(new_step, damping, 0.5 * iterate.damping),
+        where(accepted, residual, iterate.residual),
+        where(accepted, slowest, iterate.slowest),
         evaluations,
         0.0 * evaluations,
     )
-    return after, accepted, done
+    return after, accepted, solved | (evaluations >= descent.budget)
 
 
 @formula
-def shortened(x, y, theta, frame, largest):
-    """Return the part of a step that moves the body's mean place and heading by no more than ``largest``."""
-    place_x, place_y = x - frame.y * theta, y + frame.x * theta
-    far = sqrt(place_x * place_x + place_y * place_y + theta * theta)
-    long = maximum(maximum(absolute(x), absolute(y)), absolute(theta)) > 1.0  # within 1 no place moves too far
-    return where(long, largest / maximum(far, largest), 1.0)
+def step_fraction(x, y, theta, frame, largest):
+    """Return the fraction of a step that changes the velocity of the body's mean place, and its rotation rate, by no more
+    than ``largest``."""
+    mean_x, mean_y = x - frame.y * theta, y + frame.x * theta
+    size = sqrt(mean_x * mean_x + mean_y * mean_y + theta * theta)
+    may_exceed = maximum(maximum(absolute(x), absolute(y)), absolute(theta)) > 1.0
+    return where(may_exceed, largest / maximum(size, largest), 1.0)
 
 
 @formula
-def begun(dx, dy, dtheta, first, fresh):
-    """Return a sample at rest, whose first step is a guess, or, if fresh is 1, the one to the viscous solution."""
-    zero = 0.0 * fresh  # a guess may be no number
+def first_iterate(dx, dy, dtheta, first, fresh):
+    """Return a sample at rest whose first step is (dx, dy, dtheta), or, if fresh is 1, the step to the viscous
+    solution."""
+    zero = 0.0 * fresh  # not of dx, which may be nan
     return Iterate(
         zero, zero, zero,
         dx, dy, dtheta,

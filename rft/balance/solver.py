@@ -1,7 +1,7 @@
-"""Body velocities of many samples: descents in the rounding, and where these fail walks along the curve of solutions.
+"""Body velocities of many samples: descents in the rounding, then walks along the curve of solutions.
 
-Samples that need too many steps of `rft.balance.newton` are followed along their curve of solutions, which may turn
-back on its way down (`rft.balance.path`); where that breaks, slower descents are tried."""
+Samples that a descent (`rft.balance.newton`) leaves unsolved are followed along their curve of solutions, which may fold
+(`rft.balance.path`); samples that the walks leave unsolved take slower descents."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.balance import arrays, backend
+from rft.balance import arrays
+from rft.balance.backend import compiles
+from rft.balance.listening import listener
 from rft.balance.newton import Descent, Limits
 from rft.balance.path import follow
 from rft.contact import Problem
-from rft.threads import each, keep_freed_memory, split, workers
+from rft.threads import keep_freed_memory, run_shares, split, thread_count
 
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the rounding is at rest
-ELEMENTS_TOGETHER = 24576  # elements x nodes x samples that NumPy solves side by side
-COMPILED_WORTH = 4096  # samples a thread, below which another does not pay
-FASTEST = 1e30  # velocity over the scale, of which none comes near: beyond it squares overflow, and drag reads as 0
+ELEMENTS_TOGETHER = 24576  # elements x nodes x samples in one batch of NumPy
+COMPILED_WORTH = 4096  # samples a thread, below which another thread does not pay
+FASTEST = 1e30  # velocity over the scale, larger than any solution: squares of larger ones overflow, and drag becomes 0
 
 QUICK = Descent(0.011, 0.32, 0.08, 4.0, 48.0)
-WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a good guess, at the wanted rounding at once
-# Walks along a curve: size of a step's first correction, evaluations allowed. A force law alone needs no more than these;
-# the slow descents are for effects, and quadrature rules, with kinks of their own that no rounding takes away.
+WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level alone
+# Walks along a curve: intended size of a step's first correction, most evaluations. A force law alone needs no more than
+# these; the slow descents are for effects and quadrature rules whose kinks are not rounded off.
 WALKS = ((0.2, 150), (0.02, 600))
 SLOW = (
     Descent(0.1, 0.1, 1e-4, 1e3, 150.0),
@@ -37,8 +39,8 @@ keep_freed_memory()
 
 
 class Solved(NamedTuple):
-    """Body velocities xi (3, B), residuals, evaluations and whether an element is at rest, (B,) each; limit: of
-    residuals."""
+    """Solutions. xi: (3, B), body velocities. residual, iterations, stuck: (B,), residuals, evaluations, and whether an
+    element is at rest. limit: largest residual of a solved sample."""
 
     xi: np.ndarray
     residual: np.ndarray
@@ -48,8 +50,8 @@ class Solved(NamedTuple):
 
 
 class Accuracy(NamedTuple):
-    """How finely to solve. rounding: speed, over the scale, below which dry friction is linear. tolerance: residual to
-    reach."""
+    """Required accuracy. rounding: speed, over the scale of speed, below which dry friction is linear. tolerance: residual
+    of a solution."""
 
     rounding: float
     tolerance: float
@@ -60,85 +62,87 @@ def solve(
     scale: np.ndarray,
     accuracy: Accuracy,
     law,
-    points: int,
-    method: str = "auto",
+    n_law_points: int,
+    backend: str = "auto",
     threads: int | None = None,
     guess: np.ndarray | None = None,
 ) -> Solved:
     """Return the body velocities of B samples, in body lengths.
 
-    problem_at(index): the balance of these samples. scale: (B,), the size of their velocities. law: its record. points:
-    places of a sample at which the law is evaluated, by which samples are put together. method: a back end
-    (`rft.balance.backend`). guess: (3, B), tried first but where it is nan, or beyond FASTEST."""
-    size = scale.size
-    together = max(1, ELEMENTS_TOGETHER // points)
-    driver, useful = arrays, 2 * together
-    if backend.compiles(method, law):
+    problem_at(index): the `Problem` of the samples ``index``. scale: (B,), sizes of their velocities. law: its record.
+    n_law_points: `Assembly.n_law_points`, by which the sizes of batches are chosen. backend: as in
+    `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
+    size, tell = scale.size, listener()
+    batch = max(1, ELEMENTS_TOGETHER // n_law_points)
+    driver, worth = arrays, 2 * batch  # samples that pay for a thread
+    if compiles(backend, law):
         from rft.balance import compiled
 
-        driver, useful, together = compiled, COMPILED_WORTH, 4 * together
+        driver, worth, batch = compiled, COMPILED_WORTH, 4 * batch
     xi, stuck = np.zeros((3, size)), np.zeros(size, bool)
     residual, iterations, limit = np.full(size, np.inf), np.zeros(size, int), np.zeros(size)
 
-    def take(index, found, limits: Limits, linear: bool) -> None:
-        new, left, evaluations, slowest = found
-        xi[:, index], residual[index] = new, np.where(is_possible(new), left, np.inf)
+    def store(index, solutions, limits: Limits, linear: bool) -> None:
+        new_xi, new_residual, evaluations, slowest = solutions
+        xi[:, index], residual[index] = new_xi, np.where(is_possible(new_xi), new_residual, np.inf)
         stuck[index] = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
         iterations[index] += evaluations
         limit[index] = limits.residual
 
     def descend(share, stop) -> None:
-        for index in split(share, math.ceil(share.size / together)):
+        for index in split(share, math.ceil(share.size / batch)):
             if stop.is_set():
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            index = slice(None) if index.size == size else index  # which is quicker
-            first = guess[:, index] if attempt is WARM else None
-            found = driver.solve(problem, _begin(attempt, problem, limits), limits, first)
-            take(index, found, limits, problem.linear)
+            new = int(np.count_nonzero(iterations[index] == 0))
+            index = slice(None) if index.size == size else index  # a slice is quicker
+            first = guess[:, index] if method is WARM else None
+            store(index, driver.solve(problem, _begin(method, problem, limits), limits, first), limits, problem.linear)
+            if new:
+                tell(new, n_law_points, problem.linear)
 
     def walk(share) -> None:
-        for index in split(share, math.ceil(share.size / together)):
+        for index in split(share, math.ceil(share.size / batch)):
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            for i, *found in follow(problem, limits, driver.nets, *attempt):
-                solved = (found[1] <= limits.residual) & is_possible(found[0])
-                take(index[i[solved]], [x[..., solved] for x in found], limits, problem.linear)
-                iterations[index[i[~solved]]] += found[2][~solved]
+            for i, *ended in follow(problem, limits, driver.nets, *method):
+                solved = (ended[1] <= limits.residual) & is_possible(ended[0])
+                store(index[i[solved]], [x[..., solved] for x in ended], limits, problem.linear)
+                iterations[index[i[~solved]]] += ended[2][~solved]
 
-    todo = np.arange(size)
+    unsolved = np.arange(size)
     if guess is not None:
         with np.errstate(over="ignore"):
             guess = guess / scale
-    for attempt in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-        some = todo[is_possible(guess[:, todo])] if attempt is WARM else todo
-        if some.size and isinstance(attempt, Descent):
-            each(descend, split(some, workers(threads, some.size // useful)))
-        elif some.size:
-            walk(some)
+    for method in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
+        active = unsolved[is_possible(guess[:, unsolved])] if method is WARM else unsolved
+        if active.size and isinstance(method, Descent):
+            run_shares(descend, split(active, thread_count(threads, active.size // worth)))
+        elif active.size:
+            walk(active)
         solved = residual <= limit
         if solved.all():
             break
-        todo = np.flatnonzero(~solved)
+        unsolved = np.flatnonzero(~solved)
     return Solved(xi * scale, residual, iterations, stuck, float(limit.max(initial=0.0)))
 
 
 def is_possible(xi: np.ndarray) -> np.ndarray:
-    """Return whether velocities over the scale (3, B) are numbers that the solver can compute with, (B,)."""
+    """Return whether velocities (3, B) over the scale of speed are finite and below FASTEST, (B,)."""
     return (np.abs(xi) < FASTEST).all(0)
 
 
 def _begin(descent: Descent, problem: Problem, limits: Limits) -> Descent:
-    """Return the descent with its first rounding, which is the last one in a linear medium."""
-    first = limits.last if problem.linear else max(descent.first, limits.last)
+    """Return the descent with the rounding of its first level, which is also the last level in a linear medium."""
+    first = limits.rounding if problem.linear else max(descent.first, limits.rounding)
     return descent._replace(first=first)
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
-    """Return the goals, with the roundoff of the largest forces."""
-    residual = accuracy.tolerance + 1e-14 * max(1.0, problem.lateral / problem.unit)
-    if problem.momenta is not None:
-        frame, m = problem.frame, problem.momenta
-        residual += 1e-14 * np.max(m.rate * m.strength * frame.speed / frame.force)
+    """Return the limits of a problem, whose residual allows for roundoff of the largest forces."""
+    residual = accuracy.tolerance + 1e-14 * max(1.0, problem.lateral_drag / problem.axial_drag)
+    if problem.momentum_rate is not None:
+        frame, m = problem.frame, problem.momentum_rate
+        residual += 1e-14 * np.max(m.rate * m.strength * frame.speed_scale / frame.force_scale)
     return Limits(accuracy.rounding, residual)

@@ -1,4 +1,4 @@
-"""Body velocity for a shape and its rate of change: the zero of the medium's force and moment (paper Eq. 5)."""
+"""Body velocity at a shape and a rate of change of shape: the zero of the medium's force and moment (paper Eq. 5)."""
 
 from __future__ import annotations
 
@@ -9,24 +9,26 @@ import numpy as np
 
 from rft.balance.backend import check
 from rft.balance.solver import Accuracy, Solved, solve
-from rft.bodies.base import Body, pace
+from rft.bodies.base import Body, joint_speed
 from rft.bodies.pieces import PIECES
 from rft.checks import in_range, real_array
 from rft.contact import assemble
-from rft.effects.base import Effect, broken, engine
+from rft.effects.base import Effect, broken_premises, engine
 from rft.laws.base import Medium
-from rft.premise import not_so
+from rft.premise import negated
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
-LEAST = 1e-100  # of a rate that is not 0
+LEAST_RATE = 1e-100  # other than 0
 
 
 class Solution(NamedTuple):
-    """Body velocities. xi: (..., 3), body frame, (length/time, length/time, rad/time). residual: (...), the larger of
-    force over the whole body's axial yield force (its drag at unit speed in a viscous medium) and moment about its mean
-    place over that times the body's length. status: (...), "sliding", "stuck" (some element at rest) or "unconverged".
-    iterations: (...), evaluations of the load."""
+    """Body velocities.
+
+    xi: (..., 3), in the body frame, (length/time, length/time, rad/time). residual: (...), the larger of force and of
+    moment about the body's mean place, over the axial yield force of the whole body (its drag at unit speed in a viscous
+    medium) and over that times the body's length. status: (...), "sliding", "stuck" (an element is at rest) or
+    "unconverged". iterations: (...), number of evaluations of the load."""
 
     xi: np.ndarray
     residual: np.ndarray
@@ -42,12 +44,12 @@ class Solution(NamedTuple):
         return f"Solution({self.status.shape} samples: {kinds or 'none'}; {worst})"
 
     def checked(self) -> Solution:
-        """This solution, or RuntimeError if any sample is unconverged."""
-        bad = int(np.count_nonzero(self.status == "unconverged"))
-        if bad:
+        """Return this solution; RuntimeError if any sample is unconverged."""
+        unconverged = int(np.count_nonzero(self.status == "unconverged"))
+        if unconverged:
             worst = float(np.max(self.residual))
             raise RuntimeError(
-                f"{bad} of {self.status.size} force balances did not converge (worst residual {worst:.1e}): "
+                f"{unconverged} of {self.status.size} force balances did not converge (worst residual {worst:.1e}): "
                 "raise 'regularisation', or report the scene"
             )
         return self
@@ -68,63 +70,75 @@ def body_velocity(
     backend: str = "auto",
     start=None,
 ) -> Solution:
-    """Body velocity at which the medium's net force and moment on the body vanish.
+    """Return the body velocity at which the medium's net force and moment on the body vanish.
 
-    alpha, alphadot: (..., joints), rad and rad/time; they broadcast. loads: "exact", or "midpoint:N", "gauss:N".
-    regularisation: speed, in body lengths per radian of joint motion |alphadot|, below which dry friction is rounded
-    off (v^2 -> v^2 + eps^2); an element at rest creeps at about this speed. tolerance: normalised residual to reach.
-    threads: workers, by default one per core. effects: of `rft.effects`, those of the algebraic engine; what is not
-    listed is not evaluated. pieces: to a body length, into which effects that vary along an element cut it. backend:
-    "auto", "numpy" or "numba" (`rft.balance.backend`). start: (..., 3), body velocities to begin from, in the units of
-    xi, such as those of a shape nearby; nan where none is known. A good one takes 5 evaluations in place of 10, a bad
-    one costs 12 more, and the answer is the same. Raises ValueError for shapes or values that make no sense, and for a
-    medium that pushes."""
+    Parameters
+    ----------
+    medium : a force law of `rft.laws`, or any `rft.laws.base.Medium`.
+    body : a body of `rft.bodies`, or any `rft.bodies.base.Body`.
+    alpha, alphadot : arrays (..., joints) that broadcast, shapes in rad and their rates in rad/time.
+    loads : average of the law over an element, "exact", "midpoint:N" or "gauss:N" (`rft.quadrature`).
+    regularisation : speed, body lengths per radian of joint motion |alphadot|, below which dry friction is rounded off
+        (v^2 -> v^2 + rounding^2); an element at rest creeps at about this speed.
+    tolerance : largest residual of a solution.
+    threads : most threads, by default one a core.
+    effects : effects of `rft.effects` of the algebraic engine.
+    pieces : number to a body length of the pieces into which effects that vary along an element cut it.
+    backend : "auto", "numpy" or "numba" (`rft.balance.backend`).
+    start : array (..., 3), body velocities to start from in the units of xi, such as those of a shape nearby; nan where
+        none is known. The solution is the same; a good start takes 5 evaluations in place of 10, a bad one 12 more.
+
+    Raises
+    ------
+    ValueError
+        For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
+    """
     if engine(effects) != "algebraic":
-        lost = not_so(broken(effects))
-        raise ValueError(f"no body velocity follows from shape alone where effects are {lost}: use rft.time_steps")
+        broken = negated(broken_premises(effects))
+        raise ValueError(f"no body velocity follows from shape alone where effects are {broken}: use rft.time_steps")
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
     if threads is not None:
         in_range("threads", threads, 1, 1024, whole=True)
     batch = alpha.shape[:-1]
-    guess = None if start is None else _started(start, batch, body.length)
+    guess = None if start is None else _guess(start, batch, body.length)
     alpha, alphadot = (np.ascontiguousarray(x.reshape(-1, body.joints).T) for x in (alpha, alphadot))
-    speed = pace(body, alphadot)
-    moves = speed > 0
-    if not moves.all():  # where joints are at rest so is the body
-        moving = np.flatnonzero(moves)
-        assembly, alpha, alphadot = assembly.take(moving), alpha[:, moving], alphadot[:, moving]
-        guess = None if guess is None else guess[:, moving]
+    speed = joint_speed(body, alphadot)
+    moving = speed > 0
+    if not moving.all():  # a body whose joints are at rest is at rest
+        index = np.flatnonzero(moving)
+        assembly, alpha, alphadot = assembly.take(index), alpha[:, index], alphadot[:, index]
+        guess = None if guess is None else guess[:, index]
 
     def problem_at(index):
         if index.size == alpha.shape[1]:
-            return assembly.at(alpha, alphadot)
-        return assembly.take(index).at(alpha[:, index], alphadot[:, index])
+            return assembly.problem(alpha, alphadot)
+        return assembly.take(index).problem(alpha[:, index], alphadot[:, index])
 
     accuracy = Accuracy(regularisation, tolerance)
-    solved = solve(problem_at, speed[moves], accuracy, assembly.law, assembly.points, backend, threads, guess)
-    xi, residual, iterations, stuck, limit = solved if moves.all() else _with_rest(solved, moves)
+    solved = solve(problem_at, speed[moving], accuracy, assembly.law, assembly.n_law_points, backend, threads, guess)
+    xi, residual, iterations, stuck, limit = solved if moving.all() else _with_samples_at_rest(solved, moving)
     xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
     status = STATUSES[np.where(residual <= limit, stuck.astype(int), UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
-def _with_rest(solved: Solved, moves: np.ndarray) -> Solved:
-    """Return the solution with the samples at rest besides those that move (B,)."""
-    size = moves.size
-    all_of = Solved(np.zeros((3, size)), np.zeros(size), np.zeros(size, int), np.ones(size, bool), solved.limit)
-    for array, found in zip(all_of[:4], solved[:4]):
-        array[..., moves] = found
-    return all_of
+def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
+    """Return the solution of all samples from that of those which are ``moving`` (B,)."""
+    size = moving.size
+    full = Solved(np.zeros((3, size)), np.zeros(size), np.zeros(size, int), np.ones(size, bool), solved.limit)
+    for array, values in zip(full[:4], solved[:4]):
+        array[..., moving] = values
+    return full
 
 
-def _started(start, batch: tuple, length: float) -> np.ndarray:
-    """start as a guess (3, B) in body lengths; ValueError if it does not broadcast to xi."""
+def _guess(start, batch: tuple, length: float) -> np.ndarray:
+    """Return ``start`` as a guess (3, B) in body lengths; ValueError if it does not broadcast to xi."""
     start = real_array("start", start)
-    good = start.shape[-1:] == (3,) and not np.isinf(start).any() and start.ndim <= len(batch) + 1
+    fits = start.shape[-1:] == (3,) and not np.isinf(start).any() and start.ndim <= len(batch) + 1
     try:
-        start = np.broadcast_to(start, (*batch, 3)) if good else None
+        start = np.broadcast_to(start, (*batch, 3)) if fits else None
     except ValueError:
         start = None
     if start is None:
@@ -134,6 +148,8 @@ def _started(start, batch: tuple, length: float) -> np.ndarray:
 
 
 def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.ndarray]:
+    """Return shapes and rates as arrays of one shape (..., joints); ValueError for arguments of another shape or out of
+    bounds."""
     in_range("regularisation", regularisation, 1e-15, 1e3)
     in_range("tolerance", tolerance, 1e-15, 1e3)
     arrays = []
@@ -146,7 +162,11 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
             if not np.isfinite(x).all():
                 raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
             raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
-        if name == "alphadot" and size.min(initial=1.0) < LEAST and size.min(initial=1.0, where=size > 0) < LEAST:
+        if (
+            name == "alphadot"
+            and size.min(initial=1.0) < LEAST_RATE
+            and size.min(initial=1.0, where=size > 0) < LEAST_RATE
+        ):
             raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         arrays.append(x)
     if arrays[0].shape == arrays[1].shape:

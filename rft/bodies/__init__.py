@@ -1,4 +1,4 @@
-"""Bodies, one file each."""
+"""Bodies, one a file."""
 
 from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
 from rft.bodies.base import Body, Elements

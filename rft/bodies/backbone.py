@@ -1,6 +1,6 @@
 """Continuous backbones: many short straight elements whose bends follow from a few shape variables.
 
-Of order 2 in 1/elements: the elements are chords of the curve.
+The elements are chords of the curve; errors are of order 2 in 1/elements.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import Elements, Length, numbered
+from rft.bodies.base import Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
 from rft.checks import Number, check_numbers, require, shown
 
 
 @dataclass(frozen=True)
 class Backbone:
-    """A body of equal elements, bent at every one of the ``elements`` - 1 points between them, as a wave or a measured
-    centreline prescribes.
+    """A body of equal elements whose shape variables are the bends at the ``elements`` - 1 points between them, for
+    waves and measured centrelines.
 
-    frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., those of that element.
+    frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2" ..., centre and heading of that element.
     """
 
     elements: Annotated[int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)] = 100
@@ -42,45 +42,46 @@ class Backbone:
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        """As of `Chain`."""
-        return numbered(self.joints)
+        return numbered_labels(self.joints)
 
     @property
     def bends(self) -> np.ndarray | None:
-        """(elements - 1, joints): the bend at each point for a unit of each shape variable; None where they are the
-        shape variables themselves."""
+        """Bends at the points between elements for a unit of each shape variable, (elements - 1, joints); None where the
+        bends are the shape variables themselves."""
         return None
 
     def motion(self, alpha: np.ndarray, alphadot: np.ndarray) -> Elements:
-        """Elements in the body frame while that is held still; alpha, alphadot: (joints, B)."""
+        """Return the elements at shapes and rates (joints, B), with the body frame held."""
         if self.bends is None:
             return self.chain.motion(alpha, alphadot)
         return self.chain.motion(self.bends @ alpha, self.bends @ alphadot)
 
     def frame_pose(self, frame: str, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """As `Chain.frame_pose`; "link-k" is the k-th element."""
+        """Return the pose of another frame as `Chain.frame_pose` does; "link-k" is the k-th element."""
         if self.bends is None:
             return self.chain.frame_pose(frame, alpha, alphadot)
         return self.chain.frame_pose(frame, np.asarray(alpha) @ self.bends.T, np.asarray(alphadot) @ self.bends.T)
 
     def points(self, alpha, pose=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """Ends of the elements in the world, (..., elements + 1, 2), as `Chain.points`."""
+        """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
         return self.chain.points(alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T, pose)
 
 
 @dataclass(frozen=True)
 class Serpenoid(Backbone):
-    """Two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s), s from 0 at
-    the tail to 1 at the head. A circle in (alpha_1, alpha_2) is a travelling wave: towards the head, run backwards
-    (reverse) towards the tail, which drives the body head first.
+    """A backbone of two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s),
+    s from 0 at the tail to 1 at the head.
+
+    A circle in (alpha_1, alpha_2) is a wave that travels towards the head; the reversed circle is one that travels
+    towards the tail and drives the body head first.
     """
 
     waves: Annotated[float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")] = 1.0
 
     def __post_init__(self):
         super().__post_init__()
-        good = 0 < self.waves <= self.elements / 4
-        require(good, f"waves must be > 0 and at most elements / 4, got {shown(self.waves)}")
+        in_bounds = 0 < self.waves <= self.elements / 4
+        require(in_bounds, f"waves must be > 0 and at most elements / 4, got {shown(self.waves)}")
 
     @property
     def joints(self) -> int:
@@ -98,14 +99,14 @@ class Serpenoid(Backbone):
 
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
-    """Sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
+    """A backbone of sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
 
     sections: Annotated[int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)] = 2
 
     def __post_init__(self):
         super().__post_init__()
-        fits = self.elements % self.sections == 0
-        require(fits, f"sections must divide elements ({self.elements}), got {self.sections!r}")
+        divides = self.elements % self.sections == 0
+        require(divides, f"sections must divide elements ({self.elements}), got {self.sections!r}")
 
     @property
     def joints(self) -> int:
@@ -113,11 +114,11 @@ class ConstantCurvature(Backbone):
 
     @property
     def shape_labels(self) -> tuple[tuple[str, str], ...]:
-        return numbered(self.sections, "bend of section {}")
+        return numbered_labels(self.sections, "bend of section {}")
 
     @cached_property
     def bends(self) -> np.ndarray:
-        # A bend between two elements belongs half to each one's section.
+        # Half of the bend between two elements belongs to the section of either.
         per = self.elements // self.sections
         owner = np.repeat(np.eye(self.sections), per, axis=0)
         return (owner[:-1] + owner[1:]) / (2 * per)

@@ -1,4 +1,4 @@
-"""What a body is: straight elements, and how they move when the shape changes and the frame is held."""
+"""The base of bodies: straight elements, and their motion when the shape changes and the frame is held."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple, Protocol
 import numpy as np
 
 from rft.checks import Number, require, shown
-from rft.laws.base import remembered
+from rft.laws.base import cached_if_immutable
 
 Length = Annotated[
     float, Number(1e-15, 1e15, "m", "length of the body, in the unit wanted for displacement; 1 for body lengths")
@@ -34,35 +34,39 @@ class Elements(NamedTuple):
     v_w: np.ndarray
 
     @classmethod
-    def of(cls, along, place, velocity, turn, half) -> Elements:
-        """Return the elements with complex headings, places and velocities (n, B), turning rates (n, B) and half
-        lengths (n, 1)."""
-        back = along.conj()
-        own, lever = velocity * back, place * back
-        c, s = along.real.copy(), along.imag.copy()
+    def from_complex(cls, heading, centre, velocity, rotation, half) -> Elements:
+        """Return elements from complex numbers (n, B): exp(i theta) of their headings, their centres x + i y and the
+        velocities of the centres. rotation: (n, B), rates of theta. half: (n, 1), half lengths."""
+        back = heading.conj()
+        v, lever = velocity * back, centre * back
+        c, s = heading.real.copy(), heading.imag.copy()
         return cls(
-            c, s, -lever.imag, lever.real.copy(), half, 2.0 * half, own.real.copy(), own.imag.copy(), turn * half
+            c, s, -lever.imag, lever.real.copy(), half, 2.0 * half, v.real.copy(), v.imag.copy(), rotation * half
         )
 
     @property
     def v(self) -> np.ndarray:
-        """Velocities with the frame held, (3, n, B)."""
+        """Velocities (v_t, v_n, v_w) with the frame held, (3, n, B)."""
         return np.stack([self.v_t, self.v_n, self.v_w])
 
     @property
-    def place(self) -> np.ndarray:
-        """Complex places of the centres in the frame, (n, B); the lever (r_t, r_n) is i place conj(heading)."""
+    def centres(self) -> np.ndarray:
+        """Centres in the frame, complex (n, B): r_t + i r_n = i centre conj(heading)."""
         return (self.r_t + 1j * self.r_n) * (self.c + 1j * self.s) / 1j
 
-    def fixed(self, owner: list[int], ahead: np.ndarray, weight: np.ndarray) -> Elements:
-        """Return points fixed to some of the elements, ``ahead`` of their centres, (k, 1); weight: (k, 1)."""
+    def attached_points(self, owner: list[int], ahead: np.ndarray, weight: np.ndarray) -> Elements:
+        """Return k points attached to the elements ``owner``, each a distance ``ahead`` (k, 1) before the centre; weight:
+        (k, 1), factors of their drag."""
         c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[owner] for x in self)
         return Elements(c, s, r_t, r_n + ahead, 0.0 * ahead, weight, v_t, v_n + v_w * ahead / half, 0.0 * v_w)
 
 
 class Body(Protocol):
-    """Any body whose shape is ``joints`` numbers and which is made of straight elements. One that is to be drawn gives
-    ``points`` besides, and ``shape_labels`` where its shape variables are no joint angles: see `rft.Chain`."""
+    """A body of straight elements whose shape is ``joints`` numbers.
+
+    joints: number of shape variables. length: of the body, in the unit wanted for displacement. motion(alpha, alphadot):
+    its `Elements` at shapes and rates (joints, B), with the frame held. A body that is drawn also has ``points``, and
+    ``shape_labels`` if its shape variables are no joint angles: see `rft.Chain`."""
 
     @property
     def length(self) -> float: ...
@@ -74,31 +78,32 @@ class Body(Protocol):
 
 
 def checked_body(body) -> Body:
-    """body, or ValueError if it is nothing of the kind."""
-    good = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
-    require(good, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
+    """Return the body; ValueError unless it has the members of `Body`."""
+    is_body = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
+    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
     return body
 
 
-@remembered
+@cached_if_immutable
 def is_reversible(body: Body) -> bool:
-    """Whether a body with its head taken for its tail is the same one, its frame too: tried at a few shapes. Then the
-    frame is turned by pi, and the joints of -alpha backwards are those of alpha."""
+    """Return whether exchanging head and tail leaves the body and its frame as they are, from a few random shapes.
+
+    The exchange rotates the frame by pi and maps the joints alpha_1 ... alpha_d to -alpha_d ... -alpha_1."""
     rng = np.random.default_rng(0)
     alpha, rates = rng.uniform(-1.5, 1.5, (2, body.joints, 5))
-    one, other = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
-    turned = one._replace(r_t=-one.r_t, r_n=-one.r_n, v_t=-one.v_t, v_n=-one.v_n)
-    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(turned, other))
+    elements, exchanged = body.motion(alpha, rates), body.motion(-alpha[::-1], -rates[::-1])
+    rotated = elements._replace(r_t=-elements.r_t, r_n=-elements.r_n, v_t=-elements.v_t, v_n=-elements.v_n)
+    return all(bool((np.abs(x[::-1] - y) <= 1e-12).all()) for x, y in zip(rotated, exchanged))
 
 
-def numbered(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
-    """(name, unit) of each of so many shape variables, numbered from 1."""
+def numbered_labels(joints: int, name: str = "alpha_{}", unit: str = "rad") -> tuple[tuple[str, str], ...]:
+    """Return (name, unit) of each shape variable, numbered from 1."""
     return tuple((name.format(k + 1), unit) for k in range(joints))
 
 
 @dataclass(frozen=True, eq=False)
-class Wrapped:
-    """Base of bodies that are another body with changed elements."""
+class WrappedBody:
+    """Base of bodies that change the elements of an ``inner`` body."""
 
     inner: Body
 
@@ -115,18 +120,18 @@ class Wrapped:
 
 
 def _joint_angles(body: Body, shape: np.ndarray) -> np.ndarray:
-    """Angles of the joints where the shape variables are modes of them; else the shape variables."""
+    """Return the joint angles of a shape whose variables are modes; else the shape variables themselves."""
     return body.joint_angles(shape) if hasattr(body, "joint_angles") else shape
 
 
-def pace(body: Body, alphadot: np.ndarray) -> np.ndarray:
-    """(B,): the size of rates (joints, B), by which velocities are scaled; of the joints' own where a body has
-    modes."""
+def joint_speed(body: Body, alphadot: np.ndarray) -> np.ndarray:
+    """Return the size (B,) of the joint rates at rates (joints, B) of the shape variables, by which velocities are
+    scaled."""
     rates = _joint_angles(body, alphadot)
     return np.sqrt((rates * rates).sum(0))
 
 
-def halves(body: Body) -> np.ndarray:
-    """(n,): half lengths of a body's elements in body lengths."""
+def half_lengths(body: Body) -> np.ndarray:
+    """Return the half lengths (n,) of a body's elements, in body lengths."""
     zero = np.zeros((body.joints, 1))
     return body.motion(zero, zero).half[:, 0]

@@ -1,6 +1,6 @@
-"""Effects beyond the plain force law, one file each. A scene asks for them; none is evaluated unasked."""
+"""Effects beyond the plain force law, one a file; only those that a scene lists are computed."""
 
-from rft.effects.base import ENGINES, Effect, Site, broken, by_steps, engine, side_by_side
+from rft.effects.base import ENGINES, Effect, Site, batched_effect, broken_premises, engine, stepwise_effects
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -28,8 +28,8 @@ __all__ = [
     "Slope",
     "TowedSled",
     "Transient",
-    "broken",
-    "by_steps",
+    "batched_effect",
+    "broken_premises",
     "engine",
-    "side_by_side",
+    "stepwise_effects",
 ]

@@ -1,4 +1,4 @@
-"""What an effect is: something a scene may ask for beyond the plain force law, and pays for only then."""
+"""The base of effects: additions to the plain force law, computed only where a scene lists them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rft.checks import require, shown
 from rft.contact import Problem
 from rft.premise import NONE, SHAPE_ALONE, Premise
 
+# Engines and what they solve, the cheapest first.
 ENGINES = {
     "algebraic": "the balance of forces at every shape, all shapes at once",
     "time stepping": "the balance of forces step after step through the gait, place and past carried along",
@@ -23,84 +24,93 @@ PAST = Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
 class Site(NamedTuple):
-    """Where and when a step takes place, in body lengths; B samples.
+    """Place and phase of one time step of B samples, in body lengths and rad.
 
-    count: steps before this one. dt: phase since the step before, rad, 0 at the first. pose: (3, B), of the frame on
-    the ground, as foreseen. before: (v_t, v_n, v_w) of the body's elements one step earlier, (n, B) each."""
+    count: number of steps before this one. dt: phase since the previous step, rad, 0 at the first step. pose: (3, B),
+    predicted pose of the frame on the ground. v_before: velocities (v_t, v_n, v_w) of the body's elements at the
+    previous step, (n, B) each."""
 
     count: int
     dt: float
     pose: np.ndarray
-    before: tuple[np.ndarray, np.ndarray, np.ndarray]
+    v_before: tuple[np.ndarray, np.ndarray, np.ndarray]
 
-    def place(self, elements) -> np.ndarray:
-        """Return the complex places (n, B) of elements' centres on the ground."""
+    def centres(self, elements) -> np.ndarray:
+        """Return the centres of elements on the ground as complex numbers x + i y, (n, B)."""
         x, y, theta = self.pose
-        return x + 1j * y + np.exp(1j * theta) * elements.place
+        return x + 1j * y + np.exp(1j * theta) * elements.centres
 
-    def along(self, elements) -> np.ndarray:
-        """Return the complex headings (n, B) of elements on the ground."""
+    def headings(self, elements) -> np.ndarray:
+        """Return the headings of elements on the ground as complex numbers exp(i theta), (n, B)."""
         return np.exp(1j * self.pose[2]) * (elements.c + 1j * elements.s)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Base of all effects: each is one change of a `rft.contact.Problem`, and any two commute. As its parameter goes to
-    ``limit`` the scene without it comes back at ``order``.
+    """Base of all effects; an effect is one change of a `rft.contact.Problem`, and any two effects commute.
 
-    kind: its name in scenes and messages. breaks: the premises it takes away, and with them an engine or a result.
-    adds: whether it adds points to the body, which other effects then change, too. batched: parameters that may be
-    arrays (B,), one for each sample of a batch. settles: change of displacement from cycle to cycle, body lengths,
-    below which cycles with this effect count as periodic. held: numbers that time stepping remembers for each sample,
-    beside some for each element. varies: whether it differs along an element, of which it takes means, so that longer
-    elements are cut into pieces. odd: what it adds or changes turns round with velocities, as far as is known."""
+    Attributes
+    ----------
+    kind : name in scenes and messages.
+    breaks : premises that no longer hold with the effect, and with them an engine or a result.
+    adds_points : whether the effect adds points to the body; other effects then act on these points, too.
+    limit : values of the parameters at which the effect vanishes, as text.
+    order : order at which it vanishes there.
+    cost : work beyond that of the plain force law, as text.
+    batched : names of parameters that may be arrays (B,), one number for each sample of a batch.
+    drift_tolerance : change of displacement from cycle to cycle, body lengths, below which cycles are periodic.
+    memory_size : numbers that time stepping stores for each sample, beside a few for each element.
+    varies_along : whether the effect varies along an element; it then acts by its mean over each piece of an element.
+    odd : whether the loads that it adds change sign with all velocities (assumed, not proven).
+    """
 
     kind = "effect"
     breaks = NONE
-    adds = False
+    adds_points = False
     limit = ""
     order = 1
     cost = ""
     batched = ()
-    settles = 1e-6
-    held = 0
-    varies = odd = False
+    drift_tolerance = 1e-6
+    memory_size = 0
+    varies_along = odd = False
 
     def check(self, medium) -> None:
         """Raise ValueError for a medium that the effect does not take."""
 
-    def apply(self, problem: Problem, site: Site | None, past: Any) -> Problem:
-        """Return the problem with this effect. site and past are given where it breaks a premise of
+    def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
+        """Return the problem with this effect; site and state are None unless the effect breaks a premise of
         `rft.premise.SHAPE_ALONE`."""
         raise NotImplementedError
 
     def begin(self, problem: Problem, site: Site) -> Any:
-        """Return what is remembered before the first step: a record of arrays with the samples on the last axis."""
+        """Return the state of the effect before the first step: a record of arrays, samples on the last axis."""
         return ()
 
-    def after(self, problem: Problem, site: Site, past: Any, v: tuple) -> Any:
-        """Return what is remembered after a step that ended with velocities (v_t, v_n, v_w) of the body's elements."""
-        return past
+    def after(self, problem: Problem, site: Site, state: Any, v: tuple) -> Any:
+        """Return the state after a step that ended with velocities v = (v_t, v_n, v_w) of the body's elements."""
+        return state
 
-    def kicked(self, problem: Problem, site: Site, past: Any, change: np.ndarray, drag: np.ndarray) -> Any:
-        """Return what is remembered as if the body had moved faster by ``change`` (3, B) at the last steps, of which
-        the one at ``site`` was the last, with ``drag`` (3, B) more, over the unit of force; the ground does not
-        notice."""
-        return past
+    def with_velocity_change(
+        self, problem: Problem, site: Site, state: Any, change: np.ndarray, drag: np.ndarray
+    ) -> Any:
+        """Return the state as if the body had moved faster by ``change`` (3, B) up to and including the step at
+        ``site``, with an additional ``drag`` (3, B) over the axial drag; the state of the ground stays as it is."""
+        return state
 
     def assumes(self, medium) -> str:
-        """Return what the effect takes for granted because neither it nor the medium says; nothing by default."""
+        """Return, as text, what is assumed because neither the effect nor the medium gives it; "" for nothing."""
         return ""
 
     def take(self, index) -> Self:
-        """Return the effect with its parameters for the samples ``index``; itself where none differs from sample to
-        sample."""
-        differs = lambda x: isinstance(x, np.ndarray) and x.ndim > 0 and x.shape[-1] != 1
-        return self.having(**{f.name: x[..., index] for f in fields(self) if differs(x := getattr(self, f.name))})
+        """Return the effect with its parameters at the samples ``index``."""
+        arrays = {f.name: x for f in fields(self) if isinstance(x := getattr(self, f.name), np.ndarray)}
+        return self.with_parameters(
+            **{name: x[..., index] for name, x in arrays.items() if x.ndim > 0 and x.shape[-1] != 1}
+        )
 
-    def having(self, **values) -> Self:
-        """Return the effect with some parameters set, to arrays for one; checks, which are for single numbers, are not
-        repeated."""
+    def with_parameters(self, **values) -> Self:
+        """Return the effect with other parameters, which may be arrays (B,); nothing is checked."""
         if not values:
             return self
         new = object.__new__(type(self))
@@ -108,14 +118,15 @@ class Effect:
         return new
 
 
-def by_steps(effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects that depend on the past or on the place on the ground, which act step by step."""
+def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:
+    """Return the effects that depend on the past or on the place on the ground, and so take time stepping."""
     return [e for e in effects if e.breaks & SHAPE_ALONE]
 
 
-def side_by_side(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
-    """One effect with the parameters of several of its kind, each for ``count`` samples of a batch. ValueError if they
-    differ in a parameter that cannot differ within a batch."""
+def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
+    """Return one effect for a batch, made from effects of one kind, each of them for ``count`` samples in a row.
+
+    Raises ValueError if they differ in a parameter that is not `Effect.batched`."""
     first = effects[0]
     joined = {}
     for field in fields(first):
@@ -124,19 +135,19 @@ def side_by_side(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
             if field.name not in first.batched:
                 raise ValueError(f"{first.kind}: {field.name} cannot differ within a batch")
             joined[field.name] = np.repeat(np.array(values, float), counts)
-    return first.having(**joined)
+    return first.with_parameters(**joined)
 
 
-def broken(effects: Sequence[Effect]) -> Premise:
-    """All that the effects break; ValueError for what is no effect."""
-    good = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
-    require(good, f"effects must be a list of effects such as EndCaps(radius=0.06), got {shown(effects)}")
+def broken_premises(effects: Sequence[Effect]) -> Premise:
+    """Return the premises that the effects break; ValueError unless all are effects."""
+    is_list = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
+    require(is_list, f"effects must be a list of effects such as EndCaps(radius=0.06), got {shown(effects)}")
     return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 
 def engine(effects: Sequence[Effect]) -> str:
-    """The cheapest of ENGINES that is right with these effects."""
-    lost = broken(effects)
-    if lost & Premise.QUASI_STATIC:
+    """Return the cheapest of ENGINES that is right with these effects."""
+    broken = broken_premises(effects)
+    if broken & Premise.QUASI_STATIC:
         return "dynamic"
-    return "time stepping" if lost & SHAPE_ALONE else "algebraic"
+    return "time stepping" if broken & SHAPE_ALONE else "algebraic"

@@ -7,20 +7,20 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from rft.balance.newton import carried
+from rft.balance.newton import to_element
 from rft.checks import Number, check_numbers, require
 from rft.contact import Problem
 from rft.effects.base import Effect, Site
-from rft.momentum import Momenta, from_frame, momenta, over_ground
+from rft.momentum import MomentumRate, element_momenta, frame_to_ground, ground_to_frame
 from rft.premise import Premise
 
 
 @dataclass(frozen=True)
 class BodyInertia(Effect):
-    """A body of uniform mass along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
+    """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
 
-    The drag in a viscous medium is the one at one body length per radian of phase. Only mass x length x (2 pi
-    frequency)^2 / drag matters."""
+    Only mass x length x (2 pi frequency)^2 / drag matters. In a viscous medium the drag is that at one body length per
+    radian of phase."""
 
     mass: Annotated[float, Number(0, 1e9, "kg", "mass of the body")]
     frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]
@@ -41,29 +41,30 @@ class BodyInertia(Effect):
 
     @property
     def inertia(self) -> Any:
-        """mass x length x (2 pi frequency)^2 / drag, no unit."""
+        """Ratio of inertia to drag, mass x length x (2 pi frequency)^2 / drag, without a unit."""
         return self.mass * self.length * (2 * np.pi * self.frequency) ** 2 / self.drag
 
     def begin(self, problem: Problem, site: Site) -> np.ndarray:
-        """Return the momenta (2, 3, n, B) of the elements over the ground at the last two steps, the older one
-        first."""
+        """Return the momenta (2, 3, n, B) of the elements on the ground at the last two steps, the older one first."""
         return np.zeros((2, 3, *problem.sides.elements.c.shape))
 
-    def apply(self, problem: Problem, site: Site, past: np.ndarray) -> Problem:
-        older, last = past
+    def apply(self, problem: Problem, site: Site, state: np.ndarray) -> Problem:
+        older, last = state
         first_order = site.count == 1
         rate = (1.0 if first_order else 1.5) / site.dt
-        gone = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
-        strength = np.atleast_2d(self.inertia * problem.unit)
-        return problem._replace(momenta=Momenta(np.full((1, 1), rate), *from_frame(site.pose, gone), strength))
+        past = last / site.dt if first_order else (2 * last - 0.5 * older) / site.dt
+        strength = np.atleast_2d(self.inertia * problem.axial_drag)
+        return problem._replace(
+            momentum_rate=MomentumRate(np.full((1, 1), rate), *ground_to_frame(site.pose, past), strength)
+        )
 
-    def after(self, problem: Problem, site: Site, past: np.ndarray, v) -> np.ndarray:
-        return np.stack([past[1], over_ground(site.pose, momenta(problem.sides.elements, v))])
+    def after(self, problem: Problem, site: Site, state: np.ndarray, v) -> np.ndarray:
+        return np.stack([state[1], frame_to_ground(site.pose, element_momenta(problem.sides.elements, v))])
 
-    def kicked(self, problem: Problem, site: Site, past: np.ndarray, change, drag) -> np.ndarray:
-        # The body has coasted with this change of velocity, which the drag has lessened since the step before.
+    def with_velocity_change(self, problem: Problem, site: Site, state: np.ndarray, change, drag) -> np.ndarray:
+        # Drag reduced the change of momentum during the last step, so that it was larger one step earlier.
         e = problem.sides.elements
-        now = momenta(e, carried(e, *change))
-        lost = site.dt / (self.inertia + site.dt) * drag  # over inertia, where that is much
-        before = now + e.half / e.half.sum(0) * lost[:, None]
-        return past + np.stack([over_ground(site.pose, before), over_ground(site.pose, now)])
+        last = element_momenta(e, to_element(e, *change))
+        loss = site.dt / (self.inertia + site.dt) * drag
+        older = last + e.half / e.half.sum(0) * loss[:, None]
+        return state + np.stack([frame_to_ground(site.pose, older), frame_to_ground(site.pose, last)])

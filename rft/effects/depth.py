@@ -1,4 +1,4 @@
-"""Depth below the surface other than the reference one: drag grows in proportion to it (paper Eq. 2)."""
+"""Depth below the surface: drag grows in proportion to it (paper Eq. 2)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,11 @@ from rft.premise import NONE, Premise
 
 @dataclass(frozen=True)
 class DepthProfile(Effect):
-    """Drag times |z| over the depth that the medium's drag is for: 2 k rho g r |z| of Eq. 2, its other factors the
-    same.
+    """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the reference depth of the medium's drag.
 
     along (-): |z| over that depth at equally spaced places from tail to head, linear between them; [1, 1] is level.
 
-    A piece of body counts as its centre. With a slope, place and heading matter.
+    Each piece of the body has the depth of its centre. With a slope, drag depends on place and heading.
     """
 
     along: tuple[float, ...] = (1.0, 1.0)
@@ -34,14 +33,13 @@ class DepthProfile(Effect):
     limit = "along all 1 and slope = 0"
     cost = "one multiplication an element; with a slope, a step at a time in place of all phases at once"
     batched = ("slope", "towards")
-    angles = ("towards",)
-    varies = True
+    varies_along = True
 
     def __post_init__(self):
         along = real_array("along", self.along)
-        good = along.ndim == 1 and along.size >= 2 and ((along > 0) & (along <= 1000)).all()
         require(
-            good, f"along must be two depths or more, over the reference depth, > 0 to 1000, got {shown(self.along)}"
+            along.ndim == 1 and along.size >= 2 and bool(((along > 0) & (along <= 1000)).all()),
+            f"along must be two depths or more, over the reference depth, > 0 to 1000, got {shown(self.along)}",
         )
         object.__setattr__(self, "along", tuple(along.tolist()))
         check_numbers(self)
@@ -50,19 +48,20 @@ class DepthProfile(Effect):
     def breaks(self) -> Premise:
         return Premise.SE2_SYMMETRIC if np.any(self.slope) else NONE
 
-    def apply(self, problem: Problem, site: Site | None, past=None) -> Problem:
-        def buried(contact):
+    def apply(self, problem: Problem, site: Site | None, state=None) -> Problem:
+        def with_depths(contact):
             depth = np.where(contact.buried > 0, self.depths(contact, site), 1.0)
-            return contact.multiplied(depth, depth, depth)
+            return contact.with_factors(depth, depth, depth)
 
-        return problem._replace(sides=buried(problem.sides), points=buried(problem.points))
+        return problem._replace(sides=with_depths(problem.sides), points=with_depths(problem.points))
 
     def depths(self, contact: Contact, site: Site | None) -> np.ndarray:
-        """Return the depths of a contact's elements over the reference one, (n, 1), with a slope (n, B)."""
+        """Return the depths of a contact's elements over the reference depth, (n, 1), or (n, B) with a slope; ValueError
+        where a buried element comes to the surface."""
         level = np.interp(contact.station, np.linspace(0, 1, len(self.along)), self.along)
         if not self.breaks:
             return level
-        depth = level + self.slope * (site.place(contact.elements) * np.exp(-1j * self.towards)).real
+        depth = level + self.slope * (site.centres(contact.elements) * np.exp(-1j * self.towards)).real
         if not (depth > 0).all(where=contact.buried > 0):
             raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
         return depth

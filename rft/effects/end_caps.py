@@ -1,4 +1,4 @@
-"""Drag on the ends of the body: the head above all, which pushes grains out of its way."""
+"""Drag on the ends of the body, head and tail."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
 from rft.effects.base import Effect
 from rft.laws.granular import Granular
-from rft.link import point
+from rft.link import dry_point
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class EndCaps(Effect):
     tail: Annotated[float, Number(0, 100, "-", "factor e of the tail: 0 none, 1 flat, 4 hemisphere")] = 1.0
 
     kind = "end-caps"
-    adds = odd = True
+    adds_points = odd = True
     limit = "radius = 0"
     cost = "one point load an end"
 
@@ -38,22 +38,22 @@ class EndCaps(Effect):
     def check(self, medium) -> None:
         require(isinstance(medium, Granular), f"end caps take a granular medium, got {type(medium).__name__}")
 
-    def apply(self, problem: Problem, site=None, past=None) -> Problem:
+    def apply(self, problem: Problem, site=None, state=None) -> Problem:
         e = problem.sides.elements
         # In units of the whole body's axial drag 2 r C_F L: e pi r^2 C_F / (2 r C_F L) = e pi (r / L) / 2.
         weight = math.pi * self.radius / 2 * np.array([[self.tail], [self.head]])
-        ends = e.fixed([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
+        ends = e.attached_points([0, -1], e.half[[0, -1]] * [[-1.0], [1.0]], weight)
         return problem.with_points(Contact(ends, np.array([[0.0], [1.0]]), np.ones((2, 1))), cap_terms(problem.medium))
 
     def traction(self, medium: Granular, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (along, across) force of both ends together at velocity (v_t, v_n), in units of the body's axial
+        """Return the force (along, across) of both ends together at velocities (v_t, v_n), in units of the body's axial
         drag."""
-        load = point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))
+        load = dry_point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * load.t, factor * load.n
 
 
 def cap_terms(medium: Granular) -> list[tuple[float, float, float]]:
-    """Return the dry terms of a cap, which face along the body: f_t = C (v.t) / sqrt(tan^2 gamma0 + (v.t)^2), f_n =
-    v.n."""
+    """Return the dry terms (q, k_t, k_n) of a flat end, whose normal is the body's axis: f_t = C (v.t) / sqrt(tan^2 gamma0
+    + (v.t)^2), f_n = v.n."""
     return [(1.0, 1.0, 0.0), (math.sin(medium.gamma0), 0.0, medium.C * math.cos(medium.gamma0))]

@@ -1,4 +1,4 @@
-"""Inertia of the grains that a fast body pushes aside: the drag grows with the square of the speed across it."""
+"""Inertia of the grains that a fast body accelerates: drag that grows with the square of the speed across the body."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from rft.laws.base import is_linear
 from rft.laws.catalogue import GRAVITY
 from rft.premise import Premise
 
-ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed of grains of unknown k
+ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k is unknown
 
 
 @dataclass(frozen=True)
 class GrainInertia(Effect):
-    """A normal force strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
+    """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
 
-    At high speed the inertia of grains counts; the form is the momentum flux of grains swept up, as in impact laws.
+    The form is the momentum flux of grains that the body sweeps up, as in impact laws. In units of the axial drag 2 k
+    rho g r |z| the force is strength v_n^2 / (k g |z|), without radius or density. Dry media only.
 
-    In units of the axial drag 2 k rho g r |z| it is strength v_n^2 / (k g |z|), without radius or density. Dry media
-    only.
-
-    Where neither the medium nor ``k`` gives the factor of Eq. 2 (2.5 for loose glass, 5.1 for close), that of loose
-    glass is assumed."""
+    Where neither the medium nor ``k`` gives k of Eq. 2 (2.5 for loose glass, 5.1 for close), that of loose glass is
+    assumed."""
 
     frequency: Annotated[float, Number(0, 1e4, "1/s", "cycles per second, alphadot being per radian of phase")]
     length: Annotated[float, Number(1e-9, 1e6, "m", "length of the body")]
@@ -55,9 +53,9 @@ class GrainInertia(Effect):
     def check(self, medium) -> None:
         require(not is_linear(medium), f"grain inertia takes a medium of grains, got {type(medium).__name__}")
 
-    def apply(self, problem: Problem, site=None, past=None) -> Problem:
+    def apply(self, problem: Problem, site=None, state=None) -> Problem:
         speed_per_rad = 2 * np.pi * self.frequency * self.length
         k = self._known_k(problem.medium)
         strength = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
-        # Of the grains, which does not know the ground's pressure: no factor multiplies it.
-        return problem._replace(square=problem.square + np.atleast_2d(strength))
+        # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
+        return problem._replace(quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength))

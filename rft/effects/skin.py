@@ -1,4 +1,4 @@
-"""Skin friction other than that of the rod whose drag was measured: it scales the drag along the body."""
+"""Skin friction: it scales the drag along the body."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class SkinFriction(Effect):
     """Axial drag times forward / reference where an element slides towards its head, backward / reference where it
     slides towards its tail.
 
-    The defaults are the shovel-nosed snake's against 0.3 mm glass, 0.109 forward and 0.137 backward (from the
-    literature on the snake), and about 0.15 for the rod whose drag gave Eqs. 2 and 3 (paper, caption of Fig. 5). The
-    literature on the snake has 0.2, for aluminium: take that with a law that was measured with such a rod. That
-    friction scales the axial drag in proportion is assumed."""
+    The defaults are the coefficients of the shovel-nosed snake on 0.3 mm glass, 0.109 forward and 0.137 backward (from
+    the literature on the snake), and about 0.15 for the rod whose drag gave Eqs. 2 and 3 (paper, caption of Fig. 5). For
+    a law measured with an aluminium rod the reference is 0.2 (literature on the snake). Axial drag in proportion to
+    friction is assumed."""
 
     forward: Annotated[float, Number(1e-3, 100, "-", "coefficient of friction with the grains towards the head")] = (
         0.109
@@ -38,6 +38,6 @@ class SkinFriction(Effect):
     def __post_init__(self):
         check_numbers(self)
 
-    def apply(self, problem: Problem, site=None, past=None) -> Problem:
+    def apply(self, problem: Problem, site=None, state=None) -> Problem:
         factors = self.forward / self.reference, self.backward / self.reference, 1.0
-        return problem._replace(sides=problem.sides.multiplied(*factors))
+        return problem._replace(sides=problem.sides.with_factors(*factors))

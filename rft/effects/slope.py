@@ -1,4 +1,4 @@
-"""A ground that slopes: it is weaker for what moves downhill, and the body's weight pulls along it (paper Sec. IV B)."""
+"""Sloping ground: drag is weaker on downhill motion, and the body's weight pulls downhill (paper Sec. IV B)."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from rft.premise import Premise
 class Slope(Effect):
     """A plane surface that rises by an angle, and a body that moves along it at a fixed depth.
 
-    The drag is times cos(angle) - d sin(angle) / tan(repose), where d is the downhill part of the unit velocity of an
-    element's centre, 0 across and uphill. The default of repose, 37.9 degrees, is the one with which motion straight
-    downhill at 20 degrees has half the drag of level ground, as measured (paper Sec. IV B). One direction at one angle
-    has been measured: that the drag falls in proportion to d, that nothing is gained uphill, and that forces along and
-    across an element weaken alike, is assumed. Weight adds the force weight sin(angle) downhill."""
+    The drag is multiplied by cos(angle) - d sin(angle) / tan(repose), where d is the downhill part of the unit velocity
+    of an element's centre, 0 across and uphill. With the default of repose, 37.9 degrees, motion straight downhill at 20
+    degrees has half the drag of level ground, as measured (paper Sec. IV B). Only one direction at one angle has been
+    measured; assumed are a drag that falls in proportion to d, no gain uphill, and the same factor along and across an
+    element. Weight adds the force weight sin(angle) downhill."""
 
     angle: Annotated[float, Number(0, math.pi / 2, "rad", "angle by which the surface rises")]
     towards: Annotated[
@@ -43,15 +43,14 @@ class Slope(Effect):
     limit = "angle = 0"
     cost = "two dozen operations an element; a step at a time in place of all phases at once"
     batched = ("angle", "towards", "repose", "weight")
-    angles = ("angle", "towards", "repose")
-    varies = True
+    varies_along = True
 
     def __post_init__(self):
         check_numbers(self)
-        steep, most = math.degrees(self.angle), math.degrees(self.repose)
+        angle, repose = math.degrees(self.angle), math.degrees(self.repose)
         require(
             self.angle < self.repose,
-            f"a slope of {steep:.3g} degrees slides by itself: it must be below the angle of repose, {most:.3g} degrees",
+            f"a slope of {angle:.3g} degrees slides by itself: it must be below the angle of repose, {repose:.3g} degrees",
         )
         pull, drag = self.weight * math.sin(self.angle), math.sin(self.repose - self.angle) / math.sin(self.repose)
         require(
@@ -64,16 +63,17 @@ class Slope(Effect):
         require(not is_linear(medium), f"a slope takes a medium of grains, got {type(medium).__name__}")
 
     def assumes(self, medium) -> str:
-        told = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
-        return f"{told if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
+        repose = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
+        return f"{repose if np.all(self.repose == REPOSE) else ''}that only what moves downhill meets weaker ground"
 
-    def apply(self, problem: Problem, site: Site, past=None) -> Problem:
-        level, fall = np.cos(self.angle), np.sin(self.angle)
-        weight = self.weight * fall * problem.unit
+    def apply(self, problem: Problem, site: Site, state=None) -> Problem:
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
 
         def inclined(contact, weight):
-            down = -np.exp(1j * np.asarray(self.towards)) * np.conj(site.along(contact.elements))
-            rows = map(np.atleast_2d, (level, fall / np.tan(self.repose), weight))
-            return contact._replace(incline=Incline(down.real, down.imag, *rows))
+            downhill = -np.exp(1j * np.asarray(self.towards)) * np.conj(site.headings(contact.elements))
+            rows = map(np.atleast_2d, (cos, sin / np.tan(self.repose), weight))
+            return contact._replace(incline=Incline(downhill.real, downhill.imag, *rows))
+
+        weight = self.weight * sin * problem.axial_drag
 
         return problem._replace(sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0))

@@ -1,4 +1,4 @@
-"""A sled towed by the tail: friction of its own, on a point behind the last link."""
+"""A sled towed by the tail: friction at a point behind the last link."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
 from rft.effects.base import Effect
-from rft.laws.base import power_of
+from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
 
 
 @dataclass(frozen=True)
 class TowedSled(Effect):
-    """Coulomb friction, alike in all directions, at the end of a stiff bar that goes on from the tail in its direction.
+    """Isotropic Coulomb friction at the end of a stiff bar that continues the tail link.
 
-    It lies on the surface, so that the body's depth does not matter to it. Dry media only,
-    for beside drag that grows with speed friction would depend on the unit of time.
+    The sled lies on the surface, so that its friction does not depend on the body's depth. Dry media only: beside drag
+    that grows with speed, friction would depend on the unit of time.
     """
 
     pull: Annotated[float, Number(0, 1000, "-", "friction of the sled over the drag on the straight body along itself")]
     distance: Annotated[float, Number(0, 10, "body lengths", "distance of the sled behind the tail")] = 0.0
 
     kind = "towed-sled"
-    adds = odd = True
+    adds_points = odd = True
     limit = "pull = 0"
     cost = "one point load"
     batched = ("pull",)
@@ -36,10 +36,12 @@ class TowedSled(Effect):
 
     def check(self, medium) -> None:
         name = type(medium).__name__
-        require(power_of(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}")
+        require(
+            speed_exponent(medium) == 0, f"a towed sled takes a medium without viscous drag, dry as itself, got {name}"
+        )
 
-    def apply(self, problem: Problem, site=None, past=None) -> Problem:
+    def apply(self, problem: Problem, site=None, state=None) -> Problem:
         e = problem.sides.elements
-        behind = e.fixed([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
-        sled = Contact(behind, np.zeros((1, 1)), np.zeros((1, 1))).multiplied(self.pull, self.pull, self.pull)
+        point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
+        sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(self.pull, self.pull, self.pull)
         return problem.with_points(sled, Coulomb().dry)

@@ -1,4 +1,4 @@
-"""Air that rises through the grains: they bear less, up to where they are fluidised and bear nothing."""
+"""Air that rises through the grains weakens them; where it fluidises them they bear nothing."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rft.ground.base import Ground, GroundEffect
 
 @dataclass(frozen=True)
 class Aeration(GroundEffect):
-    """Strength times 1 - air_speed / fluidisation; the stress map keeps its shape.
+    """The strength is 1 - air_speed / fluidisation times that of still ground; the stress map keeps its shape.
 
-    An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength that falls
-    linearly with air speed is a finding about alpha_z(0, 90 degrees); that it holds for all angles alike, and that it
-    falls to nothing, is assumed.
+    An air speed of fluidisation, or more, is refused: no resistive force theory is known there. Strength falls
+    linearly with air speed by measurements of alpha_z(0, 90 degrees). The same fall at all angles, down to nothing, is
+    assumed.
     """
 
     air_speed: Annotated[float, Number(0, 1e3, "m/s", "upward speed of the air over the bed's whole cross section")]
@@ -28,8 +28,8 @@ class Aeration(GroundEffect):
 
     def __post_init__(self):
         check_numbers(self)
-        told = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on, and no longer "
-        require(self.air_speed < self.fluidisation, f"{told}bears as this law says; give less")
+        message = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on"
+        require(self.air_speed < self.fluidisation, f"{message}, and no longer bears as this law says; give less")
 
     def apply(self, ground: Ground) -> Ground:
         return ground._replace(strength=ground.strength * (1.0 - self.air_speed / self.fluidisation))

@@ -1,4 +1,4 @@
-"""Ground that something went through before: weaker near there."""
+"""Ground that earlier intrusions disturbed is weaker near their places."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ MOST_PLACES = 1000
 
 @dataclass(frozen=True)
 class DisturbedGround(GroundEffect):
-    """Strength times 1 - weakening x disturbance, at all depths; disturbance is 1 up to half a ``radius`` along the
-    ground from any of the ``places`` of earlier intrusions, and falls linearly to 0 at one and a half.
+    """The strength is 1 - weakening x disturbance times that of fresh ground, at all depths. Disturbance is 1 up to half
+    a ``radius`` along the ground from any of the ``places``, and falls linearly to 0 at one and a half.
 
     places (m): x of earlier intrusions.
 
-    That grains bear less where something went before is by experiment (paper Sec. IV B); the form and every number are
-    assumed, as is that disturbances do not add up or heal. The motion itself does not disturb: places are given.
+    Disturbed grains bear less by experiment (paper Sec. IV B). The form and every number are assumed; so is that
+    disturbances neither add up nor heal. The motion itself disturbs nothing: places are given.
     """
 
     places: tuple[float, ...]
@@ -36,8 +36,8 @@ class DisturbedGround(GroundEffect):
 
     def __post_init__(self):
         places = real_array("places", self.places)
-        good = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
-        require(good, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {shown(self.places)}")
+        valid = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
+        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {shown(self.places)}")
         object.__setattr__(self, "places", tuple(places.tolist()))
         check_numbers(self)
 

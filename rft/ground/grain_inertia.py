@@ -1,4 +1,4 @@
-"""Inertia of the grains that a fast body pushes aside: a pressure on what leads, with the square of its speed."""
+"""Inertia of the grains that a fast body pushes away: a pressure on leading faces that grows as their speed squared."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ POPPY_SEEDS = 638.0  # kg/m^3, loosely packed; Agarwal et al. (2021)
 
 @dataclass(frozen=True)
 class GrainInertia(GroundEffect):
-    """A stress strength x density x v_n^2 against the normal of faces that lead with v_n across themselves, at any depth:
-    the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
+    """A stress of strength x density x v_n^2 against the normal of leading faces, at any depth, where v_n is the speed of
+    a face along its normal: the momentum of grains that are swept up (Agarwal et al. 2021; paper Sec. IV C).
 
-    The other half of that work, a surface that sinks behind a fast body, is left out.
+    The paper's other finding, a surface that sinks behind a fast body, is not modelled.
     """
 
     strength: Annotated[float, Number(0, 1e6, "-", "lambda, 1 to 4 by grains and body; 1 is assumed")] = 1.0
@@ -39,6 +39,9 @@ class GrainInertia(GroundEffect):
 
     @property
     def assumes(self) -> str:
-        numbers = {"strength": self.strength == 1.0, "density": self.density == POPPY_SEEDS}
-        told = {"strength": "lambda = 1 (1 to 4 are known)", "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds"}
-        return ", ".join(told[name] for name, default in numbers.items() if default)
+        defaults = {"strength": self.strength == 1.0, "density": self.density == POPPY_SEEDS}
+        descriptions = {
+            "strength": "lambda = 1 (1 to 4 are known)",
+            "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds",
+        }
+        return ", ".join(descriptions[name] for name, is_default in defaults.items() if is_default)

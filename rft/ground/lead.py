@@ -1,8 +1,8 @@
-"""How much of its stress a face bears that leads, slides along itself or trails: 1 to 0.
+"""The lead of a face: the share of its stress that it bears, from 1 where it leads to 0 where it trails.
 
-The law of stress jumps where a face begins to lead. ``into`` is the part of a face's velocity along its outward normal
-over its speed, ``sine`` that of the grazing angle, over which the stress rises from none to its own. All functions are
-formulas (`rft.vectors`)."""
+The law of stress jumps where a face begins to lead. ``n_dot_v`` is n . v, with n the outward unit normal of the face and
+v its unit velocity. ``grazing_sine`` is the sine of the grazing angle, over which the lead rises from 0 to 1. All
+functions are formulas (`rft.vectors`)."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from rft.vectors import absolute, formula, maximum, minimum, sqrt, where
 
 
 @formula
-def jump(into):
-    """Return all of the stress on a face that leads, or slides along itself, none on one that trails."""
-    return where(into >= 0.0, 1.0, 0.0)
+def jump(n_dot_v):
+    """Return 1 where a face leads or slides along itself, and 0 where it trails."""
+    return where(n_dot_v >= 0.0, 1.0, 0.0)
 
 
 @formula
-def smoothstep(into, sine):
-    """Return s^2 (3 - 2 s), s = into / sine from 0 to 1."""
-    share = minimum(maximum(into / sine, 0.0), 1.0)
+def smoothstep(n_dot_v, grazing_sine):
+    """Return s^2 (3 - 2 s) with s = n_dot_v / grazing_sine, held between 0 and 1."""
+    share = minimum(maximum(n_dot_v / grazing_sine, 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
 @formula
-def rounded(into, sine):
-    """Return into / sqrt(into^2 + sine^2)."""
-    return maximum(into, 0.0) / maximum(sqrt(into * into + sine * sine), TINY)
+def rounded(n_dot_v, grazing_sine):
+    """Return n_dot_v / sqrt(n_dot_v^2 + grazing_sine^2), and 0 where a face trails."""
+    return maximum(n_dot_v, 0.0) / maximum(sqrt(n_dot_v * n_dot_v + grazing_sine * grazing_sine), TINY)
 
 
 @formula
-def mean_ramp(first, last, sine):
-    """Return the mean of min(into / sine, 1) over a part along which ``into`` goes evenly from ``first`` to ``last``,
-    both at least 0."""
-    per = 1.0 / sine
-    a, b = maximum(first * per, 0.0), maximum(last * per, 0.0)
+def mean_ramp(first, last, grazing_sine):
+    """Return the mean of min(n_dot_v / grazing_sine, 1) over a part of a face along which n_dot_v changes linearly from
+    ``first`` to ``last``, both at least 0."""
+    scale = 1.0 / grazing_sine
+    a, b = maximum(first * scale, 0.0), maximum(last * scale, 0.0)
     below_a, below_b = where(a < 1.0, 0.5 * a * a, a - 0.5), where(b < 1.0, 0.5 * b * b, b - 0.5)
     step = b - a
-    flat = absolute(step) < 1e-6
-    return where(flat, minimum(0.5 * (a + b), 1.0), (below_b - below_a) / where(flat, 1.0, step))
+    constant = absolute(step) < 1e-6
+    return where(constant, minimum(0.5 * (a + b), 1.0), (below_b - below_a) / where(constant, 1.0, step))

@@ -1,4 +1,4 @@
-"""A surface that slopes: gravity pulls the body along it, and weakens the ground for what moves downhill."""
+"""A surface that slopes: gravity pulls the body along it, and the ground is weaker for faces that move downhill."""
 
 from __future__ import annotations
 
@@ -15,16 +15,17 @@ from rft.laws.catalogue import GRAVITY, REPOSE
 class Slope(GroundEffect):
     """The surface rises towards +x; x runs along it, z away from it, depth along z.
 
-    The default of repose, 37.9 degrees, is the one with which a plate that moves straight downhill at 20 degrees has half
-    its drag on level ground, as measured (paper Sec. IV B); 30 degrees, as of many heaps, would leave it a third. Gravity
-    adds the force -mass g sin(angle) along the slope at the body's origin; the power is that of the grains alone.
+    The default repose, 37.9 degrees, gives a plate that moves straight downhill at 20 degrees half its drag on level
+    ground, as measured (paper Sec. IV B); 30 degrees, as of many heaps, would give a third. Gravity adds the force
+    -mass g sin(angle) along the slope at the body's origin; the power is that of the grains alone.
 
-    Strength times cos(angle) - d sin|angle| / tan(repose), where d, 0 to 1, is the downhill part of the unit velocity of the
-    face, 0 of one that moves straight in, across or uphill. Straight downhill that is sin(repose - |angle|) / sin(repose):
-    grains |z| deep can take a shear of rho g |z| cos(angle) tan(repose), and their own weight along the slope takes
-    rho g |z| sin|angle| of it. One direction at one angle has been measured: that strength falls in proportion to d, that
-    nothing is gained uphill, and that forces along and across a face weaken alike, is assumed. Liao and Qian
-    (arXiv:2603.06928, 2026) find the resistance to penetration nearly unchanged by a slope and that to shear much less.
+    The strength is cos(angle) - d sin|angle| / tan(repose) times that of level ground. Here d, 0 to 1, is the downhill
+    component of the face's unit velocity, 0 for a face that moves straight in, across or uphill. Straight downhill the
+    factor is sin(repose - |angle|) / sin(repose): grains |z| deep can take a shear of rho g |z| cos(angle) tan(repose),
+    of which their own weight along the slope takes rho g |z| sin|angle|. One direction at one angle has been measured.
+    Assumed are a strength that falls in proportion to d, no gain uphill, and one factor for forces along and across a
+    face. Liao and Qian (arXiv:2603.06928, 2026) find the resistance to penetration nearly unchanged by a slope and that
+    to shear much less.
     """
 
     angle: Annotated[
@@ -38,24 +39,21 @@ class Slope(GroundEffect):
     kind = "slope"
     limit = "angle = 0"
     cost = "one multiplication an element"
-    angles = ("angle", "repose")
 
     def __post_init__(self):
         check_numbers(self)
-        steep, most = math.degrees(self.angle), math.degrees(self.repose)
-        told = (
-            f"a slope of {steep:.3g} degrees slides by itself: it must be below the angle of repose, {most:.3g} degrees"
-        )
-        require(abs(self.angle) < self.repose, told)
+        angle, repose = math.degrees(self.angle), math.degrees(self.repose)
+        message = f"a slope of {angle:.3g} degrees slides by itself: it must be below the angle of repose, {repose:.3g} degrees"
+        require(abs(self.angle) < self.repose, message)
 
     def apply(self, ground: Ground) -> Ground:
-        fall = -math.tan(self.angle) / math.tan(self.repose)
-        return ground._replace(strength=ground.strength * math.cos(self.angle), fall=fall)
+        loss = -math.tan(self.angle) / math.tan(self.repose)
+        return ground._replace(strength=ground.strength * math.cos(self.angle), downhill_loss=loss)
 
     def weight(self) -> tuple[float, float]:
         return -self.mass * GRAVITY * math.sin(self.angle), 0.0
 
     @property
     def assumes(self) -> str:
-        told = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
-        return f"{told if self.repose == REPOSE else ''}that only what moves downhill meets weaker ground"
+        default = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
+        return f"{default if self.repose == REPOSE else ''}that only what moves downhill meets weaker ground"

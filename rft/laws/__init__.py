@@ -1,6 +1,6 @@
-"""Force laws, one file each, and the catalogue of named media."""
+"""Force laws, one a file, and the catalogue of named media."""
 
-from rft.laws.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, power_of
+from rft.laws.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.catalogue import CATALOGUE
 from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular
@@ -24,5 +24,5 @@ __all__ = [
     "is_linear",
     "is_mirror",
     "is_rate_independent",
-    "power_of",
+    "speed_exponent",
 ]

@@ -1,4 +1,4 @@
-"""What a medium is: the drag per unit length on a piece of body that slides along and across itself."""
+"""The base of force laws: drag per unit length on a body that slides along and across itself."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ class Medium(Protocol):
 
         f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + eps^2),
 
-    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give the closed-form link
-    integrals of `rft.link`. A law of another form has neither (or None), supplies `traction` alone and is integrated
-    by quadrature. So all but `traction` may be left out (`dry_terms`, `viscous_terms`): ``slopes``, (df_t/dv_t,
-    df_t/dv_n, df_n/dv_t, df_n/dv_n), else by differences; ``mirror``, True where left and right are alike, f_n odd and
-    f_t even in v_n, else not said (`is_mirror`); ``k``, that of Eq. 2 (`Granular`). Compiled code knows a law whose
-    traction, and slopes where it has them, are formulas (`rft.vectors.formula`) of its number fields. A measured medium
-    may have a ``covariance`` (n, n), of the parameters that ``uncertain`` names, in their order; it changes no force
-    (`checked_covariance`)."""
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n; eps is the rounding. Together they give
+    the exact averages of `rft.link`. A law of another form has neither (or None) and is averaged by quadrature.
+
+    Only `traction` is required. Optional members:
+
+    slopes(v_t, v_n, rounding): (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); by default central differences.
+    mirror: True if f_n is odd and f_t even in v_n, so that left and right are alike.
+    k: the factor k of Eq. 2.
+    covariance: (n, n), of the parameters named in ``uncertain``; it changes no force.
+
+    A law runs in compiled code if its traction, and its slopes if it has them, are formulas (`rft.vectors.formula`) of
+    its number fields."""
 
     def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing the velocity (v_t, v_n); arrays broadcast together."""
@@ -93,72 +97,72 @@ def numbers_of_terms(medium) -> TermNumbers:
 
 
 def dry_terms(medium) -> tuple[tuple[float, float, float], ...] | None:
-    """The rate-independent terms (q, k_t, k_n) of a medium's closed form, None where it has none."""
+    """Return the rate-independent terms (q, k_t, k_n) of a medium's closed form; None without a closed form."""
     return getattr(medium, "dry", None)
 
 
 def viscous_terms(medium) -> tuple[float, float] | None:
-    """(c_t, c_n) of a medium's closed form, None where it has none."""
+    """Return the viscous coefficients (c_t, c_n) of a medium's closed form; None without a closed form."""
     return getattr(medium, "viscous", None)
 
 
 def is_closed(medium) -> bool:
-    """Whether the medium has a closed form, so that its integrals over a link are exact."""
+    """Return whether a medium has a closed form, and so exact averages over a link."""
     return dry_terms(medium) is not None and viscous_terms(medium) is not None
 
 
 def is_mirror(medium) -> bool:
-    """Whether the medium says that left and right are alike; then a field takes half the balances."""
+    """Return whether a medium claims that left and right are alike; a field then takes half the balances."""
     return bool(getattr(medium, "mirror", False))
 
 
-def is_frozen(thing) -> bool:
-    """Whether it stays what it is: a frozen dataclass of what can be a key, which an array of parameters cannot."""
-    parameters = getattr(type(thing), "__dataclass_params__", None)
+def is_frozen(value) -> bool:
+    """Return whether a value is a frozen dataclass of hashable fields (an array is not hashable)."""
+    parameters = getattr(type(value), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen:
         return False
     try:
-        hash(thing)
+        hash(value)
     except TypeError:
         return False
     return True
 
 
-def remembered(f: Callable) -> Callable:
-    """f, worked out once for the last few arguments of which none can change (`is_frozen`, text, whole numbers,
-    tuples)."""
-    kept = functools.lru_cache(maxsize=32)(f)
+def cached_if_immutable(function: Callable) -> Callable:
+    """Return the function with a cache of its last 32 calls; calls with an argument that may change are not cached.
 
-    @functools.wraps(f)
-    def of(*args):
-        return (kept if _lasts(args) else f)(*args)
+    Immutable are frozen dataclasses (`is_frozen`), text, integers, and tuples of these."""
+    cached = functools.lru_cache(maxsize=32)(function)
 
-    return of
+    @functools.wraps(function)
+    def call(*args):
+        return (cached if _is_immutable(args) else function)(*args)
 
-
-def _lasts(x) -> bool:
-    return type(x) in (str, int) or (all(map(_lasts, x)) if type(x) is tuple else is_frozen(x))
+    return call
 
 
+def _is_immutable(x) -> bool:
+    return type(x) in (str, int) or (all(map(_is_immutable, x)) if type(x) is tuple else is_frozen(x))
+
+
+# Velocities at which properties of a law are checked: 48 directions at 13 speeds, (13, 48).
 SPEEDS, DIRECTIONS = np.logspace(-12, 12, 13)[:, None], np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
-TRIED = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
+VELOCITIES = SPEEDS * np.cos(DIRECTIONS), SPEEDS * np.sin(DIRECTIONS)
 
 
-@remembered
-def is_central(medium: Medium) -> bool:
-    """Whether drag only turns round with the velocity, so that no end of an element is its front: tried at many."""
+@cached_if_immutable
+def is_odd(medium: Medium) -> bool:
+    """Return whether f(-v) = -f(v) at VELOCITIES, so that the ends of an element are alike."""
+    v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
-        forth, back = (
-            np.stack(np.broadcast_arrays(*medium.traction(sign * TRIED[0], sign * TRIED[1]))) for sign in (1, -1)
-        )
-    return bool((np.abs(forth + back) <= 1e-13 * np.abs(forth).max(0)).all())
+        forward, backward = (np.stack(np.broadcast_arrays(*medium.traction(k * v_t, k * v_n))) for k in (1, -1))
+    return bool((np.abs(forward + backward) <= 1e-13 * np.abs(forward).max(0)).all())
 
 
 def require_law(medium: Medium) -> None:
-    """Raise ValueError for what is no medium, or whose `traction` cannot be asked for the drag on arrays of
-    elements."""
-    good = hasattr(medium, "traction") and not isinstance(medium, type)
-    require(good, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
+    is_law = hasattr(medium, "traction") and not isinstance(medium, type)
+    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
     if is_closed(medium):
         return
     name = f"{type(medium).__name__}.traction"
@@ -174,50 +178,50 @@ def require_law(medium: Medium) -> None:
     except Exception as error:
         raise ValueError(f"{name} fails: {type(error).__name__}: {error}") from error
     shapes = np.shape(f_t), np.shape(f_n)
-    good = set(shapes) <= {(), (1,), (2, 3)}
-    require(good, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
+    broadcasts = set(shapes) <= {(), (1,), (2, 3)}
+    require(broadcasts, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
 
 
-def _drags(medium: TermLaw) -> bool:
-    """Whether all terms of a closed form are drags, and there are some; if not, they may yet be drags together."""
-    every = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
-    return min(every) >= 0.0 and 0.0 < max(every) < np.inf
+def _has_only_drags(medium: TermLaw) -> bool:
+    """Return whether no term of a closed form pushes and some term drags."""
+    coefficients = [*(x for _, *k in medium.dry for x in k), *medium.viscous]
+    return min(coefficients) >= 0.0 and 0.0 < max(coefficients) < np.inf
 
 
 def require_drag(medium: Medium) -> None:
-    """Raise ValueError if the medium pushes: if at some velocity, of 48 directions and speeds from 1e-12 to 1e12, its
-    force has a part along the motion, not against it, or if it has none at all."""
+    """Raise ValueError if the medium pushes at one of VELOCITIES, that is if its force there has a part along the motion,
+    or if it has no drag at all."""
     require_law(medium)
-    if getattr(type(medium), "traction", None) is TermLaw.traction and _drags(medium):
+    if getattr(type(medium), "traction", None) is TermLaw.traction and _has_only_drags(medium):
         return
-    v_t, v_n = TRIED
+    v_t, v_n = VELOCITIES
     with np.errstate(all="ignore"):
         f_t, f_n = medium.traction(v_t, v_n)
-        against = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1: straight against the motion
-    name, against = type(medium).__name__, np.nan_to_num(against)
-    require(bool((against > 0).any()), f"{name} has no drag at any velocity: give its traction a positive one")
-    worst = np.unravel_index(np.argmin(against), against.shape)
+        cosine = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1 straight against the motion
+    name, cosine = type(medium).__name__, np.nan_to_num(cosine)
+    require(bool((cosine > 0).any()), f"{name} has no drag at any velocity: give its traction a positive one")
+    worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(
-        against[worst] > -1e-9,  # rounding, in laws that hardly drag along the body
+        cosine[worst] > -1e-9,  # roundoff, in laws that hardly drag along the body
         f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body: "
         "drag is positive in the direction of the motion it opposes, change its sign there",
     )
 
 
 def is_linear(medium: Medium) -> bool:
-    """Whether drag is proportional to velocity, so that the body velocity is linear in alphadot."""
+    """Return whether drag is proportional to velocity, and so the body velocity linear in alphadot."""
     return dry_terms(medium) == () and is_closed(medium)
 
 
 def is_rate_independent(medium: Medium) -> bool:
-    """Whether it does not matter how fast a gait is run: drag grows with the same power of the speed in all
-    directions."""
-    return power_of(medium) is not None
+    """Return whether drag grows with one power of the speed in all directions, so that the speed of a gait does not
+    matter."""
+    return speed_exponent(medium) is not None
 
 
-def power_of(medium: Medium) -> float | None:
-    """The power of the speed that drag grows with in all directions: 0 dry, 1 viscous; None if there is no one
-    power."""
+def speed_exponent(medium: Medium) -> float | None:
+    """Return the power of the speed with which drag grows in all directions, 0 for dry media, 1 for viscous ones; None
+    if it differs between speeds or directions."""
     if is_closed(medium):
         return (None if any(medium.viscous) else 0.0) if medium.dry else 1.0
     speeds = np.logspace(-3, 1, 5)[:, None]
@@ -227,5 +231,5 @@ def power_of(medium: Medium) -> float | None:
     if not np.isfinite(size).all() or not size.all():
         return None
     form, growth = f / size[:, None], size[1:] / size[:-1]
-    alike = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
-    return round(float(np.log10(growth.mean())), 6) + 0.0 if alike else None
+    has_power = np.ptp(form, axis=1).max() < 1e-6 and np.ptp(growth) < 1e-6 * growth.max()
+    return round(float(np.log10(growth.mean())), 6) + 0.0 if has_power else None

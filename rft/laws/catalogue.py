@@ -21,22 +21,23 @@ class Entry:
     axial_stress: float | None = None
 
 
-# Of the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 % less drag (Sec. IV B).
+# From the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 % less drag (Sec. IV B).
 REPOSE = math.atan(math.sin(math.radians(20.0)) / (math.cos(math.radians(20.0)) - 0.5))  # rad, 37.9 degrees
 GRAVITY = 9.81  # m/s^2
-DEPTH = 0.0762  # m, of the rods whose drag gave the axial stresses
+DEPTH = 0.0762  # m, of the rods whose drag gave the axial stresses of the catalogue
 GLASS = 2500.0  # kg/m^3, soda-lime glass, assumed
 PACKED = {"loose": 0.58, "close": 0.62}  # volume fractions, Zhang and Goldman (2014), caption of Fig. 9
 
 
 def pressure_factor(axial_stress: float, packed: str) -> float:
-    """k of Eq. 2 from an axial stress in Pa at DEPTH: over rho g |z|, rho that of glass times the volume fraction."""
+    """Return k of Eq. 2 from an axial stress in Pa at DEPTH, k = stress / (rho g |z|), with rho the density of glass
+    times the volume fraction."""
     return axial_stress / (GLASS * PACKED[packed] * GRAVITY * DEPTH)
 
 
 SURFACE_ACROSS = 0.15  # N, A of the drag across a plate 8 mm deep, Schiebel et al. (2020)
-# N, along that plate. Their fit of it is not known here: about 0.017 where they show it, cos psi assumed as its form. The
-# speed of their snakes, 0.81 of that along their own track (0.74 to 0.89), asks for 0.010 (0.78) rather than 0.017 (0.74).
+# N, drag along that plate, of the assumed form cos psi: about 0.017 in their figure; their fit is not known here. Their
+# snakes move at 0.81 of the speed along their own track (0.74 to 0.89), to which 0.010 (0.78) is nearer than 0.017 (0.74).
 SURFACE_ALONG, SURFACE_ALONG_RANGE = 0.017, (0.010, 0.017)  # assumed
 
 ZHANG_GOLDMAN = "Zhang and Goldman, Phys. Fluids 26, 101308 (2014)"

@@ -9,6 +9,8 @@ from rft.laws.base import TermLaw
 
 @dataclass(frozen=True)
 class Coulomb(TermLaw):
-    """f_t = v.t, f_n = v.n with v the unit velocity: `Granular` with C = 0. The unit of force is the yield force."""
+    """Isotropic friction: f_t = v.t, f_n = v.n with v the unit velocity, in units of the yield force.
+
+    The law is that of `Granular` with C = 0."""
 
     dry = ((1.0, 1.0, 1.0),)

@@ -19,16 +19,15 @@ class Granular(TermLaw):
     v the unit vector of the velocity, both times 2 k rho g r |z| (the axial drag, our unit of force).
     Source: Zhang and Goldman, Phys. Fluids 26, 101308 (2014), Eqs. 2-3.
 
-    k is part of our unit of force, so only what is measured against the weight of grains asks for it (grain inertia).
+    k is part of the unit of force; only effects measured against the weight of grains use it (grain inertia).
 
-    covariance (-): that of C, gamma0 (in rad) and, where k is given, k or not, as ``uncertain`` says; it changes no
+    covariance (-): of C and gamma0 (in rad), and of k as a third parameter if k is given and has one; it changes no
     force and is what drag measurements leave open (`rft.calibrate`)."""
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
     k: Annotated[float | None, Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above")] = None
     covariance: tuple[tuple[float, ...], ...] | None = None
-    angles = ("gamma0",)
 
     def __post_init__(self):
         check_numbers(self)
@@ -41,7 +40,7 @@ class Granular(TermLaw):
 
     @property
     def uncertain(self) -> tuple[str, ...]:
-        """Names of the parameters that ``covariance`` is of."""
+        """Names of the parameters of ``covariance``, in their order."""
         return ("C", "gamma0", "k")[: len(self.covariance or (0, 0))]
 
     @property

@@ -1,9 +1,8 @@
-"""Force laws as records: numbers, and formulas of them, which both drivers of the balance take.
+"""Force laws as records: numbers, and formulas of these numbers, for both drivers of the balance.
 
 The record of a law is a NamedTuple of arrays whose class holds the formulas `traction`, `slopes` and `average`. A
 closed form, a sum of viscous and dry terms, has exact averages over an element; any other law is averaged by a
-quadrature rule. Compiled code knows a law whose traction is a formula (`rft.vectors.formula`); another one is left to
-NumPy."""
+quadrature rule. A law whose traction is no formula (`rft.vectors.formula`) is computed by NumPy alone."""
 
 from __future__ import annotations
 
@@ -15,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.checks import is_number
-from rft.laws.base import is_closed, numbers_of_terms, remembered, require_law, terms_slopes, terms_traction
-from rft.link import added, dry, viscous
+from rft.laws.base import cached_if_immutable, is_closed, numbers_of_terms, require_law, terms_slopes, terms_traction
+from rft.link import dry, sum_loads, viscous
 from rft.quadrature import QUADRATURE, by_nodes, nodes_of, parse, slopes_by_differences
 from rft.vectors import formula, is_formula
 
@@ -26,12 +25,12 @@ def closed_form(law, v_t, v_n, v_w, rounding):
     """Return the exact load of viscous and dry terms."""
     load = viscous(v_t, v_n, v_w, law.viscous[0, 0], law.viscous[0, 1])
     for j in range(len(law.dry)):
-        load = added(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
+        load = sum_loads(load, dry(v_t, v_n, v_w, rounding, law.dry[j, 0], law.dry[j, 1], law.dry[j, 2]))
     return load
 
 
 class Terms(NamedTuple):
-    """A law in closed form, as `TermNumbers`."""
+    """The record of a law in closed form; fields as in `TermNumbers`."""
 
     viscous: np.ndarray
     dry: np.ndarray
@@ -49,9 +48,9 @@ class Uncompiled:
             self.slopes = law.slopes
 
 
-@remembered
+@cached_if_immutable
 def record(law, rule: str = "exact") -> Any:
-    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N"); ValueError for what is no law."""
+    """Return the record of a law under a rule ("exact", "midpoint:N", "gauss:N"); ValueError unless it is a law."""
     require_law(law)
     kind, count = rule_for(law, rule)
     if is_closed(law):
@@ -66,34 +65,34 @@ def record(law, rule: str = "exact") -> Any:
         numbers = numbers_of(law)
         slopes = getattr(type(law), "slopes", slopes_by_differences)
         formulas = {"traction": type(law).traction, "slopes": slopes, "average": by_nodes}
-    new = record_class(type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items()))
-    return new(*numbers.values(), nodes, weights)
+    cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items()))
+    return cls(*numbers.values(), nodes, weights)
 
 
 def numbers_of(law) -> dict[str, np.ndarray | float]:
     """Return the numbers that the formulas of a law read: its ``numbers``, or the numbers among its fields."""
     if hasattr(law, "numbers"):
         return law.numbers
-    own = fields(law) if is_dataclass(law) else ()
-    return {f.name: float(x) for f in own if is_number(x := getattr(law, f.name))}
+    law_fields = fields(law) if is_dataclass(law) else ()
+    return {f.name: float(x) for f in law_fields if is_number(x := getattr(law, f.name))}
 
 
 @functools.cache
 def record_class(name: str, names: tuple[str, ...], formulas: tuple[tuple[str, Callable], ...]) -> type:
-    """Return the class of records with these numbers and formulas; one class is one form of law to compiled code."""
-    new = NamedTuple(name, [(field, np.ndarray) for field in names])
+    """Return the class of records with these numbers and formulas; a kernel is compiled for each class."""
+    cls = NamedTuple(name, [(field, np.ndarray) for field in names])
     for field, function in formulas:
-        setattr(new, field, function)
-    return new
+        setattr(cls, field, function)
+    return cls
 
 
 def is_compilable(law_record) -> bool:
-    """Return whether compiled code knows a law, from its record."""
+    """Return whether a law, given by its record, can be compiled."""
     return isinstance(law_record, tuple)
 
 
 def rule_for(law, rule: str) -> tuple[str, int]:
-    """Return the rule as `rft.quadrature.parse` does, but QUADRATURE where "exact" is asked of a law without a closed
+    """Return the rule as `rft.quadrature.parse` does, but QUADRATURE in place of "exact" for a law without a closed
     form."""
     kind, count = parse(rule)
     return (kind, count) if kind != "exact" or is_closed(law) else parse(QUADRATURE)

@@ -16,18 +16,17 @@ class Surface(TermLaw):
 
         f_n = across (1 + C / sqrt(tan^2 gamma0 + (v.n)^2)) (v.n),     f_t = v.t,
 
-    v the unit vector of the velocity, in units of the axial drag: `Granular` with across = 1. The form across is the
-    one that Schiebel et al. (eLife 9, e51412, 2020) fitted to the drag on a plate; that the drag along is Coulomb's, a
-    constant times v.t, is assumed.
+    v the unit vector of the velocity, in units of the axial drag. With across = 1 the law is that of `Granular`. The form
+    of f_n is the one that Schiebel et al. (eLife 9, e51412, 2020) fitted to the drag on a plate; that of f_t, Coulomb
+    friction, is assumed.
 
-    covariance (-): that of C, gamma0 (in rad) and across; it changes no force and is what drag measurements leave open.
+    covariance (-): of C, gamma0 (in rad) and across; it changes no force and is what drag measurements leave open.
     """
 
     C: Annotated[float, Number(0, 1e6, "-", "the extra normal force")]
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
     across: Annotated[float, Number(1e-6, 1e6, "-", "strength of the drag across, A of that fit, over the axial drag")]
     covariance: tuple[tuple[float, ...], ...] | None = None
-    angles = ("gamma0",)
     uncertain = ("C", "gamma0", "across")
 
     def __post_init__(self):

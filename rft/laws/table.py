@@ -1,4 +1,4 @@
-"""A law as it was measured: drag along and across by the angle of attack, and a monotone curve through it."""
+"""A measured law: drag along and across at angles of attack, and monotone curves through the measurements."""
 
 from __future__ import annotations
 
@@ -13,36 +13,35 @@ from rft.vectors import absolute, at, copysign, floor, formula, minimum, sqrt, w
 
 MOST_ROWS = 10_000
 MOST_CELLS = 4096  # of a curve on [0, 1]
-REACH = np.radians(15.0)  # how near to 0 and pi/2 the angles must come
+LARGEST_GAP = np.radians(15.0)  # from 0 to the smallest angle, and from the largest angle to pi/2
 
 
 @dataclass(frozen=True)
 class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
 
-    psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; others are folded between,
-    and those measured again averaged (`rft.drag.rod_drag`). f_t, f_n (-): as many forces per length along and across,
-    in one unit of any kind, positive against the motion.
+    psi (rad): at least three different angles that come within 15 degrees of 0 and of pi/2; other angles are mapped to 0
+    to pi/2 by symmetry, and forces at equal angles averaged (`rft.drag.rod_drag`). f_t, f_n (-): as many forces per
+    length along and across, in one unit of any kind, positive against the motion.
 
-    With the unit velocity v, f_t is a function of v.t = cos psi and f_n one of v.n = sin psi, as in Eq. 3 of Zhang and
-    Goldman (2014): odd ones, through the origin and the measured values, by piecewise cubics that are monotone between
-    neighbours and have a continuous derivative (PCHIP). They hold the last value where the angles do not reach 0 or
-    pi/2; what was measured of f_n at 0 and of f_t at pi/2, where symmetry allows none, is left out. Forces are in units
-    of f_t at psi = 0."""
+    With the unit velocity v, f_t is a function of v.t = cos psi and f_n a function of v.n = sin psi, as in Eq. 3 of
+    Zhang and Goldman (2014). Both are odd piecewise cubics through the origin and the measured values, monotone between
+    neighbours and with a continuous derivative (PCHIP), and constant beyond the last measured value. Values of f_n at 0
+    and of f_t at pi/2 are ignored, for they vanish by symmetry. Forces are in units of f_t at psi = 0."""
 
     psi: tuple[float, ...]
     f_t: tuple[float, ...]
     f_n: tuple[float, ...]
-    angles = ("psi",)
     dry = None
     viscous = None
     mirror = True
 
     def __post_init__(self):
         rows = [real_array(name, getattr(self, name)) for name in ("psi", "f_t", "f_n")]
-        alike = all(x.ndim == 1 and x.size == rows[0].size for x in rows)
+        have_one_length = all(x.ndim == 1 and x.size == rows[0].size for x in rows)
         require(
-            alike and 3 <= rows[0].size <= MOST_ROWS, f"psi, f_t and f_n must be rows of 3 to {MOST_ROWS} numbers each"
+            have_one_length and 3 <= rows[0].size <= MOST_ROWS,
+            f"psi, f_t and f_n must be rows of 3 to {MOST_ROWS} numbers each",
         )
         for name, x in zip(("psi", "f_t", "f_n"), rows):
             require(bool(np.isfinite(x).all()), f"{name} must be finite numbers")
@@ -51,13 +50,16 @@ class Table:
         require(largest <= 2 * np.pi + 1e-9, f"psi is in rad, at most 2 pi, got {largest:g}: write psi_deg for degrees")
         data = rod_drag(np.degrees(rows[0]), *rows[1:])
         require(
-            data.psi.min() <= REACH and data.psi.max() >= np.pi / 2 - REACH and len(np.unique(data.psi.round(9))) > 2,
+            data.psi.min() <= LARGEST_GAP
+            and data.psi.max() >= np.pi / 2 - LARGEST_GAP
+            and len(np.unique(data.psi.round(9))) > 2,
             "the angles must come within 15 degrees of 0 and of 90, with at least one more between",
         )
-        along, across = (_curve(x, f) for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces))
+        along, across = (_monotone_curve(x, f) for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces))
         unit = float(along(1.0)) if along(1.0) > 0 else float(across(1.0))
         require(unit > 0, "there is no drag at psi = 0 nor at psi = 90 degrees")
-        object.__setattr__(self, "numbers", {**_pieces("along", along, unit), **_pieces("across", across, unit)})
+        numbers = {**_curve_arrays("along", along, unit), **_curve_arrays("across", across, unit)}
+        object.__setattr__(self, "numbers", numbers)
         for name, x in self.numbers.items():
             object.__setattr__(self, name, x)
         require_drag(self)
@@ -83,7 +85,7 @@ class Table:
 
 @formula
 def inverse_speed(v_t, v_n, rounding):
-    """Return 1 / |v|, with |v|^2 rounded off by rounding^2; 0 at rest."""
+    """Return 1 / sqrt(|v|^2 + rounding^2); 0 at rest without rounding."""
     size2 = v_t * v_t + v_n * v_n + rounding * rounding
     return where(size2 > 0.0, 1.0, 0.0) / sqrt(where(size2 > 0.0, size2, 1.0))
 
@@ -104,27 +106,26 @@ def curve(x, pieces, cells, knots, steps):
     return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (2.0 * c2 + d * (3.0 * c3))
 
 
-def _pieces(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
-    """Return the arrays of `curve`, by name, for the half at x >= 0 of one of SciPy's odd piecewise polynomials on [-1,
-    1]."""
+def _curve_arrays(name: str, polynomial, unit: float) -> dict[str, np.ndarray]:
+    """Return the arrays that `curve` takes, by name, from one of SciPy's odd piecewise polynomials on [-1, 1]."""
     half = polynomial.x >= 0.0
     knots, pieces = polynomial.x[half], polynomial.c.T[half[:-1]] / unit
     count = min(MOST_CELLS, 1 << int(np.ceil(np.log2(1.0 / np.diff(knots).min()))))
     first = np.searchsorted(knots, np.arange(count + 1) / count, side="right") - 1
-    column = lambda x: np.array(x, float).reshape(-1, 1)
     cells, steps = np.minimum(first, len(pieces) - 1), np.zeros(max(1, np.diff(first).max()))
-    arrays = {"cells": cells, "knots": [*knots[:-1], 2.0], "steps": steps}
-    return {name: np.ascontiguousarray(pieces), **{f"{name}_{key}": column(x) for key, x in arrays.items()}}
+    columns = {"cells": cells, "knots": [*knots[:-1], 2.0], "steps": steps}
+    columns = {f"{name}_{key}": np.array(x, float).reshape(-1, 1) for key, x in columns.items()}
+    return {name: np.ascontiguousarray(pieces), **columns}
 
 
-def _curve(x: np.ndarray, f: np.ndarray):
-    """The odd monotone piecewise cubic on [-1, 1] through the origin and (x, f), the mean of f where x repeats."""
+def _monotone_curve(x: np.ndarray, f: np.ndarray):
+    """Return the odd monotone piecewise cubic on [-1, 1] through the origin and (x, f), the mean of f where x repeats."""
     from scipy.interpolate import PchipInterpolator
 
-    knots, which = np.unique(np.round(x, 12), return_inverse=True)
-    values = np.bincount(which, f) / np.bincount(which)
-    inner = knots > 1e-9
-    knots, values = knots[inner], values[inner]
+    knots, index = np.unique(np.round(x, 12), return_inverse=True)
+    values = np.bincount(index, f) / np.bincount(index)
+    positive = knots > 1e-9
+    knots, values = knots[positive], values[positive]
     if knots[-1] < 1.0:
         knots, values = np.append(knots, 1.0), np.append(values, values[-1])
     return PchipInterpolator(

@@ -11,11 +11,11 @@ from rft.laws.base import TermLaw
 
 @dataclass(frozen=True)
 class Viscous(TermLaw):
-    """f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
+    """Linear drag: f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
 
     A ratio of 2 is the slender-body limit of Gray and Hancock, J. Exp. Biol. 32, 802 (1955).
 
-    covariance (-): that of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
+    covariance (-): of the ratio, 1 x 1; it changes no force and is what drag measurements leave open
     (`rft.calibrate`)."""
 
     ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0

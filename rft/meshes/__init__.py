@@ -1,13 +1,13 @@
-"""Forces of grains on bodies of any form in three dimensions: law, triangle meshes, their motion."""
+"""Forces of grains on bodies of any form in three dimensions: the law, triangle meshes, and their motions."""
 
 from rft.meshes.intrusion import Faces, Wrench, bearing, wrench
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh, below, read
-from rft.meshes.motions import MOTIONS, Drag, Motion, Passage, Path, Penetrate, Rotate
+from rft.meshes.motions import MOTIONS, Drag, Motion, Path, Penetrate, Rotate, Trajectory
 from rft.meshes.solids import SOLIDS, Cylinder, Leg, MeshFile, Screw, Solid, Sphere
 
 __all__ = [
-    "MOTIONS", "SOLIDS", "Cylinder", "Drag", "Faces", "Leg", "Mesh", "MeshFile", "Motion", "Passage", "Path", "Penetrate",
-    "Rotate", "Screw", "Solid", "Spatial", "Sphere", "Wrench", "bearing", "below", "read",
+    "MOTIONS", "SOLIDS", "Cylinder", "Drag", "Faces", "Leg", "Mesh", "MeshFile", "Motion", "Path", "Penetrate",
+    "Rotate", "Screw", "Solid", "Spatial", "Sphere", "Trajectory", "Wrench", "bearing", "below", "read",
     "wrench",
 ]  # fmt: skip

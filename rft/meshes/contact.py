@@ -9,29 +9,30 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rft.ground import Ground, per_speed, share
+from rft.ground import Ground, inverse_speed, strength_at
 
 UP, AHEAD = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
 
 class FaceLaw(Protocol):
-    """A law of three dimensions. sine: of the grazing angle."""
+    """A law of three dimensions. grazing_sine: sine of the grazing angle."""
 
-    sine: float
+    grazing_sine: float
 
     def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
-        """Return the force per area and depth, N/m^3 (3, ...), on faces with outward unit normals n and unit velocities
-        v, whether or not they lead; upwards is along ``up``."""
+        """Return the force per area and depth (3, ...), N/m^3, on faces with outward unit normals n and unit velocities
+        v (3, ...), whether or not they lead; ``up`` (3,) is the unit vector upwards."""
         ...
 
-    def lead(self, into: np.ndarray, sine: float, sheet: np.ndarray | bool) -> np.ndarray:
-        """Return how much of it faces bear, 0 to 1 (`rft.ground.lead`). sheet: whether either side may lead."""
+    def lead(self, n_dot_v: np.ndarray, grazing_sine: float, sheet: np.ndarray | bool) -> np.ndarray:
+        """Return the share of the traction that faces bear, 0 to 1 (`rft.ground.lead`). sheet: whether either side may
+        lead."""
         ...
 
 
 class Part(NamedTuple):
-    """What of faces is below the surface. n: unit normal, outwards. middle: m from the origin. area: m^2. depth:
-    integral of |z| over it, m^3. arms: integral of |z| times the place, m^4."""
+    """The parts of faces below the surface. n: outward unit normal. middle: from the origin, m. area: m^2. depth:
+    integral of |z| over the part, m^3. arms: integral of |z| times the vector from the origin, m^4."""
 
     n: np.ndarray
     middle: np.ndarray
@@ -41,8 +42,8 @@ class Part(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Velocity of the origin, m/s, and spin, rad/s; x of the origin, m; upwards and the world's x axis, along the axes
-    that vectors are told along."""
+    """Motion of a body. velocity: of the origin, m/s. spin: angular velocity, rad/s. x: of the origin in the world, m.
+    up, ahead: unit vectors upwards and along the world's x axis. All vectors are along the same axes."""
 
     velocity: np.ndarray
     spin: np.ndarray
@@ -51,29 +52,29 @@ class Motion(NamedTuple):
     ahead: np.ndarray = AHEAD
 
 
-def load(law: FaceLaw, ground: Ground, part: Part, at: Motion, sheet: np.ndarray | bool = False):
+def load(law: FaceLaw, ground: Ground, part: Part, motion: Motion, sheet: np.ndarray | bool = False):
     """Return force (3, ...), N, moment about the origin (3, ...), N m, and stress per depth (3, ...), N/m^3, of the
-    grains on faces."""
-    n, v = np.broadcast_arrays(part.n, at.velocity + cross(at.spin, part.middle))
+    grains on parts of faces. sheet: whether a face is one of a thin sheet, of which either side may lead."""
+    n, v = np.broadcast_arrays(part.n, motion.velocity + cross(motion.spin, part.middle))
     speed, across = np.sqrt(dot(v, v)), dot(n, v)
-    per, unit = per_speed(ground, speed), v / np.where(speed == 0.0, 1.0, speed)
-    bears = speed * per * law.lead(across * per, ground.sine, sheet) * _share(ground, part, at, unit)
-    flat = lambda x: x.reshape(3, -1)
-    stress = law.traction(flat(n), flat(unit), at.up).reshape(v.shape) * bears
+    slowness, unit = inverse_speed(ground, speed), v / np.where(speed == 0.0, 1.0, speed)
+    lead = law.lead(across * slowness, ground.grazing_sine, sheet)
+    share = speed * slowness * lead * _strength(ground, part, motion, unit)
+    stress = law.traction(n.reshape(3, -1), unit.reshape(3, -1), motion.up).reshape(v.shape) * share
     force, moment = stress * part.depth, cross(part.arms, stress)
     if np.any(ground.flux):
-        into = np.where(sheet, across, np.maximum(across, 0.0))
-        push = ground.flux * into * np.abs(into) * part.area
+        across = np.where(sheet, across, np.maximum(across, 0.0))
+        push = ground.flux * across * np.abs(across) * part.area
         force, moment = force - push * n, moment - push * cross(part.middle, n)
     return force, moment, stress
 
 
-def _share(ground: Ground, part: Part, at: Motion, unit: np.ndarray):
-    """The ground's strength on the faces, one number where it is the same everywhere."""
-    if not (ground.fall or len(ground.disturbed)):
+def _strength(ground: Ground, part: Part, motion: Motion, unit: np.ndarray):
+    """Return the ground's strength at the parts, one number where it is the same everywhere."""
+    if not (ground.downhill_loss or len(ground.disturbed)):
         return ground.strength
-    ahead = at.ahead.reshape(3, *[1] * (unit.ndim - 1))
-    return share(ground, at.x + dot(ahead, part.middle), dot(ahead, unit))
+    ahead = motion.ahead.reshape(3, *[1] * (unit.ndim - 1))
+    return strength_at(ground, motion.x + dot(ahead, part.middle), dot(ahead, unit))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

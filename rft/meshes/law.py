@@ -5,7 +5,7 @@ face and v the unit vector of its velocity, and
 
     stress = xi_n alpha(n, v) |z|      on faces that lead (n . v >= 0), |z| deep,
 
-with alpha a fit in three invariants. The fit knows a plate and not its two faces, so n stands for n' = n or -n, the one
+with alpha a fit in three invariants. The fit is for a plate, not for one of its faces, so it takes n' = n or -n, the one
 that points down. With r the horizontal direction of v and theta = z x r,
 
     n' = (sin beta cos psi, sin beta sin psi, -cos beta),   v = (cos gamma, 0, -sin gamma)    along r, theta, z,
@@ -13,7 +13,7 @@ that points down. With r the horizontal direction of v and theta = z x r,
     alpha_r = f1 sin beta cos psi + f2 cos gamma,   alpha_theta = f1 sin beta sin psi,
     alpha_z = -f1 cos beta - f2 sin gamma - f3,
 
-that is alpha = f1 n' + f2 v - f3 z, f1, f2, f3 polynomials of degree 3 in x1, x2, x3. No angle is ever needed.
+that is alpha = f1 n' + f2 v - f3 z, with f1, f2, f3 polynomials of degree 3 in x1, x2, x3. The code needs no angles.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from rft.ground.lead import jump, smoothstep
 TENSION = ("cut", "keep", "push")
 GRAVITY = 9.81  # m/s^2
 UP = np.array([0.0, 0.0, 1.0])
-UPRIGHT = 1e-9  # |n . z| of faces that are vertical but for rounding
+UPRIGHT = 1e-9  # |n . z| of faces that are vertical but for roundoff
 
-# Rows c1, c2, c3 over the terms of `_terms`: Agarwal et al. (2023), as in a public implementation; the limits of the law
-# (invariance about the vertical, no twist where psi = 0) hold by its form, whatever the digits.
+# Rows: coefficients of f1, f2, f3 for the terms of `_terms`. Source: Agarwal et al. (2023), as in a public implementation.
+# Invariance about the vertical, and no stress along theta where psi = 0, hold by the form of the law for any digits.
 COEFFICIENTS = np.array([
     [0.00212, -0.02320, -0.20890, -0.43083, -0.00259, 0.48872, -0.00415, 0.07204, -0.02750, -0.08772,
      0.01992, -0.45961, 0.40799, -0.10107, -0.06576, 0.05664, -0.09269, 0.01892, 0.01033, 0.15120],
@@ -45,7 +45,7 @@ COEFFICIENTS = np.array([
 
 
 def _terms(x1, x2, x3) -> np.ndarray:
-    """(20, ...): the monomials that the coefficients multiply."""
+    """Return the monomials (20, ...) that the coefficients multiply."""
     a, b, c = x1 * x1, x2 * x2, x3 * x3
     one = np.ones_like(x1)
     return np.stack([
@@ -55,7 +55,7 @@ def _terms(x1, x2, x3) -> np.ndarray:
 
 
 def _alpha(n: np.ndarray, v: np.ndarray, up: np.ndarray) -> np.ndarray:
-    """`alpha` for n and v (3, N), upwards being along ``up`` (3,)."""
+    """Return `alpha` (3, N) for n and v (3, N); ``up`` (3,) is the unit vector upwards."""
     height, along = up @ n, np.einsum("iN,iN->N", n, v)
     down = np.where((height > UPRIGHT) | ((np.abs(height) <= UPRIGHT) & (along < 0)), -1.0, 1.0)
     f1, f2, f3 = COEFFICIENTS @ _terms(-(up @ v), -down * height, down * along)
@@ -63,17 +63,17 @@ def _alpha(n: np.ndarray, v: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def alpha(n, v) -> np.ndarray:
-    """The stress vector over xi_n |z|, (..., 3) along x, y, z, of faces with normals n and unit velocities v (..., 3), as
+    """Return the stress over xi_n |z|, (..., 3) along x, y, z, on faces with normals n and unit velocities v (..., 3), as
     fitted: without surface friction, and whether or not the face leads. No unit.
 
-    The law turns with n and v about the vertical. It jumps, by 0.02 in the mean, where a face passes through the vertical
-    and its other side begins to point down; a vertical face counts as one that leads.
+    The law is invariant under rotations of n and v about the vertical. It jumps, by 0.02 in the mean, where a face passes
+    through the vertical and its other side begins to point down; a vertical face counts as one that leads.
     """
     return _by_rows(lambda n, v: _alpha(n, v, UP), n, v)
 
 
 def _by_rows(law, n, v) -> np.ndarray:
-    """law of (3, N) arrays for n and v (..., 3)."""
+    """Return law(n, v), a function of arrays (3, N), for n and v (..., 3)."""
     n, v = np.broadcast_arrays(np.asarray(n, float), np.asarray(v, float))
     return law(n.reshape(-1, 3).T, v.reshape(-1, 3).T).T.reshape(n.shape)
 
@@ -82,16 +82,16 @@ def _by_rows(law, n, v) -> np.ndarray:
 class Spatial:
     """A granular medium in three dimensions.
 
-    tension (-): what becomes of faces on which the fit pulls: "cut" (no force at all), "keep" (as fitted), or "push" (its
-    across part the other way, as public codes do).
+    tension (-): stress on faces on which the fit pulls: "cut" (none), "keep" (as fitted), or "push" (its component across
+    the face reversed, as public codes do).
 
-    `Spatial.of_grains` has xi_n from density and friction. The law jumps where a face begins to lead: by grazing, faces along
-    which the body slides do not bear by rounding, and forces converge with the mesh. The law is one of slow motion in ground
-    that nothing has disturbed. As fitted it pulls in 5 % of all directions of faces that lead. It dissipates except
-    where it drives: a face within 10 degrees of level, looking up, that is drawn out forwards and up to 20 degrees above the
-    horizontal, in 0.05 % of directions and with at most 0.0052 xi_n |z| of stress; and one tilted by 56 to 64 degrees,
-    looking up, that is drawn out 64 to 71 degrees above the horizontal against its tilt, in 0.011 % of directions and with at
-    most 8e-4 xi_n |z|. Of the second region "cut" and "push" leave 0.001 % and 4e-4.
+    `Spatial.from_grains` computes xi_n from density and friction. The law jumps where a face begins to lead; rounded over the
+    grazing angle, faces along which the body slides bear nothing by roundoff, and forces converge with the mesh. The law
+    holds for slow motion in undisturbed ground. As fitted it pulls in 5 % of all directions of faces that lead. It
+    dissipates but for two regions of faces that look up. A face within 10 degrees of level that is drawn out forwards, up to
+    20 degrees above the horizontal, drives in 0.05 % of directions, with at most 0.0052 xi_n |z| of stress. A face tilted by
+    56 to 64 degrees that is drawn out against its tilt, 64 to 71 degrees above the horizontal, drives in 0.011 % of
+    directions, with at most 8e-4 xi_n |z|; "cut" and "push" leave 0.001 % and 4e-4 of this region.
     """
 
     xi_n: Annotated[
@@ -112,14 +112,13 @@ class Spatial:
             "0 to 0.5, 0 for a jump; stress grows from 0 to its own as the velocity turns by that angle out of the face",
         ),
     ] = math.radians(2.0)  # fmt: skip  # assumed
-    angles = ("grazing",)
 
     def __post_init__(self):
         check_numbers(self)
         require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {shown(self.tension)}")
 
     @classmethod
-    def of_grains(cls, density: float, friction: float, **more) -> Spatial:
+    def from_grains(cls, density: float, friction: float, **more) -> Spatial:
         """Return the medium of grains with a critical density, kg/m^3, and an internal friction mu, the tangent of the
         angle of repose, 0.05 to 1.5: xi_n = density g (894 mu^3 - 386 mu^2 + 89 mu), the fit of Agarwal et al. (2023)."""
         in_range("density", density, 1, 1e5, unit="kg/m^3")
@@ -129,35 +128,36 @@ class Spatial:
 
     @property
     def plate(self) -> float:
-        """Of a plate pushed straight down: stress over xi_n |z|, whatever becomes of faces that are pulled."""
+        """Stress on a plate pushed straight down, over xi_n |z|, at any ``tension``."""
         return float(alpha(-UP, -UP)[2])
 
     @property
-    def sine(self) -> float:
-        """Of the grazing angle."""
+    def grazing_sine(self) -> float:
+        """Sine of the grazing angle."""
         return math.sin(self.grazing)
 
     def stress(self, n, v) -> np.ndarray:
-        """Force per area and depth, N/m^3 (..., 3), that the grains exert on faces with outward normals n that move with
-        velocities v (..., 3), of any size. Zero on faces that trail or rest."""
+        """Return the force per area and depth (..., 3), N/m^3, of the grains on faces with outward unit normals n (..., 3)
+        and velocities v (..., 3), of any size; 0 on faces that trail or rest."""
         return _by_rows(self._stress, n, v)
 
     def _stress(self, n: np.ndarray, v: np.ndarray) -> np.ndarray:
         speed = np.sqrt(np.einsum("iN,iN->N", v, v))
         v = v / np.where(speed > 0, speed, 1.0)
-        return self.traction(n, v) * (self.lead(np.einsum("iN,iN->N", n, v), self.sine) * (speed > 0))
+        return self.traction(n, v) * (self.lead(np.einsum("iN,iN->N", n, v), self.grazing_sine) * (speed > 0))
 
     def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:
-        """The same for n and unit v (3, ...), whether or not faces lead, upwards being along ``up`` (3,)."""
+        """Return the force per area and depth (3, N), N/m^3, for unit normals n and unit velocities v (3, N), whether or
+        not faces lead; ``up`` (3,) is the unit vector upwards."""
         return self._limited(_alpha(n, v, up), n) * self.xi_n
 
-    def lead(self, into: np.ndarray, sine: float, sheet: np.ndarray | bool = False) -> np.ndarray:
-        """How much of that faces bear that move at ``into`` times their speed along n; a sheet leads on either side."""
-        into = np.where(sheet, np.abs(into), into)
-        return smoothstep(into, sine) if sine else jump(into)
+    def lead(self, n_dot_v: np.ndarray, grazing_sine: float, sheet: np.ndarray | bool = False) -> np.ndarray:
+        """Return the share of the traction that faces bear, 0 to 1; a sheet leads on either side."""
+        n_dot_v = np.where(sheet, np.abs(n_dot_v), n_dot_v)
+        return smoothstep(n_dot_v, grazing_sine) if grazing_sine else jump(n_dot_v)
 
     def _limited(self, a: np.ndarray, n: np.ndarray) -> np.ndarray:
-        """alpha (3, N) with surface friction, and with what is done about faces that are pulled."""
+        """Return alpha (3, N) limited by surface friction, with the chosen ``tension`` on faces that are pulled."""
         across = np.einsum("iN,iN->N", a, n)  # negative: a push against the face
         along = a - across * n
         if self.tension == "cut":
@@ -168,9 +168,9 @@ class Spatial:
         return across * n + np.minimum(1.0, most / np.where(size > 0, size, 1.0)) * along
 
 
-def of_angles(beta, gamma, psi) -> np.ndarray:
-    """alpha (..., 3) along r, theta, z of a plate tilted by beta, that moves gamma below the horizontal and whose normal
-    is psi off that direction about the vertical; rad."""
+def alpha_of_angles(beta, gamma, psi) -> np.ndarray:
+    """Return alpha (..., 3) along r, theta, z of a plate tilted by beta that moves gamma below the horizontal, with its
+    normal at the angle psi from that direction about the vertical; rad."""
     beta, gamma, psi = np.broadcast_arrays(*(np.asarray(x, float) for x in (beta, gamma, psi)))
     n = np.stack([np.sin(beta) * np.cos(psi), np.sin(beta) * np.sin(psi), -np.cos(beta)], -1)
     v = np.stack([np.cos(gamma), np.zeros_like(gamma), -np.sin(gamma)], -1)

@@ -1,4 +1,4 @@
-"""Triangle meshes that move through grains: what is made of them, and what of them is below the surface."""
+"""Triangle meshes: their geometry, the parts of triangles below the surface, copies, and reading from files."""
 
 from __future__ import annotations
 
@@ -21,29 +21,31 @@ LARGEST_FILE = 500_000_000  # bytes
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of triangles, in its own frame. vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise
-    as seen from outside. closed: every edge is shared by two triangles that agree on which side is out; asked for unless
-    it is given as False, as for a thin plate, of which either side may lead. bends: (F, 3, 3), unit normals at the corners of
-    each triangle where the mesh stands for a smooth surface; None: those of the triangles."""
+    """A surface of triangles, in its own frame.
+
+    vertices: (V, 3), m. faces: (F, 3), indices of vertices, counter-clockwise as seen from outside. closed: whether every
+    edge must be shared by two triangles that agree on which side is out; False for a thin plate, of which either side may
+    lead. smooth_normals: (F, 3, 3), unit normals at the corners of the triangles of a mesh that stands for a smooth
+    surface; None for the normals of the triangles."""
 
     vertices: np.ndarray
     faces: np.ndarray
     closed: bool = True
-    bends: np.ndarray | None = None
+    smooth_normals: np.ndarray | None = None
 
     def __post_init__(self):
         vertices, faces = real_array("vertices", self.vertices), np.asarray(self.faces)
         require(vertices.ndim == 2 and vertices.shape[1:] == (3,), f"vertices must be (V, 3), got {vertices.shape}")
-        good = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
-        require(good, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
+        valid = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
+        require(valid, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
         require(0 < len(faces) <= MOST, f"a mesh has 1 to {MOST:,} triangles, got {len(faces):,}")
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         _require_known(faces, len(vertices))
         require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
-        bends = self.bends if self.bends is None else real_array("bends", self.bends)
-        good = bends is None or (bends.shape == (len(faces), 3, 3) and bool(np.isfinite(bends).all()))
-        require(good, f"bends must be unit normals of shape ({len(faces)}, 3, 3)")
-        object.__setattr__(self, "bends", bends)
+        normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
+        valid = normals is None or (normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all()))
+        require(valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)")
+        object.__setattr__(self, "smooth_normals", normals)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces.astype(np.int64))
         flat = int((self.areas <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2).sum())
@@ -52,19 +54,21 @@ class Mesh:
             self._require_closed()
 
     def _require_closed(self) -> None:
-        one_way = np.sort(self._codes(self.faces, self.faces[:, [1, 2, 0]]))
-        other_way = np.sort(self._codes(self.faces[:, [1, 2, 0]], self.faces))
+        """Raise ValueError if the mesh is not closed, or its triangles do not agree on which side is out."""
+        edges = np.sort(self._codes(self.faces, self.faces[:, [1, 2, 0]]))
+        reversed_edges = np.sort(self._codes(self.faces[:, [1, 2, 0]], self.faces))
         require(
-            bool((np.diff(one_way) > 0).all()),
+            bool((np.diff(edges) > 0).all()),
             "the mesh has an edge that two triangles run along the same way: some are turned inside out, or there are doubles",
         )
-        open_edges = np.setdiff1d(one_way, other_way).size
+        open_edges = np.setdiff1d(edges, reversed_edges).size
         require(
             not open_edges, f"the mesh is open: {open_edges} edges have one triangle; close it, or say closed = false"
         )
         require(self.volume > 0, "the mesh is inside out: its normals point inwards; turn the triangles round")
 
     def _codes(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Return one whole number for each pair of vertices."""
         return (a * len(self.vertices) + b).ravel()
 
     @cached_property
@@ -74,73 +78,74 @@ class Mesh:
 
     @cached_property
     def areas(self) -> np.ndarray:
-        """(F,), m^2."""
+        """Areas (F,), m^2."""
         return np.linalg.norm(self._cross, axis=-1) / 2
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """(F, 3): outward unit normals."""
+        """Outward unit normals (F, 3) of the triangles."""
         return self._cross / (2 * self.areas[:, None])
 
     @cached_property
-    def facing(self) -> np.ndarray:
-        """(F, 3): unit normals at the triangles' middles, of the surface that they stand for."""
-        if self.bends is None:
+    def middle_normals(self) -> np.ndarray:
+        """Unit normals (F, 3) at the triangles' middles of the surface that the mesh stands for."""
+        if self.smooth_normals is None:
             return self.normals
-        mean = self.bends.sum(1)
+        mean = self.smooth_normals.sum(1)
         return mean / np.linalg.norm(mean, axis=-1, keepdims=True)
 
     @cached_property
     def middles(self) -> np.ndarray:
-        """(F, 3): centroids, m."""
+        """Centroids (F, 3), m."""
         return self.vertices[self.faces].mean(1)
 
     @cached_property
-    def twists(self) -> np.ndarray:
-        """(F, 3): middle x `facing`, m."""
-        return np.cross(self.middles, self.facing)
+    def normal_moments(self) -> np.ndarray:
+        """Moments (F, 3) of the normals about the origin, middle x normal, m."""
+        return np.cross(self.middles, self.middle_normals)
 
     @cached_property
-    def squares(self) -> np.ndarray:
-        """(F, 3, 3): integrals of x x^T over the triangles, m^4."""
+    def second_moments(self) -> np.ndarray:
+        """Integrals (F, 3, 3) of x x^T over the triangles, m^4."""
         corners = self.vertices[self.faces]
-        each = np.einsum("fci,fcj->fij", corners, corners) + 9 * np.einsum("fi,fj->fij", self.middles, self.middles)
-        return each * (self.areas / 12)[:, None, None]
+        sums = np.einsum("fci,fcj->fij", corners, corners) + 9 * np.einsum("fi,fj->fij", self.middles, self.middles)
+        return sums * (self.areas / 12)[:, None, None]
 
     @property
     def volume(self) -> float:
-        """m^3, of what a closed mesh encloses."""
+        """Volume that a closed mesh encloses, m^3."""
         a = self.vertices[self.faces[:, 0]]
         return float((a * self._cross).sum() / 6)
 
     @property
     def two_sided(self) -> Mesh:
-        """An open mesh with a second triangle on the back of each, so that whichever side leads bears."""
-        bends = None if self.bends is None else np.concatenate([self.bends, -self.bends[:, ::-1]])
-        return Mesh(self.vertices, np.concatenate([self.faces, self.faces[:, ::-1]]), closed=False, bends=bends)
+        """An open mesh with a second triangle on the back of each, so that the side which leads bears."""
+        smooth = self.smooth_normals
+        normals = None if smooth is None else np.concatenate([smooth, -smooth[:, ::-1]])
+        return Mesh(self.vertices, np.concatenate([self.faces, self.faces[:, ::-1]]), False, normals)
 
 
 def below(corners: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The parts of triangles (T, 3, 3) of which the corners' heights (T, 3) are negative, cut exactly where they are 0:
-    triangles (P, 3, 3), and of which triangle each is a part (P,). A triangle that crosses leaves one or two."""
+    """Return the parts of triangles (T, 3, 3) below the surface, from the corners' heights (T, 3): triangles (P, 3, 3), and
+    the index (P,) of the triangle that each is a part of. A triangle that crosses the surface has one part or two."""
     under = heights < 0
     count = under.sum(-1)
-    whole, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))
-    # Turned about so that the vertex that is alone on its side comes first; the sense of the triangle stays.
+    full, tips, pairs = (np.flatnonzero(count == k) for k in (3, 1, 2))
+    # The vertex that is alone on its side comes first; the sense of the triangle stays.
     (a, p, q), (lone, b, c) = (
-        _turned(corners[some], heights[some], np.argmax(under[some] == alone, -1))
-        for some, alone in ((tips, True), (pairs, False))
+        _starting_at(corners[index], heights[index], np.argmax(under[index] == alone, -1))
+        for index, alone in ((tips, True), (pairs, False))
     )
     small = np.stack([a[0], _crossing(a, p), _crossing(a, q)], 1)
     p, q = _crossing(b, lone), _crossing(c, lone)
     return (
-        np.concatenate([corners[whole], small, np.stack([p, b[0], c[0]], 1), np.stack([p, c[0], q], 1)]),
-        np.concatenate([whole, tips, pairs, pairs]),
+        np.concatenate([corners[full], small, np.stack([p, b[0], c[0]], 1), np.stack([p, c[0], q], 1)]),
+        np.concatenate([full, tips, pairs, pairs]),
     )
 
 
-def _turned(corners: np.ndarray, heights: np.ndarray, first: np.ndarray) -> list:
-    """(point (T, 3), height (T,)) of the three corners in order, from ``first`` on."""
+def _starting_at(corners: np.ndarray, heights: np.ndarray, first: np.ndarray) -> list:
+    """Return (point (T, 3), height (T,)) of the three corners in cyclic order, starting at the corner ``first`` (T,)."""
     order = (first[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners, order[..., None], 1)
     heights = np.take_along_axis(heights, order, 1)
@@ -148,51 +153,51 @@ def _turned(corners: np.ndarray, heights: np.ndarray, first: np.ndarray) -> list
 
 
 def _crossing(under: tuple, over: tuple) -> np.ndarray:
-    """Where edges from corners under the surface to corners on or over it meet it."""
+    """Return the points (T, 3) where edges from corners under the surface to corners on or over it cross it."""
     share = under[1] / (under[1] - over[1])
     return under[0] + share[:, None] * (over[0] - under[0])
 
 
-def halved(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every triangle cut in four flat ones at the middles of its edges."""
+def subdivided(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices and faces of a mesh with every triangle cut in four flat ones at the middles of its edges."""
     pairs = np.sort(np.stack([faces, faces[:, [1, 2, 0]]], -1).reshape(-1, 2), -1)
-    edges, where = np.unique(pairs, axis=0, return_inverse=True)
-    ab, bc, ca = len(vertices) + where.reshape(-1, 3).T
+    edges, index = np.unique(pairs, axis=0, return_inverse=True)
+    ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
     a, b, c = faces.T
     cut = np.concatenate([np.stack(t, -1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
     return np.concatenate([vertices, vertices[edges].mean(1)]), cut
 
 
 def quartered(mesh: Mesh) -> Mesh:
-    """The same surface, of four times as many triangles."""
-    bends = mesh.bends
-    if bends is not None:
-        a, b, c = bends.swapaxes(0, 1)
+    """Return the same surface with four times as many triangles."""
+    normals = mesh.smooth_normals
+    if normals is not None:
+        a, b, c = normals.swapaxes(0, 1)
         ab, bc, ca = (x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (a + b, b + c, c + a))
-        bends = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
-    return Mesh(*halved(mesh.vertices, mesh.faces), closed=mesh.closed, bends=bends)
+        normals = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+    return Mesh(*subdivided(mesh.vertices, mesh.faces), mesh.closed, normals)
 
 
 def mirrored(mesh: Mesh) -> Mesh:
-    """The mesh as a mirror in the plane of x and z shows it."""
-    bends = None if mesh.bends is None else mesh.bends[:, ::-1] * [1.0, -1.0, 1.0]
-    return Mesh(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], closed=mesh.closed, bends=bends)
+    """Return the mirror image of a mesh in the plane of x and z."""
+    normals = None if mesh.smooth_normals is None else mesh.smooth_normals[:, ::-1] * [1.0, -1.0, 1.0]
+    return Mesh(mesh.vertices * [1.0, -1.0, 1.0], mesh.faces[:, ::-1], mesh.closed, normals)
 
 
 def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
-    """The mesh of an STL, OBJ or PLY file, its lengths times ``scale`` (0.001 for millimetres). Needs trimesh."""
+    """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001 for millimetres. Needs trimesh."""
     kind = str(path).rpartition(".")[2].lower()
     require(kind in ("stl", "obj", "ply"), f"{path}: a mesh is an .stl, .obj or .ply file")
     vertices, faces = _loaded(Path(path), kind)
     require(faces.ndim == 2 and len(faces) > 0, f"{path} is no {kind.upper()} mesh: it has no triangles")
     with _named(path):
         _require_known(faces, len(vertices))
-    merged, where = np.unique(vertices, axis=0, return_inverse=True)  # an STL file tells every corner anew
+    merged, index = np.unique(vertices, axis=0, return_inverse=True)  # an STL file has three vertices for each triangle
     size = scale * float(np.ptp(merged, axis=0).max())
-    told = f"{path}: the mesh is {size:.4g} m large, beyond {LARGEST:g} m: give scale, 0.001 if it is in mm"
-    require(not size > LARGEST, told)
+    message = f"{path}: the mesh is {size:.4g} m large, beyond {LARGEST:g} m: give scale, 0.001 if it is in mm"
+    require(not size > LARGEST, message)
     with _named(path):
-        return Mesh(merged * scale, where.reshape(-1)[faces], closed)
+        return Mesh(merged * scale, index.reshape(-1)[faces], closed)
 
 
 @contextlib.contextmanager
@@ -210,31 +215,31 @@ def _require_known(faces: np.ndarray, count: int) -> None:
         raise ValueError(f"a face names vertex {bad}, where vertices are 0 to {count - 1}: mend the mesh")
 
 
-# Of an OBJ file: a face with a vertex 0, one with a vertex below 0, and a vertex.
+# Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, and a vertex.
 ZERO, BACK, VERTEX = (
     re.compile(rb"^[ \t]*" + line, re.M) for line in (rb"f[^\n]*[ \t]0+(?=[/\s]|\Z)", rb"f[^\n]*[ \t]-", rb"v[ \t]")
 )
 
 
 def _require_read_rightly(data: bytes) -> None:
-    """Raise ValueError for the vertices of an OBJ file that trimesh takes for others: it takes 0 for the last one, and counts
-    those below 0 back from the last of all, where OBJ counts from the last before the face."""
+    """Raise ValueError for an OBJ file that trimesh misreads: it takes vertex 0 for the last one, and counts vertices below 0
+    back from the end of the file, where OBJ counts back from the face."""
     require(not ZERO.search(data), "a face names vertex 0, where vertices count from 1: mend the mesh")
     back = BACK.search(data)
-    good = back is None or not VERTEX.search(data, back.end())
-    require(good, "a face counts vertices back, and vertices follow it: count from 1, or put all vertices first")
+    valid = back is None or not VERTEX.search(data, back.end())
+    require(valid, "a face counts vertices back, and vertices follow it: count from 1, or put all vertices first")
 
 
 def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices, faces) of an ordinary file of at most `LARGEST_FILE` bytes."""
+    """Return (vertices, faces) of an ordinary file of at most `LARGEST_FILE` bytes."""
     try:
         import trimesh
     except ImportError:
         raise ValueError(f"{path}: reading a mesh needs trimesh: pip install 'geomech[mesh]'") from None
     try:
-        bytes_ = path.stat().st_size
+        size = path.stat().st_size
         require(path.is_file(), f"{path} is no ordinary file")
-        require(bytes_ <= LARGEST_FILE, f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB: give fewer triangles")
+        require(size <= LARGEST_FILE, f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB: give fewer triangles")
         data = path.read_bytes()
     except OSError as error:
         raise ValueError(f"cannot read mesh {path}: {error.strerror}") from None
@@ -242,7 +247,7 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         with _named(path):
             _require_read_rightly(data)
     try:
-        found = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
-        return np.asarray(found.vertices, float), np.asarray(getattr(found, "faces", ()))
-    except Exception as error:  # whatever a parser makes of a file that is none
+        mesh = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
+        return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
+    except Exception as error:  # trimesh raises many kinds of errors for a file that is no mesh
         raise ValueError(f"{path} is no {kind.upper()} mesh: {shown(str(error))}") from None

@@ -1,7 +1,7 @@
 """Prescribed motions of rigid bodies, one class a kind. SI units; x forwards, z up, the surface at z = 0.
 
-Turns are right-handed about their axes: about y, a body that hangs down and turns at a positive rate sweeps backwards. A
-heading is that of the motion along the ground, rad from x towards y.
+Rotations are right-handed about their axes: about y, a body that hangs down and rotates at a positive rate sweeps backwards.
+A heading is the direction of motion along the ground, rad from x towards y.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ Heading = Annotated[float, Number(-10, 10, "rad", "heading of the motion along t
 Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle about the axis, from the attitude, at one end of the motion")]
 
 
-class Passage(NamedTuple):
-    """A motion: times (T,), places (T, 3) of the origin, rotations (T, 3, 3), velocities (T, 3) and spins (T, 3), told in the
-    world. angle (T,): of bodies that turn about one axis."""
+class Trajectory(NamedTuple):
+    """A motion in time, in the world. t: (T,), s. place: (T, 3), of the origin, m. rotation: (T, 3, 3). velocity: (T, 3), of
+    the origin, m/s. spin: (T, 3), angular velocity, rad/s. angle: (T,), rad, of a body that rotates about one axis, else
+    0."""
 
     t: np.ndarray
     place: np.ndarray
@@ -43,7 +44,7 @@ class Passage(NamedTuple):
 class Drag(Motion):
     """Motion along a straight line without turning.
 
-    attitude (rad): how the body is held, a rotation vector, or an angle about y.
+    attitude (rad): orientation of the body, a rotation vector, or an angle about y.
     """
 
     depth: Depth
@@ -53,13 +54,12 @@ class Drag(Motion):
     distance: Distance = 0.1
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 51
-    angles = ("direction", "heading", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
-        _hold(self)
+        _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         return _straight(self, -self.depth, self.distance)
 
 
@@ -67,7 +67,7 @@ class Drag(Motion):
 class Penetrate(Motion):
     """Motion straight down, or on a slope, from where the lowest point touches the surface.
 
-    attitude (rad): how the body is held, a rotation vector, or an angle about y.
+    attitude (rad): orientation of the body, a rotation vector, or an angle about y.
     """
 
     depth: Annotated[float, metres("depth of the lowest point at the end", 1e-9)]
@@ -76,14 +76,13 @@ class Penetrate(Motion):
     speed: Speed = 0.01
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 51
-    angles = ("direction", "heading", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
         self.require_downwards()
-        _hold(self)
+        _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         lowest = float((mesh.vertices @ _matrix(self.attitude)[2]).min())
         return _straight(self, -lowest, self.depth / math.sin(self.direction))
 
@@ -92,8 +91,8 @@ class Penetrate(Motion):
 class Rotate(Motion):
     """Rotation about an axis through the origin, at a fixed height above the surface, which may also move along the ground.
 
-    axis (-): its direction, of any length but 0. attitude (rad): how the body is held, a rotation vector, or an angle
-    about y, before it turns.
+    axis (-): direction of the axis, of any length but 0. attitude (rad): orientation of the body at angle 0, a rotation
+    vector, or an angle about y.
     """
 
     hub_height: Height
@@ -107,7 +106,6 @@ class Rotate(Motion):
     heading: Heading = 0.0
     attitude: float | tuple[float, ...] = (0.0, 0.0, 0.0)
     samples: Samples = 361
-    angles = ("start", "stop", "heading", "attitude")
     turns = True
 
     def __post_init__(self):
@@ -115,19 +113,19 @@ class Rotate(Motion):
         self.require_turning()
         axis = real_array("axis", self.axis)
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
-        good = 1e-9 < size < 1e9
-        require(good, f"axis must be three numbers that are not all 0, such as [0, 1, 0], got {shown(self.axis)}")
+        valid = 1e-9 < size < 1e9
+        require(valid, f"axis must be three numbers that are not all 0, such as [0, 1, 0], got {shown(self.axis)}")
         object.__setattr__(self, "axis", tuple(axis.tolist()))
-        _hold(self)
+        _set_attitude(self)
 
-    def passage(self, mesh: Mesh) -> Passage:
+    def trajectory(self, mesh: Mesh) -> Trajectory:
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
-        rotation = _turned(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
-        velocity = np.broadcast_to(self.speed * _ahead(self.heading, 0.0), rotation.shape[:2])
+        rotation = rotations(angle[:, None] * axis).as_matrix() @ _matrix(self.attitude)
+        velocity = np.broadcast_to(self.speed * _unit_vector(self.heading, 0.0), rotation.shape[:2])
         place = velocity * t[:, None] + [0.0, 0.0, self.hub_height]
-        return Passage(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
+        return Trajectory(t, place, rotation, velocity, np.broadcast_to(self.rate * axis, velocity.shape), angle)
 
 
 @dataclass(frozen=True)
@@ -156,78 +154,84 @@ class Path(Motion):
             require(within, f"{name} must be finite and within {largest:g}{unit}")
         require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses, got {len(self.t)}")
         same = len(self.x) == len(self.y) == len(self.z) == len(self.t)
-        turned = {len(self.rx), len(self.ry), len(self.rz)} in ({0}, {len(self.t)})
-        require(same and turned, "t, x, y, z and rx, ry, rz must be equally many")
+        all_or_none = {len(self.rx), len(self.ry), len(self.rz)} in ({0}, {len(self.t)})
+        require(same and all_or_none, "t, x, y, z and rx, ry, rz must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
         require(not late.size, f"t must ascend, but t = {self.t[late[0]] if late.size else 0:g} is not before the next")
-        turns = self._rotations()
-        far = np.flatnonzero((turns[1:] * turns[:-1].inv()).magnitude() >= WIDEST)
-        told = f"the body turns by {WIDEST:g} rad or more after t = {self.t[far[0]] if far.size else 0:g}: give poses between"
-        require(not far.size, told)
+        rotation = self._rotations()
+        wide = np.flatnonzero((rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST)
+        after = f"after t = {self.t[wide[0]] if wide.size else 0:g}"
+        require(not wide.size, f"the body turns by {WIDEST:g} rad or more {after}: give poses between")
 
     @property
     def samples(self) -> int:
         return len(self.t)
 
     def _rotations(self) -> Rotation:
-        return _turned(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
+        """Return the rotations (T,) of the poses."""
+        return rotations(np.stack([self.rx, self.ry, self.rz], -1) if self.rx else np.zeros((len(self.t), 3)))
 
-    def passage(self, mesh: Mesh) -> Passage:
-        t, place, turns = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
+    def trajectory(self, mesh: Mesh) -> Trajectory:
+        t, place, rotation = np.array(self.t), np.stack([self.x, self.y, self.z], -1), self._rotations()
         velocity = np.gradient(place, t, axis=0, edge_order=2)
-        return Passage(t, place, turns.as_matrix(), velocity, _spins(t, turns), np.zeros_like(t))
+        return Trajectory(t, place, rotation.as_matrix(), velocity, _spins(t, rotation), np.zeros_like(t))
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
 
 
-def _turned(vectors) -> Rotation:
-    """By rotation vectors (..., 3)."""
-    from scipy.spatial.transform import Rotation  # which takes a fifth of a second to load
+def rotations(vectors) -> Rotation:
+    """Return the rotations (...,) by rotation vectors (..., 3), rad."""
+    from scipy.spatial.transform import Rotation  # loads in a fifth of a second
 
     return Rotation.from_rotvec(vectors)
 
 
-def _spins(t, turns: Rotation) -> np.ndarray:
-    """(T, 3), rad/s in the world: of the parabola through three rotation vectors, from each pose to it and its neighbours."""
-    at = np.arange(len(t))
-    some = np.clip(at - 1, 0, len(t) - 3)[:, None] + np.arange(3)
-    back = turns.inv()
-    vectors = np.stack([(turns[k] * back).as_rotvec() for k in some.T], 1)
+def _spins(t, rotation: Rotation) -> np.ndarray:
+    """Return the angular velocities (T, 3), rad/s in the world, of rotations at times t (T,).
+
+    At each time it is the slope of the parabola through three rotation vectors: from this rotation to itself and to its
+    neighbours."""
+    three = np.clip(np.arange(len(t)) - 1, 0, len(t) - 3)[:, None] + np.arange(3)
+    inverse = rotation.inv()
+    vectors = np.stack([(rotation[k] * inverse).as_rotvec() for k in three.T], 1)
     spins = 0.0
     for k in range(3):
-        i, j = (some[:, m] for m in range(3) if m != k)
-        slope = (2 * t - t[i] - t[j]) / ((t[some[:, k]] - t[i]) * (t[some[:, k]] - t[j]))
+        i, j = (three[:, m] for m in range(3) if m != k)
+        slope = (2 * t - t[i] - t[j]) / ((t[three[:, k]] - t[i]) * (t[three[:, k]] - t[j]))
         spins = spins + slope[:, None] * vectors[:, k]
     return spins
 
 
-def _hold(motion) -> None:
-    """Puts the attitude of a motion as a rotation vector."""
+def _set_attitude(motion) -> None:
+    """Store the attitude of a motion as a rotation vector; ValueError unless it is an angle or three numbers."""
     value = motion.attitude
     array = real_array("attitude", value)
-    good = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
-    told = "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad"
-    require(good, f"{told}, got {shown(value)}")
+    valid = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
+    message = "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad"
+    require(valid, f"{message}, got {shown(value)}")
     vector = array.tolist() if array.ndim else [0.0, float(array), 0.0]
     object.__setattr__(motion, "attitude", tuple(vector))
 
 
 def _matrix(vector) -> np.ndarray:
-    return _turned(vector).as_matrix()
+    """Return the matrix (3, 3) of a rotation vector."""
+    return rotations(vector).as_matrix()
 
 
-def _ahead(heading: float, direction: float) -> np.ndarray:
+def _unit_vector(heading: float, direction: float) -> np.ndarray:
+    """Return the unit vector (3,) with a heading along the ground and a direction below the horizontal, rad."""
     level = math.cos(direction)
-    way = np.array([level * math.cos(heading), level * math.sin(heading), -math.sin(direction)])
-    way[np.abs(way) < 1e-15] = 0.0  # straight down, or level, to the last digit
-    return way
+    along = np.array([level * math.cos(heading), level * math.sin(heading), -math.sin(direction)])
+    along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
+    return along
 
 
-def _straight(motion, z: float, distance: float) -> Passage:
-    way = _ahead(motion.heading, motion.direction)
+def _straight(motion, z: float, distance: float) -> Trajectory:
+    """Return a motion along a straight line of a length, m, from (0, 0, z)."""
+    along = _unit_vector(motion.heading, motion.direction)
     s = np.linspace(0.0, distance, motion.samples)
-    place = np.array([0.0, 0.0, z]) + s[:, None] * way
-    turn = np.broadcast_to(_matrix(motion.attitude), (len(s), 3, 3))
-    velocity = np.broadcast_to(motion.speed * way, place.shape)
-    return Passage(s / motion.speed, place, turn, velocity, np.zeros_like(place), np.zeros_like(s))
+    place = np.array([0.0, 0.0, z]) + s[:, None] * along
+    rotation = np.broadcast_to(_matrix(motion.attitude), (len(s), 3, 3))
+    velocity = np.broadcast_to(motion.speed * along, place.shape)
+    return Trajectory(s / motion.speed, place, rotation, velocity, np.zeros_like(place), np.zeros_like(s))

@@ -1,17 +1,18 @@
-"""Meshes made from a few sizes (m): sphere, cylinder, screw, leg. All are closed; the origin is their middle, or the hip."""
+"""Closed meshes of bodies with a few sizes, m: sphere, cylinder, screw, capsule, box, leg. The origin is the middle, or the
+hip of a leg."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rft.checks import in_range, require
-from rft.meshes.mesh import Mesh, halved
+from rft.meshes.mesh import Mesh, subdivided
 
 
 def sphere(radius: float, fineness: int = 4) -> Mesh:
-    """An icosahedron whose triangles are cut in four ``fineness`` (0 to 7) times, with corners on the sphere: 20 4^fineness
-    triangles of nearly equal size."""
-    _sizes(radius=radius)
+    """Return a sphere of 20 4^fineness triangles of nearly equal size: an icosahedron cut ``fineness`` (0 to 7) times, with
+    all corners on the sphere."""
+    _check_sizes(radius=radius)
     in_range("fineness", fineness, 0, 7, whole=True)
     g = (1 + 5**0.5) / 2
     vertices = np.array([
@@ -29,16 +30,15 @@ def sphere(radius: float, fineness: int = 4) -> Mesh:
 
 
 def _quartered(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every triangle cut in four at the middles of its edges, all on one sphere."""
+    """Return vertices and faces with every triangle cut in four at the middles of its edges, all on one sphere."""
     size = np.linalg.norm(vertices[0])
-    vertices, faces = halved(vertices, faces)
+    vertices, faces = subdivided(vertices, faces)
     return vertices * (size / np.linalg.norm(vertices, axis=-1, keepdims=True)), faces
 
 
 def cylinder(radius: float, length: float, around: int = 64, along: int = 32, across: int = 8) -> Mesh:
-    """Along y, as the rods that are dragged along x are; so many triangles around, along and from rim to middle of the
-    end faces."""
-    _sizes(radius=radius, length=length)
+    """Return a cylinder along y. around, along, across: numbers of quadrilaterals, the last from rim to middle of an end."""
+    _check_sizes(radius=radius, length=length)
     turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
     circle = np.stack([np.cos(turn), 0 * turn, -np.sin(turn)], -1)
     y = length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1)
@@ -49,23 +49,23 @@ def screw(
     radius: float, core: float, pitch: float, length: float, around: int = 64, along: int = 128, across: int = 6,
     nose: float = 0.0,
 ) -> Mesh:  # fmt: skip
-    """A right-handed Archimedean screw along x: a core with one thread of a smooth profile, as high as ``radius`` - ``core``
-    and ``pitch`` from turn to turn, and with ends that are points ``nose`` beyond it."""
-    _sizes(radius=radius, core=core, pitch=pitch, length=length)
+    """Return a right-handed Archimedean screw along x: a core with one thread of a smooth profile, ``radius`` - ``core``
+    high and ``pitch`` from turn to turn, and cones of length ``nose`` at its ends."""
+    _check_sizes(radius=radius, core=core, pitch=pitch, length=length)
     require(core < radius, f"core must be less than the radius, got {core:g} and {radius:g}")
     turn = 2 * np.pi * np.arange(_count("around", around, 3)) / around
     rings = []
     for x in length * np.linspace(-0.5, 0.5, _count("along", along, 1) + 1):
-        height = np.exp(6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0))  # of the profile; its sharpness is assumed
+        height = np.exp(6.0 * (np.cos(turn - 2 * np.pi * x / pitch) - 1.0))  # profile; the sharpness 6 is assumed
         r = core + (radius - core) * height
         rings.append(np.stack([np.full_like(turn, x), r * np.cos(turn), r * np.sin(turn)], -1))
     return _tube(np.array(rings), _count("across", across, 1), nose)
 
 
 def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mesh:
-    """A rod along z of length 2 ``half`` with a half sphere at either end, so many triangles around and along the rod. Its
-    poles are cut off flat within a quarter of a triangle's angle of the axis."""
-    _sizes(radius=radius, half=half)
+    """Return a rod along z of length 2 ``half`` with a half sphere at either end. around, along: numbers of quadrilaterals.
+    Its poles are cut off flat within a quarter of a triangle's angle of the axis."""
+    _check_sizes(radius=radius, half=half)
     turn = 2 * np.pi * np.arange(_count("around", around, 4)) / around
     polar = np.linspace(0.25, around / 4, max(2, around // 4)) * 2 * np.pi / around
     z = [-half - radius * np.cos(polar), np.linspace(-half, half, _count("along", along, 1) + 1)[1:-1]]
@@ -75,7 +75,7 @@ def capsule(radius: float, half: float, around: int = 24, along: int = 4) -> Mes
 
 
 def box(sides, m: int = 1) -> Mesh:
-    """Along the axes, about the origin; each face cut into m x m rectangles."""
+    """Return a box along the axes, about the origin, with each face cut into m x m rectangles."""
     half = np.asarray(sides, float) / 2
     s, points, faces = np.arange(-_count("m", m, 1), m + 1, 2) / m, [], []
     for axis in range(3):
@@ -85,37 +85,38 @@ def box(sides, m: int = 1) -> Mesh:
             a, b, c, d = n[:-1, :-1].ravel(), n[1:, :-1].ravel(), n[1:, 1:].ravel(), n[:-1, 1:].ravel()
             points.append(np.roll(np.stack([out + 0 * u, u, v], -1).reshape(-1, 3), axis, 1) * half)
             faces += [np.stack([a, b, c], -1), np.stack([a, c, d], -1)]
-    vertices, where = np.unique(np.concatenate(points), axis=0, return_inverse=True)
-    return Mesh(vertices, where.reshape(-1)[np.concatenate(faces)])
+    vertices, index = np.unique(np.concatenate(points), axis=0, return_inverse=True)
+    return Mesh(vertices, index.reshape(-1)[np.concatenate(faces)])
 
 
 def leg(
     reach: float, curvature: float, thickness: float, width: float, along: int = 64, across: int = 8, thick: int = 2
 ) -> Mesh:
-    """A strip that hangs from the hip, at the origin, to (0, 0, -2 reach), bent to an arc of 1/r = ``curvature`` / reach,
-    -1 (a half circle that opens forwards) to 1 (backwards), 0 for a flat leg; the c-leg of the paper's Fig. 8(b) has
-    ``curvature`` 1. So many quadrilaterals along it, across its width and through its thickness."""
-    _sizes(reach=reach, thickness=thickness, width=width)
+    """Return a strip that hangs from the hip, at the origin, to (0, 0, -2 reach), bent to an arc of radius reach / curvature.
+
+    curvature: -1 (a half circle that opens forwards) to 1 (backwards, the c-leg of the paper's Fig. 8(b)), 0 for a flat leg.
+    along, across, thick: numbers of quadrilaterals along the strip, across its width and through its thickness."""
+    _check_sizes(reach=reach, thickness=thickness, width=width)
     in_range("curvature", curvature, -1, 1)
     require(thickness < reach, f"thickness must be less than the reach, got {thickness:g} and {reach:g}")
     s = np.linspace(-1.0, 1.0, _count("along", along, 2) + 1)
     half = np.arcsin(abs(curvature))
-    bend = np.sign(curvature) * half * s  # of the strip's direction from straight down
+    bend = np.sign(curvature) * half * s  # angle of the strip's direction from straight down
     if half:
         r = reach / np.sin(half)
         x, z = np.sign(curvature) * r * (np.cos(half * s) - np.cos(half)), -reach - r * np.sin(half * s)
     else:
         x, z = 0 * s, -reach - reach * s
-    out = np.stack([np.cos(bend), 0 * s, -np.sin(bend)], -1)  # across the strip, forwards
+    normal = np.stack([np.cos(bend), 0 * s, -np.sin(bend)], -1)  # through the strip, forwards
     corners = _rectangle(thickness, width, _count("thick", thick, 1), _count("across", across, 1))
     rings = (
-        np.stack([x, 0 * s, z], -1)[:, None] + corners[None, :, :1] * out[:, None] + corners[:, 1:] * [0.0, 1.0, 0.0]
+        np.stack([x, 0 * s, z], -1)[:, None] + corners[None, :, :1] * normal[:, None] + corners[:, 1:] * [0.0, 1.0, 0.0]
     )
     return _tube(rings, max(1, round(across / 2)))
 
 
 def _rectangle(a: float, b: float, m: int, n: int) -> np.ndarray:
-    """(2 m + 2 n, 2): points around a rectangle a x b, counter-clockwise."""
+    """Return points (2 m + 2 n, 2) around a rectangle a x b, counter-clockwise."""
     u, v = np.linspace(-0.5, 0.5, m + 1)[:-1], np.linspace(-0.5, 0.5, n + 1)[:-1]
     low, high = np.full(m, 0.5), np.full(n, 0.5)
     sides = [(u, -low), (high, v), (-u, low), (-high, -v)]
@@ -123,8 +124,8 @@ def _rectangle(a: float, b: float, m: int, n: int) -> np.ndarray:
 
 
 def _tube(rings: np.ndarray, across: int, nose: float = 0.0) -> Mesh:
-    """A closed mesh through rings (M, K, 3) of points, with ends of ``across`` smaller rings and a point in the middle, which
-    is ``nose`` further out along x."""
+    """Return a closed mesh through rings (M, K, 3) of points. Each end has ``across`` - 1 smaller rings and a point in the
+    middle, ``nose`` further out along x."""
     share = np.linspace(0.0, 1.0, across + 1)[1:-1][:, None, None]
     first, last = rings[0], rings[-1]
     near, far = first.mean(0) - [nose, 0.0, 0.0], last.mean(0) + [nose, 0.0, 0.0]
@@ -133,16 +134,16 @@ def _tube(rings: np.ndarray, across: int, nose: float = 0.0) -> Mesh:
     i = np.arange(m * k).reshape(m, k)
     tip, end, ahead = m * k, m * k + 1, np.roll(np.arange(k), -1)
     faces = [
-        between(i),
+        triangles(i),
         np.stack([np.full(k, tip), ahead, np.arange(k)], -1),
         np.stack([np.full(k, end), i[-1], i[-1][ahead]], -1),
     ]  # fmt: skip
     return outward(np.concatenate([rings.reshape(-1, 3), [near, far]]), np.concatenate(faces))
 
 
-def between(rows: np.ndarray, closed: bool = True) -> np.ndarray:
-    """(F, 3): two triangles for each quadrilateral between one row of vertices (M, K) and the next; closed: whether a row's
-    last vertex is followed by its first."""
+def triangles(rows: np.ndarray, closed: bool = True) -> np.ndarray:
+    """Return two triangles (F, 3) for each quadrilateral between neighbouring rows of vertices (M, K). closed: whether the
+    last vertex of a row is a neighbour of its first."""
     ahead = np.roll(rows, -1, 1) if closed else rows[:, 1:]
     rows = rows if closed else rows[:, :-1]
     a, b, c, d = (x.ravel() for x in (rows[:-1], ahead[:-1], ahead[1:], rows[1:]))
@@ -150,17 +151,19 @@ def between(rows: np.ndarray, closed: bool = True) -> np.ndarray:
 
 
 def outward(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    """The closed mesh of triangles that agree on which side is out, turned round if that is the inside."""
+    """Return the closed mesh of triangles that agree on which side is out, reversed if that is the inside."""
     corner = vertices[faces]
     inside_out = (corner[:, 0] * np.cross(corner[:, 1], corner[:, 2])).sum() < 0
     return Mesh(vertices, faces[:, ::-1] if inside_out else faces)
 
 
-def _sizes(**sizes: float) -> None:
+def _check_sizes(**sizes: float) -> None:
+    """Raise ValueError for lengths out of range, m."""
     for name, value in sizes.items():
         in_range(name, value, 1e-6, 1e3)
 
 
 def _count(name: str, value: int, low: int) -> int:
+    """Return a number of quadrilaterals; ValueError if it is out of range."""
     in_range(name, value, low, 4096, whole=True)
     return int(value)

@@ -1,4 +1,4 @@
-"""Solid bodies, one class a kind; sizes in m. Each gives its `Mesh` of about so many triangles."""
+"""Solid bodies as meshes, one class a kind; sizes in m."""
 
 from __future__ import annotations
 
@@ -16,45 +16,45 @@ from rft.meshes.mesh import MOST, Mesh, mirrored, quartered, read
 from rft.meshes.smooth import smooth
 from rft.metres import metres
 
-FINEST = 327_680  # triangles that a body is compared to
+FINEST = 327_680  # triangles of the mesh that stands for the truth in studies of accuracy
 HANDS = ("right", "left")
-MOST_TURNS = 100  # of a thread: more need more triangles than there are
+MOST_TURNS = 100  # of a thread: more turns need more than `MOST` triangles
 
 
 class Solid:
-    """Base of bodies: a mesh, and the numbers of triangles that are tried, and at last the truth, where one asks how many
-    are enough."""
+    """Base of bodies that have a mesh."""
 
     def __post_init__(self):
         check_numbers(self)
 
     def mesh(self, triangles: int = 5000) -> Mesh:
-        """Of about so many triangles, and at least those that the body takes."""
+        """Return the mesh of about ``triangles`` triangles, at least as many as the body needs, with smooth normals."""
         in_range("triangles", triangles, 1, MOST, whole=True)
-        made = self.made(int(triangles))
-        return smooth(made) if made.bends is None else made
+        mesh = self.build(int(triangles))
+        return smooth(mesh) if mesh.smooth_normals is None else mesh
 
-    def made(self, triangles: int) -> Mesh:
-        """Of flat triangles, or with the normals of its surface."""
+    def build(self, triangles: int) -> Mesh:
+        """Return the mesh, of flat triangles or with the normals of the body's exact surface."""
         raise NotImplementedError
 
     @property
     def ladder(self) -> tuple[int, ...]:
+        """Numbers of triangles that a study of accuracy computes with, the last of them for the truth."""
         return (*(80 * 4**k for k in range(5)), FINEST)
 
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A ball about the origin; its triangles are 20, 80, 320, ..., 327680, the next number from the one required."""
+    """A ball about the origin, of 20, 80, 320, ..., or 327680 triangles: the least that are enough for ``triangles``."""
 
     radius: Annotated[float, metres("radius of the sphere")]
 
     def mesh(self, triangles: int = 5000) -> Mesh:
         in_range("triangles", triangles, 1, MOST, whole=True)
-        flat = self.made(int(triangles))
-        return dataclasses.replace(flat, bends=flat.vertices[flat.faces] / self.radius)
+        flat = self.build(int(triangles))
+        return dataclasses.replace(flat, smooth_normals=flat.vertices[flat.faces] / self.radius)
 
-    def made(self, triangles: int) -> Mesh:
+    def build(self, triangles: int) -> Mesh:
         return shapes.sphere(self.radius, min(7, max(0, math.ceil(math.log(triangles / 20, 4) - 0.01))))
 
 
@@ -65,9 +65,9 @@ class Cylinder(Solid):
     radius: Annotated[float, metres("radius of the rod")]
     length: Annotated[float, metres("length along y")]
 
-    def made(self, triangles: int) -> Mesh:
+    def build(self, triangles: int) -> Mesh:
         size = math.sqrt(4 * math.pi * self.radius * (self.length + 2 * self.radius) / triangles)
-        counts = _divided(size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1))
+        counts = _divisions(size, (2 * math.pi * self.radius, 8), (self.length, 1), (self.radius, 1))
         return shapes.cylinder(self.radius, self.length, *counts)
 
 
@@ -93,20 +93,20 @@ class Screw(Solid):
     def __post_init__(self):
         super().__post_init__()
         require(self.core < self.radius, f"core must be less than the radius, got {self.core:g} and {self.radius:g}")
-        told = f"{self.thickness:g} and {self.pitch:g}"
-        told = f"thickness must be 0, or from a thousandth of the pitch to less than that, got {told}"
-        require(self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch, told)
+        message = "thickness must be 0, or from a thousandth of the pitch to less than that"
+        within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
+        require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
         require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {shown(self.handed)}")
         require(self.turns <= MOST_TURNS, f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}: length / pitch")
 
     @property
     def turns(self) -> float:
-        """Of the thread, from end to end."""
+        """Number of turns of the thread from end to end."""
         return self.length / self.pitch
 
     @property
     def sense(self) -> float:
-        """1 or -1: the sign of the rate about x at which it drives to +x."""
+        """Sign, 1 or -1, of the rate about x at which the screw drives to +x."""
         return 1.0 if self.handed == "right" else -1.0
 
     @property
@@ -114,13 +114,15 @@ class Screw(Solid):
         """The screw of the other hand."""
         return dataclasses.replace(self, handed="left" if self.handed == "right" else "right")
 
-    def made(self, triangles: int) -> Mesh:
+    def build(self, triangles: int) -> Mesh:
         right = self._bladed(triangles) if self.thickness else self._smooth(triangles)
         return right if self.handed == "right" else mirrored(right)
 
     def _smooth(self, triangles: int) -> Mesh:
         size = math.sqrt(4 * math.pi * self.core * (self.length + 2 * self.core) / triangles)
-        counts = _divided(size, (2 * math.pi * self.core, 12), (self.length, 4), (math.hypot(self.core, self.nose), 1))
+        counts = _divisions(
+            size, (2 * math.pi * self.core, 12), (self.length, 4), (math.hypot(self.core, self.nose), 1)
+        )
         return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts, self.nose)
 
     def _bladed(self, triangles: int) -> Mesh:
@@ -128,13 +130,13 @@ class Screw(Solid):
         edge, slant = self.length * math.hypot(1.0, slope), math.hypot(self.core, self.nose)
         sides = edge * (2 * math.pi * self.core + 2 * high + self.thickness) + 2 * math.pi * self.core * slant
         lengths = (2 * math.pi * self.core, 8), (edge, 8), (slant, 1), (high, 1), (self.thickness * slope, 1)
-        counts = _divided(math.sqrt(2 * sides / triangles), *lengths)
+        counts = _divisions(math.sqrt(2 * sides / triangles), *lengths)
         return blade(self.radius, self.core, self.pitch, self.length, self.thickness, self.nose, *counts)
 
 
 @dataclass(frozen=True)
 class Leg(Solid):
-    """The c-leg of the vertical plane, extruded across it: hip at the origin, its free end at z = -2 R below."""
+    """The c-leg of the vertical plane, extruded across it: hip at the origin, free end at z = -2 R."""
 
     radius: Annotated[float, metres("R, half the distance from hip to free end")]
     width: Annotated[float, metres("width across the plane, along y")]
@@ -150,14 +152,14 @@ class Leg(Solid):
 
     def __post_init__(self):
         super().__post_init__()
-        told = f"thickness must be less than the radius, got {self.thickness:g} and {self.radius:g}"
-        require(self.thickness < self.radius, told)
+        message = f"thickness must be less than the radius, got {self.thickness:g} and {self.radius:g}"
+        require(self.thickness < self.radius, message)
 
-    def made(self, triangles: int) -> Mesh:
+    def build(self, triangles: int) -> Mesh:
         bend = math.asin(abs(self.relative_curvature))
         length = 2 * self.radius * (bend / math.sin(bend) if bend else 1.0)
         size = math.sqrt(4 * length * (self.width + self.thickness) / triangles)
-        counts = _divided(size, (length, 4), (self.width, 1), (self.thickness, 1))
+        counts = _divisions(size, (length, 4), (self.width, 1), (self.thickness, 1))
         return shapes.leg(self.radius, -self.relative_curvature, self.thickness, self.width, *counts)
 
 
@@ -165,11 +167,11 @@ class Leg(Solid):
 class MeshFile(Solid):
     """The mesh of an STL, OBJ or PLY file (needs trimesh), in its own frame.
 
-    file (-): its name; in a scene file, from the folder of that. closed (-): whether it has an inside, which is then
-    required; of an open one either side may lead. smooth (-): whether its triangles stand for a curved surface, with edges
-    where they meet at more than 40 degrees.
+    file (-): name of the file; in a scene file, from the scene's folder. closed (-): whether the mesh must have an inside;
+    of an open one either side may lead. smooth (-): whether the triangles stand for a curved surface, with edges where they
+    meet at more than 40 degrees.
 
-    More triangles than it has come of cutting each in four; its form stays.
+    For more triangles than the file has, each is cut in four; the form stays.
     """
 
     file: str
@@ -195,14 +197,14 @@ class MeshFile(Solid):
 
     @property
     def ladder(self) -> tuple[int, ...]:
-        own = len(self._mesh.faces)
-        finer = [own * 4**k for k in range(8) if own * 4**k <= max(FINEST, own)]
-        return (*finer[:-1], finer[-1]) if len(finer) > 1 else (own, own)
+        coarsest = len(self._mesh.faces)
+        ladder = [coarsest * 4**k for k in range(8) if coarsest * 4**k <= max(FINEST, coarsest)]
+        return tuple(ladder) if len(ladder) > 1 else (coarsest, coarsest)
 
 
 SOLIDS = {"sphere": Sphere, "cylinder": Cylinder, "screw": Screw, "c-leg": Leg}
 
 
-def _divided(size: float, *lengths: tuple[float, int]) -> list[int]:
-    """How many pieces of a size each length is cut into, at least the number beside it."""
+def _divisions(size: float, *lengths: tuple[float, int]) -> list[int]:
+    """Return the number of pieces of about ``size``, m, in each length, at least the number given with it."""
     return [int(np.clip(round(length / size), fewest, 4096)) for length, fewest in lengths]

@@ -1,8 +1,8 @@
 """The stress map of a medium from measurements (Sec. II B): its strength zeta from a plate pushed straight down, or its nine
 coefficients from plates dragged at many tilts and directions.
 
-The map is linear in its coefficients, so both are linear least squares. What drags do not tell is held near the shape of the
-generic set: c = s M0 + d with any strength s, and d of the size `SPREAD` of it.
+The map is linear in its coefficients, so both are linear least squares. Coefficients that the drags do not determine stay
+near the shape of the generic set: c = s M0 + d with any strength s, and d of about `SPREAD` s.
 """
 
 from __future__ import annotations
@@ -17,22 +17,24 @@ from rft.checks import in_range, real_array, require
 from rft.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
 GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
-SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times what the named media with nine of their own stray by at most
+SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times the most that named media with own coefficients differ by
 DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
 FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
 MOST = 100_000
-LARGEST = 1e12  # of any number; what is below 1 over it counts as 0
-STRENGTHS = (0.01, 100.0)  # of zeta: more than a factor of 20 beyond all named media is a slip of units
+LARGEST = 1e12  # of any number; numbers below 1 / LARGEST count as 0
+STRENGTHS = (0.01, 100.0)  # bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
 EXACT = 1e-6  # least noise, over zeta
-STRAY = 0.5  # rms of what the generic shape leaves of drags, over theirs, from which on slips are looked for
+STRAY = 0.5  # misfit of the generic shape, rms over that of the drags, from which on slips are looked for
 
 
 @dataclass(frozen=True, eq=False)
 class StressFit:
-    """Nine coefficients fitted to plate drags. values: (9,), of `COEFFICIENTS`, N/cm^3. covariance: (9, 9), with the scatter
-    about the map as noise. resolution: (9,), the share of each that comes from the data; the rest is the generic shape.
-    zeta: strength of the generic set that comes nearest. residuals: (2, N), measured minus fitted alpha_x, alpha_z.
-    noise: their standard deviation; free: its degrees of freedom."""
+    """Nine coefficients fitted to plate drags.
+
+    values: (9,), the `COEFFICIENTS`, N/cm^3. covariance: (9, 9), with the scatter about the map as noise. resolution:
+    (9,), the share of each coefficient that comes from the data; the rest comes from the generic shape. zeta: strength of
+    the nearest generic set. residuals: (2, N), measured minus fitted alpha_x, alpha_z, N/cm^3. noise: standard deviation
+    of the residuals. free: its degrees of freedom."""
 
     values: np.ndarray
     covariance: np.ndarray
@@ -44,16 +46,17 @@ class StressFit:
 
     @property
     def stress(self) -> StressMap:
+        """The fitted map."""
         return StressMap(**dict(zip(COEFFICIENTS, self.values.tolist())))
 
     @property
     def errors(self) -> np.ndarray:
-        """(9,), standard errors."""
+        """Standard errors (9,), N/cm^3."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def intervals(self) -> np.ndarray:
-        """(9, 2), each with 95 %."""
+        """Intervals (9, 2) of 95 %, N/cm^3."""
         return self.values[:, None] + widening(self.free) * self.errors[:, None] * [-1.0, 1.0]
 
     @property
@@ -62,7 +65,7 @@ class StressFit:
         return [name for name, share in zip(COEFFICIENTS, self.resolution) if share < DETERMINED]
 
     def least_known(self) -> tuple[float, float]:
-        """(beta, gamma), radians in steps of 15 degrees, at which the covariance leaves the map most open."""
+        """Return the (beta, gamma), rad in steps of 15 degrees, at which the map has the largest variance."""
         line = np.radians(np.arange(-90, 91, 15))
         beta, gamma = (x.ravel() for x in np.meshgrid(line[1:], line, indexing="ij"))
         design = _design(beta, gamma).reshape(2, beta.size, -1)
@@ -72,8 +75,10 @@ class StressFit:
 
 @dataclass(frozen=True, eq=False)
 class ZetaFit:
-    """Strength from a plate pushed straight down. error: its standard error, from the scatter about the straight line and how
-    neighbours scatter alike. depth (m), force, law (N): (N,), what was below the surface, in the order of depth. zero,
+    """Strength fitted to a plate pushed straight down.
+
+    error: standard error of zeta, from the scatter about the law and the correlation of neighbouring residuals. free: its
+    degrees of freedom. depth (m), force, law (N): (N,), the rows below the surface in the order of depth. zero,
     zero_error: depth where the best straight line of stress against depth is zero, m; the law has 0."""
 
     zeta: float
@@ -87,45 +92,47 @@ class ZetaFit:
 
     @property
     def stress(self) -> StressMap:
+        """The fitted map."""
         return StressMap(zeta=self.zeta)
 
     @property
     def interval(self) -> np.ndarray:
-        """(2,), with 95 %."""
+        """Interval (2,) of 95 % of zeta."""
         return self.zeta + widening(self.free) * self.error * np.array([-1.0, 1.0])
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
-    """The nine coefficients from (N,) plate drags: angles in radians, stresses per depth in N/cm^3.
+    """Return the nine coefficients fitted to (N,) plate drags: angles in radians, stresses per depth in N/cm^3.
 
-    Least squares with the departure from the generic shape held to `SPREAD`; the noise is estimated beside it, one for
-    both components. ValueError for drags that no grains have, naming the slip of columns, signs or units that explains it."""
+    Least squares with a prior of `SPREAD` on the difference from the generic shape; the noise, one number for both
+    components, is estimated with it. ValueError for drags that no grains have, with the slip of columns, signs or units
+    that explains them."""
     rows = _drags(beta, gamma, alpha_x, alpha_z)
     design, y = _design(*rows[:2]), rows[2:].ravel()
-    zeta, left = _generic(design, y)
-    _check_slips(rows, left)
+    zeta, misfit = _generic(design, y)
+    _check_slips(rows, misfit)
     check_strength(zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of those in N/m^3)")
     unit = GENERIC / np.linalg.norm(GENERIC)
-    hold = (np.eye(len(unit)) - np.outer(unit, unit)) / (SPREAD * zeta)
-    noise = max(left * np.sqrt(np.mean(y * y)), EXACT * zeta)
+    prior = (np.eye(len(unit)) - np.outer(unit, unit)) / (SPREAD * zeta)
+    noise = max(misfit * np.sqrt(np.mean(y * y)), EXACT * zeta)
     for _ in range(100):
-        values, covariance, told = _solve(design, y, hold, noise)
-        free = len(y) - np.trace(told)
+        values, covariance, resolution = _solve(design, y, prior, noise)
+        free = len(y) - np.trace(resolution)
         last, noise = noise, max(math.sqrt(np.sum((y - design @ values) ** 2) / free), EXACT * zeta)
         if abs(noise - last) <= 1e-9 * last:
             break
     residuals = (y - design @ values).reshape(2, -1)
-    return StressFit(values, covariance, np.diag(told), zeta, residuals, noise, float(free))
+    return StressFit(values, covariance, np.diag(resolution), zeta, residuals, noise, float(free))
 
 
 def fit_zeta(depth, force, area) -> ZetaFit:
-    """zeta from (N,) forces (N, upwards) on a level plate of ``area`` (m^2, one or (N,)) pushed straight down to ``depth`` (m):
-    F = zeta alpha_z(0, 90 degrees) |z| A. Rows above the surface are left out."""
+    """Return zeta fitted to (N,) forces, N upwards, on a level plate of ``area``, m^2, one number or (N,), that is pushed
+    straight down to ``depth``, m: F = zeta alpha_z(0, 90 degrees) |z| A. Rows above the surface do not count."""
     depth, force, area = (np.atleast_1d(real_array(*x)) for x in (("depth", depth), ("force", force), ("area", area)))
     require(depth.ndim == 1 and depth.shape == force.shape, "depth and force must be equally many numbers")
     require(area.shape in ((1,), depth.shape), "area must be one number, or as many as depths")
-    small = all(bool((np.abs(x) <= LARGEST).all()) for x in (depth, force, area))
-    require(small, f"depths, forces and areas must be finite numbers of at most {LARGEST:g}")
+    within = all(bool((np.abs(x) <= LARGEST).all()) for x in (depth, force, area))
+    require(within, f"depths, forces and areas must be finite numbers of at most {LARGEST:g}")
     require(bool((area >= 1 / LARGEST).all()), "the area of the plate must be above 0")
     order = np.argsort(depth, kind="stable")
     order = order[depth[order] > 1 / LARGEST]
@@ -136,21 +143,21 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
     require(zeta > 0, "the force is against the law: it must be positive where grains push the plate upwards")
     check_strength(zeta, "depth in m, force in N, area in m^2")
-    left = f - zeta * per_zeta
-    error = math.sqrt((left @ left) / (len(f) - 1) / (per_zeta @ per_zeta))
-    error = max(error * _alike(left), EXACT**2 * zeta)
+    residuals = f - zeta * per_zeta
+    error = math.sqrt((residuals @ residuals) / (len(f) - 1) / (per_zeta @ per_zeta))
+    error = max(error * _correlation_factor(residuals), EXACT**2 * zeta)
     return ZetaFit(zeta, error, float(len(f) - 1), d, f, zeta * per_zeta, *_zero(d, f / a))
 
 
 def check_strength(zeta: float, units: str) -> None:
-    """ValueError if zeta is that of no grains."""
+    """Raise ValueError if no grains have this zeta; the message names the right units."""
     low, high = STRENGTHS
-    told = f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): check the units, {units}"
-    require(low <= zeta <= high, told)
+    message = f"zeta = {zeta:.3g} is that of no grains ({low:g} to {high:g}): check the units, {units}"
+    require(low <= zeta <= high, message)
 
 
 def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
-    """(4, N)."""
+    """Return the drags as rows (4, N); ValueError for wrong lengths, too few or too many, or numbers out of range."""
     names = ("beta", "gamma", "alpha_x", "alpha_z")
     rows = [np.atleast_1d(real_array(name, x)) for name, x in zip(names, (beta, gamma, alpha_x, alpha_z))]
     same = all(x.ndim == 1 and x.shape == rows[0].shape for x in rows)
@@ -163,13 +170,13 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
 
 
 def _design(beta, gamma) -> np.ndarray:
-    """(2 N, 9): what each coefficient adds to alpha_x, then to alpha_z, wherever the angles lie."""
-    alone = [StressMap(**dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0}) for name in COEFFICIENTS]
-    return np.stack([np.concatenate(stress(beta, gamma)) for stress in alone], -1)
+    """Return the derivatives (2 N, 9) of alpha_x, then of alpha_z, by the coefficients, at any angles (N,)."""
+    unit_maps = [StressMap(**dict.fromkeys(COEFFICIENTS, 0.0) | {name: 1.0}) for name in COEFFICIENTS]
+    return np.stack([np.concatenate(stress(beta, gamma)) for stress in unit_maps], -1)
 
 
 def _generic(design, y) -> tuple[float, float]:
-    """(zeta, what the generic set times it leaves, rms over that of the drags)."""
+    """Return zeta of the nearest generic set, and the rms of its residuals over that of the drags ``y``."""
     shape = design @ GENERIC
     zeta = float(shape @ y / (shape @ shape))
     return zeta, float(np.sqrt(np.mean((y - max(zeta, 0.0) * shape) ** 2) / np.mean(y * y)))
@@ -188,40 +195,40 @@ SLIPS = {
 }
 
 
-def _check_slips(rows, left: float) -> None:
-    """ValueError if the drags are far from the shape that all grains have (Fig. 7), and a slip explains it."""
-    if left < STRAY:
+def _check_slips(rows, misfit: float) -> None:
+    """Raise ValueError if the drags are far from the shape that all grains have (Fig. 7), and a slip explains it."""
+    if misfit < STRAY:
         return
-    tried = {}
-    for slip, undone in SLIPS.items():
-        b, g, x, z = undone(*rows)
-        tried[slip] = _generic(_design(b, g), np.concatenate([x, z]))[1]
-    best = min(tried, key=tried.get)
-    told = f"these drags are like those of no grains, but would be if {best}"
-    require(tried[best] > left / 2, told)
+    misfits = {}
+    for slip, undo in SLIPS.items():
+        b, g, x, z = undo(*rows)
+        misfits[slip] = _generic(_design(b, g), np.concatenate([x, z]))[1]
+    best = min(misfits, key=misfits.get)
+    require(misfits[best] > misfit / 2, f"these drags are like those of no grains, but would be if {best}")
 
 
-def _solve(design, y, hold, noise: float):
-    """(values, covariance, share of the data in the values (9, 9)) of a given noise."""
-    rows = np.concatenate([design / noise, hold])
+def _solve(design, y, prior, noise: float):
+    """Return values (9,), covariance (9, 9) and resolution (9, 9), the data's share in the values, for a noise."""
+    rows = np.concatenate([design / noise, prior])
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     root = vt.T / s
     return root @ (u[: len(y)].T @ (y / noise)), root @ root.T, root @ (u[: len(y)].T @ design) / noise
 
 
-def _alike(left) -> float:
-    """How much wider neighbours that scatter alike make a standard error."""
-    size = left @ left
-    alike = min(max(float(left[1:] @ left[:-1] / size), 0.0), 0.99) if size else 0.0
-    return math.sqrt((1 + alike) / (1 - alike))
+def _correlation_factor(residuals) -> float:
+    """Return the factor of a standard error by which correlated neighbouring residuals widen it."""
+    size = residuals @ residuals
+    correlation = min(max(float(residuals[1:] @ residuals[:-1] / size), 0.0), 0.99) if size else 0.0
+    return math.sqrt((1 + correlation) / (1 - correlation))
 
 
 def _zero(depth, stress) -> tuple[float, float]:
-    """Depth at which the best straight line is zero, and its standard error (m); nan if there is no line."""
+    """Return the depth at which the best straight line is zero, and its standard error, m; nan if there is no line."""
     if np.ptp(depth) == 0:
         return math.nan, math.nan
     rows = np.stack([depth, np.ones_like(depth)], -1)
-    (slope, at), *_ = np.linalg.lstsq(rows, stress, rcond=None)
-    left = stress - rows @ [slope, at]
-    spread = math.sqrt((left @ left) / (len(depth) - 2) * np.linalg.inv(rows.T @ rows)[1, 1]) * _alike(left)
-    return (-float(at / slope), float(abs(spread / slope))) if slope else (math.nan, math.nan)
+    (slope, intercept), *_ = np.linalg.lstsq(rows, stress, rcond=None)
+    residuals = stress - rows @ [slope, intercept]
+    variance = (residuals @ residuals) / (len(depth) - 2) * np.linalg.inv(rows.T @ rows)[1, 1]
+    error = math.sqrt(variance) * _correlation_factor(residuals)
+    return (-float(intercept / slope), float(abs(error / slope))) if slope else (math.nan, math.nan)

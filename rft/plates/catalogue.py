@@ -11,7 +11,7 @@ LI = "Li, Zhang and Goldman, Science 339, 1408 (2013), Table S2"
 
 @dataclass(frozen=True)
 class VerticalEntry:
-    """A named medium of the vertical plane and where its numbers come from."""
+    """A named medium of the vertical plane and the source of its numbers."""
 
     stress: StressMap
     source: str
@@ -24,7 +24,8 @@ def _scaled(zeta: float, grains: str) -> VerticalEntry:
 LOOSE = StressMap(0.051, 0.047, 0.053, 0.083, 0.020, -0.026, 0.057, 0.0, 0.025)
 CLOSE = StressMap(0.094, 0.092, 0.092, 0.151, 0.035, -0.039, 0.086, 0.018, 0.046)
 
-OWN = f"its own nine coefficients; {LI}; a level plate bears"  # and so in three dimensions, where xi_n is matched to it
+# In three dimensions the strength xi_n is matched to what a level plate bears.
+OWN = f"its own nine coefficients; {LI}; a level plate bears"
 
 VERTICAL = {
     "generic": VerticalEntry(StressMap(), f"the generic set M0, zeta = 1 (1 N/cm^3 straight down); {LI}"),

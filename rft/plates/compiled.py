@@ -18,13 +18,13 @@ from rft.simd import load as read
 
 
 @register_jitable
-def on_elements(law, ground, table, begin, end, g, side, rests, sums):
-    """Return the `Force` on the elements of some rows of a table (R, 9, 8) in motion. sums: (3, 8), to work with."""
+def on_elements(law, ground, table, begin, end, g, side, lead_of_middle, sums):
+    """Return the `Force` on the elements in rows ``begin`` to ``end`` of a table (R, 9, 8). sums: (3, 8), overwritten."""
     x = z = moment = 0.0 * read(sums, 0)
     for k in range(begin, end):
         e = read_element(table[k], 0)
         if any_of((g.z + g.cos * e.z1 - g.sin * e.x1 < 0.0) | (g.z + g.cos * e.z2 - g.sin * e.x2 < 0.0)):
-            f = load(law, ground, e, g, side, side != 0.0, rests)
+            f = load(law, ground, e, g, side, side != 0.0, lead_of_middle)
             x, z, moment = x + f.x, z + f.z, moment + f.moment
     store(sums, 0, x)
     store(sums, 1, z)
@@ -34,17 +34,19 @@ def on_elements(law, ground, table, begin, end, g, side, rests, sums):
 
 @functools.cache
 def kernel(Law: type):
-    """Return the compiled sum for maps of one form, which is the class of their records."""
+    """Return the compiled function that adds up forces by laws whose records have one class."""
     register_formulas()
 
     @njit(nogil=True, error_model="numpy")
-    def total(numbers, ground, disturbed, table, side, motions, out):
+    def total(numbers, ground_numbers, disturbed, table, side, motions, out):
         law, sums = Law(*numbers), np.zeros((3, WIDTH))
-        strength, flux, rounding, sine, fall = ground
-        under = Ground(strength, flux, rounding, sine, fall, disturbed)
+        strength, flux, rounding, grazing_sine, downhill_loss = ground_numbers
+        ground = Ground(strength, flux, rounding, grazing_sine, downhill_loss, disturbed)
         for i in range(len(motions)):
             x, z, cos, sin, v_x, v_z, rate = motions[i]
-            f = on_elements(law, under, table, 0, len(table), Motion(x, z, cos, sin, v_x, v_z, rate), side, False, sums)
+            f = on_elements(
+                law, ground, table, 0, len(table), Motion(x, z, cos, sin, v_x, v_z, rate), side, False, sums
+            )
             out[0, i] += f.x
             out[1, i] += f.z
             out[2, i] += f.moment
@@ -52,8 +54,8 @@ def kernel(Law: type):
     return cached(total, f"the contact with ground of the form {Law.__name__}")
 
 
-def rows(elements: Element) -> np.ndarray:
-    """Return elements (..., E) as (..., E / 8, 9, 8), the last eight filled up with some of no area."""
+def rows_of_eight(elements: Element) -> np.ndarray:
+    """Return elements (..., E) as (..., E / 8, 9, 8), the last row filled up with elements without area."""
     table = np.stack(elements, -2)
     if short := -table.shape[-1] % WIDTH:
         table = np.concatenate([table, table[..., :1].repeat(short, -1)], -1)
@@ -61,10 +63,10 @@ def rows(elements: Element) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(table.reshape(*table.shape[:-1], -1, WIDTH), -2, -3))
 
 
-def summed(law, ground: Ground, parts: Element, motions: Motion, sides: tuple[float, ...]) -> np.ndarray:
-    """As `rft.plates.loads.summed_by_numpy`."""
-    table, at, out = rows(parts), np.stack(motions, -1), np.zeros((3, len(motions.x)))
+def sum_forces(law, ground: Ground, outline: Element, motions: Motion, sides: tuple[float, ...]) -> np.ndarray:
+    """Return (3, M): the same as `rft.plates.loads.sum_forces_by_numpy`."""
+    table, moves, out = rows_of_eight(outline), np.stack(motions, -1), np.zeros((3, len(motions.x)))
     numbers = tuple(map(float, ground[:-1]))
     for side in sides:
-        kernel(type(law))(tuple(law), numbers, ground.disturbed, table, side, at, out)
+        kernel(type(law))(tuple(law), numbers, ground.disturbed, table, side, moves, out)
     return out

@@ -1,4 +1,4 @@
-"""Prescribed motions in the vertical plane, one class a kind: poses and twists in time. SI units; signs are those of
+"""Prescribed motions in the vertical plane, one class a kind: poses and twists in time. SI units; signs as in
 `rft.plates.loads`."""
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ Attitude = Annotated[float, Number(-10, 10, "rad", "angle at which the body is h
 Angle = Annotated[float, Number(-1e3, 1e3, "rad", "angle at one end of the motion, 0 where a leg points down")]
 
 
-class Course(NamedTuple):
-    """A motion: times (T,), poses (T, 3) as (x, z, angle), twists (T, 3) as (v_x, v_z, rate)."""
+class Trajectory(NamedTuple):
+    """A motion in time. t: (T,), s. pose: (T, 3) as (x, z, angle), m and rad. twist: (T, 3) as (v_x, v_z, rate)."""
 
     t: np.ndarray
     pose: np.ndarray
@@ -37,12 +37,11 @@ class Drag(Motion):
     distance: Distance = 0.1
     attitude: Attitude = 0.0
     samples: Samples = 51
-    angles = ("direction", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
 
-    def course(self, outline: Outline) -> Course:
+    def trajectory(self, outline: Outline) -> Trajectory:
         return _straight(self, 0.0, -self.depth, self.distance)
 
 
@@ -55,13 +54,12 @@ class Penetrate(Motion):
     speed: Speed = 0.01
     attitude: Attitude = 0.0
     samples: Samples = 51
-    angles = ("direction", "attitude")
 
     def __post_init__(self):
         check_numbers(self)
         self.require_downwards()
 
-    def course(self, outline: Outline) -> Course:
+    def trajectory(self, outline: Outline) -> Trajectory:
         x, z = outline.points.T
         lowest = (z * math.cos(self.attitude) - x * math.sin(self.attitude)).min()
         return _straight(self, 0.0, -lowest, self.depth / math.sin(self.direction))
@@ -79,18 +77,17 @@ class Rotate(Motion):
     stop: Angle = math.pi
     speed: Annotated[float, Number(-1e3, 1e3, "m/s", "speed of the hub, forwards")] = 0.0
     samples: Samples = 361
-    angles = ("start", "stop")
     turns = True
 
     def __post_init__(self):
         check_numbers(self)
         self.require_turning()
 
-    def course(self, outline: Outline) -> Course:
+    def trajectory(self, outline: Outline) -> Trajectory:
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         pose = np.stack([self.speed * t, np.full_like(t, self.hub_height), angle], -1)
-        return Course(t, pose, np.broadcast_to([self.speed, 0.0, self.rate], pose.shape))
+        return Trajectory(t, pose, np.broadcast_to([self.speed, 0.0, self.rate], pose.shape))
 
 
 @dataclass(frozen=True)
@@ -123,18 +120,19 @@ class Path(Motion):
     def samples(self) -> int:
         return len(self.t)
 
-    def course(self, outline: Outline) -> Course:
+    def trajectory(self, outline: Outline) -> Trajectory:
         t, angle = np.array(self.t), self.angle or (0.0,) * len(self.t)
         pose = np.stack([self.x, self.z, angle], -1)
-        return Course(t, pose, np.gradient(pose, t, axis=0, edge_order=2))
+        return Trajectory(t, pose, np.gradient(pose, t, axis=0, edge_order=2))
 
 
 MOTIONS = {"drag": Drag, "penetrate": Penetrate, "rotate": Rotate, "csv": Path}
 
 
-def _straight(motion, x: float, z: float, distance: float) -> Course:
-    way = np.array([math.cos(motion.direction), -math.sin(motion.direction), 0.0])
-    way[np.abs(way) < 1e-15] = 0.0  # straight down, or level, to the last digit
+def _straight(motion, x: float, z: float, distance: float) -> Trajectory:
+    """Return a motion along a straight line of a length, m, from (x, z)."""
+    along = np.array([math.cos(motion.direction), -math.sin(motion.direction), 0.0])
+    along[np.abs(along) < 1e-15] = 0.0  # straight down, or level, to the last digit
     s = np.linspace(0.0, distance, motion.samples)
-    pose = np.array([x, z, motion.attitude]) + s[:, None] * way
-    return Course(s / motion.speed, pose, np.broadcast_to(motion.speed * way, pose.shape))
+    pose = np.array([x, z, motion.attitude]) + s[:, None] * along
+    return Trajectory(s / motion.speed, pose, np.broadcast_to(motion.speed * along, pose.shape))

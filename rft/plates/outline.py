@@ -11,21 +11,21 @@ from rft.checks import check_numbers, real_array, require
 from rft.metres import LARGEST, metres
 
 MOST_ELEMENTS = 5000
-FEW = 500  # elements, of which pairs are compared all at once, without loading a tree
+FEW = 500  # elements up to which all pairs are compared at once, without loading SciPy's tree
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A chain of straight elements in the body's frame, in m; turned about its origin.
+    """A chain of straight elements in the body's frame, m.
 
-    points: (N + 1, 2) as (x, z), the last repeating the first if the outline is closed. bends: (N, 2, 2), unit normals
-    at both ends of each element where the chain stands for a curve; None: those of the elements. A closed outline has
-    faces outwards, and is stored counter-clockwise with x to the right and z up. An open one is a thin sheet, of which
-    either side may lead. Refused: outlines that cross or touch themselves, elements of no length."""
+    points: (N + 1, 2) as (x, z), the last repeating the first if the outline is closed. smooth_normals: (N, 2, 2), unit
+    normals at both ends of each element of a chain that stands for a curve; None for the normals of the elements. A
+    closed outline has faces outwards, and is stored counter-clockwise with x to the right and z up. An open one is a thin
+    sheet; either side may lead. Refused: outlines that cross or touch themselves, elements of no length."""
 
     points: np.ndarray
     width: Annotated[float, metres("width of the body across the plane")]
-    bends: np.ndarray | None = None
+    smooth_normals: np.ndarray | None = None
 
     def __post_init__(self):
         check_numbers(self)
@@ -36,46 +36,49 @@ class Outline:
             f"an outline takes 1 to {MOST_ELEMENTS} elements, got {len(points) - 1}",
         )
         require(bool((np.abs(points) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
-        bends = self.bends if self.bends is None else real_array("bends", self.bends)
-        good = bends is None or (bends.shape == (len(points) - 1, 2, 2) and bool(np.isfinite(bends).all()))
-        require(good, f"bends must be unit normals of shape ({len(points) - 1}, 2, 2)")
+        normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
+        valid = normals is None or (normals.shape == (len(points) - 1, 2, 2) and bool(np.isfinite(normals).all()))
+        require(valid, f"smooth_normals must be unit normals of shape ({len(points) - 1}, 2, 2)")
         if self.closed and _area(points) < 0.0:
-            points, bends = points[::-1], None if bends is None else bends[::-1, ::-1]
+            points, normals = points[::-1], None if normals is None else normals[::-1, ::-1]
         object.__setattr__(self, "points", points)
-        object.__setattr__(self, "bends", bends)
+        object.__setattr__(self, "smooth_normals", normals)
         _check_simple(points, self.closed)
 
     @property
     def closed(self) -> bool:
+        """Whether the last point is the first."""
         return len(self.points) > 3 and bool((np.asarray(self.points[0]) == np.asarray(self.points[-1])).all())
 
     @property
     def elements(self) -> int:
+        """Number N of elements."""
         return len(self.points) - 1
 
     @property
     def midpoints(self) -> np.ndarray:
-        """(N, 2)."""
+        """Middles (N, 2) of the elements, m."""
         return (self.points[1:] + self.points[:-1]) / 2
 
     @property
     def lengths(self) -> np.ndarray:
-        """(N,)."""
+        """Lengths (N,) of the elements, m."""
         return np.hypot(*np.diff(self.points, axis=0).T)
 
     @property
     def normals(self) -> np.ndarray:
-        """(N, 2): to the right of the way from point to point, which is outwards if the outline is closed."""
+        """Unit normals (N, 2) of the elements, to the right of the direction from point to point: outwards if closed."""
         along = np.diff(self.points, axis=0) / self.lengths[:, None]
         return np.stack([along[:, 1], -along[:, 0]], -1)
 
     @property
     def end_normals(self) -> np.ndarray:
-        """(N, 2, 2): at the start and at the end of each element."""
-        return np.repeat(self.normals[:, None], 2, 1) if self.bends is None else self.bends
+        """Unit normals (N, 2, 2) at the start and at the end of each element."""
+        return np.repeat(self.normals[:, None], 2, 1) if self.smooth_normals is None else self.smooth_normals
 
 
 def _area(points) -> float:
+    """Return the enclosed area, m^2; positive if the points (N + 1, 2) run counter-clockwise."""
     x, z = points.T
     return float(np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) / 2)
 
@@ -85,6 +88,7 @@ def _cross(a, b):
 
 
 def _check_simple(points, closed: bool) -> None:
+    """Raise ValueError for elements of no length, elements that fold back onto the last, and elements that cross."""
     along = np.diff(points, axis=0)
     lengths, size = np.hypot(*along.T), np.ptp(points, axis=0).max()
     short = np.flatnonzero(lengths <= 1e-12 * size)
@@ -96,27 +100,27 @@ def _check_simple(points, closed: bool) -> None:
         not back.any(),
         f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}: drop the point there",
     )
-    i, j = _meeting(points, along, closed)
+    i, j = _crossings(points, along, closed)
     require(not i.size, f"elements {i[:1]} and {j[:1]} of the outline cross or touch: order its points along the edge")
 
 
 def _close(points, reach: float) -> np.ndarray:
-    """(2, k): pairs of points not further apart than ``reach``, the first before the second."""
+    """Return the pairs (2, K) of points at most ``reach`` from each other, as indices, the smaller first."""
     if len(points) <= FEW:
-        away = points[:, None] - points
-        return np.array(np.nonzero(np.triu(np.hypot(away[..., 0], away[..., 1]) <= reach, 1)))
+        difference = points[:, None] - points
+        return np.array(np.nonzero(np.triu(np.hypot(difference[..., 0], difference[..., 1]) <= reach, 1)))
     from scipy.spatial import cKDTree
 
     return cKDTree(points).query_pairs(reach, output_type="ndarray").T
 
 
-def _meeting(points, along, closed: bool):
-    """Pairs of elements that meet, but for neighbours. Only those whose middles are close can."""
+def _crossings(points, along, closed: bool):
+    """Return the pairs of elements that cross or touch, but for neighbours; only elements with close middles can."""
     i, j = _close(points[:-1] + along / 2, np.hypot(*along.T).max() * (1 + 1e-9))
-    apart = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
-    i, j = i[apart], j[apart]
+    no_neighbours = (j > i + 1) & ~((i == 0) & (j == len(along) - 1) & closed)
+    i, j = i[no_neighbours], j[no_neighbours]
     a, d, b, e = points[i], along[i], points[j], along[j]
     sides = _cross(d, b - a) * _cross(d, b + e - a), _cross(e, a - b) * _cross(e, a + d - b)
-    near = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (np.minimum(b, b + e) <= np.maximum(a, a + d))
-    met = near.all(-1) & (sides[0] <= 0) & (sides[1] <= 0)
-    return i[met], j[met]
+    overlap = (np.minimum(a, a + d) <= np.maximum(b, b + e)) & (np.minimum(b, b + e) <= np.maximum(a, a + d))
+    crosses = overlap.all(-1) & (sides[0] <= 0) & (sides[1] <= 0)
+    return i[crosses], j[crosses]

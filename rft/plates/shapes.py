@@ -1,7 +1,7 @@
-"""Bodies as outlines, one class a kind; sizes in m. Each gives its `Outline` of about so many elements.
+"""Bodies as outlines, one class a kind; sizes in m.
 
-The frame of rods, plates and wheels is at their centre, x forward and z up. That of a leg is at the hip, and its free end is
-straight below, at z = -2 R.
+The frame of rods, plates and wheels is at their centre, x forward and z up. The frame of a leg is at the hip; its free end
+is straight below, at z = -2 R.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from rft.metres import LARGEST, metres
 from rft.plates.outline import MOST_ELEMENTS, Outline
 
 FEWEST_ROUND = 8  # elements of a curve
-MOST_POINTS = 2000  # of an outline of one's own
+MOST_POINTS = 2000  # of a polygon or spline
 
 Width = Annotated[float, metres("width across the plane")]
 HalfLength = Annotated[float, metres("R, half the distance from hip to free end")]
 
 
 class Shape:
-    """Base of bodies, with an outline."""
+    """Base of bodies that have an outline."""
 
     width: float
 
@@ -32,13 +32,13 @@ class Shape:
         check_numbers(self)
 
     def outline(self, elements: int = 100) -> Outline:
-        """Return the outline of about so many elements, and at least those that the shape takes."""
+        """Return the outline of about ``elements`` elements, at least as many as the shape needs."""
         in_range("elements", elements, 1, MOST_ELEMENTS, whole=True)
-        points, bends = self.curve(int(elements))
-        return Outline(points, self.width, bends)
+        points, normals = self.curve(int(elements))
+        return Outline(points, self.width, normals)
 
     def curve(self, elements: int):
-        """Return points (N + 1, 2), m, and bends (N, 2, 2) or None as of `Outline`."""
+        """Return points (N + 1, 2), m, and smooth_normals (N, 2, 2) or None of an `Outline`."""
         raise NotImplementedError
 
 
@@ -49,7 +49,6 @@ class Plate(Shape):
     length: Annotated[float, metres("length in the plane")]
     width: Width
     tilt: Annotated[float, Number(-100, 100, "rad", "beta, 0 lying flat")] = 0.0
-    angles = ("tilt",)
 
     def curve(self, elements: int):
         s = np.linspace(-0.5, 0.5, elements + 1)[:, None] * self.length
@@ -88,14 +87,14 @@ class HalfCylinder(Shape):
     def curve(self, elements: int):
         round_part = max(FEWEST_ROUND // 2, round(elements * math.pi / (math.pi + 2)))
         begin = 0.0 if self.flat == "down" else math.pi
-        points, bends = _arc(self.radius, begin, begin + math.pi, round_part)
+        points, normals = _arc(self.radius, begin, begin + math.pi, round_part)
         side = np.linspace(points[-1], points[0], max(1, elements - round_part) + 1)
         sign = 1.0 if self.flat == "up" else -1.0
         flat = np.broadcast_to([0.0, sign], (len(side) - 1, 2, 2))
         side[:, 1] = 0.0
         points[0, 1] = points[-1, 1] = 0.0
         side[-1], side[0] = points[0], points[-1]
-        return np.concatenate([points, side[1:]]), np.concatenate([bends, flat])
+        return np.concatenate([points, side[1:]]), np.concatenate([normals, flat])
 
 
 @dataclass(frozen=True)
@@ -107,15 +106,15 @@ class SquareRod(Shape):
 
     def curve(self, elements: int):
         h = self.side / 2
-        return _divided(np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]]), elements), None
+        return _subdivided(np.array([[-h, -h], [h, -h], [h, h], [-h, h], [-h, -h]]), elements), None
 
 
 @dataclass(frozen=True)
 class CLeg(Shape):
-    """A thin leg bent to an arc of a circle; hip and free end are 2 R apart whatever it bends by (Fig. 12(c)).
+    """A thin leg bent to an arc of a circle; hip and free end are 2 R from each other at any curvature (Fig. 12(c)).
 
     A leg of positive curvature bulges backwards as it points down, and enters the grains with the bulge ahead as it turns
-    at a positive rate; that the paper calls this one positive is assumed.
+    at a positive rate. The sign is assumed to be the paper's.
     """
 
     radius: HalfLength
@@ -130,13 +129,13 @@ class CLeg(Shape):
 
     def curve(self, elements: int):
         c, s = self.relative_curvature, np.linspace(-1.0, 1.0, elements + 1)
-        half = math.asin(c)  # of the angle by which the arc turns
-        turned = half * s
-        # Sines of s asin(c) over c, and (cos(s asin c) - cos(asin c)) over c, both regular as c -> 0.
-        along = np.sinc(turned / np.pi) * s * (half / c if c else 1.0)
-        across = 2 * np.sin((half + turned) / 2) * np.sin((half - turned) / 2) / c if c else 0.0 * s
+        half = math.asin(c)  # half the angle of the arc
+        angle = half * s
+        # sin(s asin c) / c and (cos(s asin c) - cos(asin c)) / c, both regular as c -> 0
+        along = np.sinc(angle / np.pi) * s * (half / c if c else 1.0)
+        across = 2 * np.sin((half + angle) / 2) * np.sin((half - angle) / 2) / c if c else 0.0 * s
         points = self.radius * np.stack([-across, -1.0 - along], -1)
-        normal = np.stack([-np.cos(turned), -np.sin(turned)], -1)
+        normal = np.stack([-np.cos(angle), -np.sin(angle)], -1)
         return points, np.stack([normal[:-1], normal[1:]], 1)
 
 
@@ -168,55 +167,37 @@ class Wheel(Shape):
             return
         for name in ("lug_height", "lug_width"):
             in_range(name, getattr(self, name), 1e-6, LARGEST, unit="m")
-        room = 2 * self.radius * math.sin(math.pi / max(3, self.lugs))
-        told = f"lug_width must be below {room:.3g} m, so that {self.lugs} lugs have room on the rim, got {self.lug_width:g}"
-        require(self.lug_width < room, told)
+        widest = 2 * self.radius * math.sin(math.pi / max(3, self.lugs))
+        required = f"lug_width must be below {widest:.3g} m, so that {self.lugs} lugs have room on the rim"
+        require(self.lug_width < widest, f"{required}, got {self.lug_width:g}")
 
     def curve(self, elements: int):
         if not self.lugs:
             return _arc(self.radius, 0.0, 2 * math.pi, elements)
-        half = math.asin(self.lug_width / (2 * self.radius))  # of the angle that a lug takes of the rim
+        half = math.asin(self.lug_width / (2 * self.radius))  # half the angle of a lug at the rim
         pitch, top = 2 * math.pi / self.lugs, self.radius * math.cos(half) + self.lug_height
         rim = self.lugs * (pitch - 2 * half) * self.radius
         bars = self.lugs * (2 * self.lug_height + self.lug_width)
-        each = max(1, round(elements * rim / (rim + bars) / self.lugs))
+        arc_elements = max(1, round(elements * rim / (rim + bars) / self.lugs))
         bar = np.array([[self.radius * math.cos(half), -1], [top, -1], [top, 1], [self.radius * math.cos(half), 1]])
-        bar = _divided(bar * [1.0, self.lug_width / 2], max(3, round(elements * bars / (rim + bars) / self.lugs)))
-        points, bends = [], []
+        bar = _subdivided(bar * [1.0, self.lug_width / 2], max(3, round(elements * bars / (rim + bars) / self.lugs)))
+        points, normals = [], []
         for k in range(self.lugs):
             cos, sin = math.cos(k * pitch), math.sin(k * pitch)
-            here = bar @ np.array([[cos, sin], [-sin, cos]])
-            arc, normals = _arc(self.radius, k * pitch + half, (k + 1) * pitch - half, each)
-            along = np.diff(here, axis=0)
-            side = np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
-            points += [here, arc[1:-1]]
-            bends += [np.repeat(side[:, None], 2, 1), normals]
-        return np.concatenate([*points, points[0][:1]]), np.concatenate(bends)
+            lug = bar @ np.array([[cos, sin], [-sin, cos]])
+            arc, arc_normals = _arc(self.radius, k * pitch + half, (k + 1) * pitch - half, arc_elements)
+            along = np.diff(lug, axis=0)
+            lug_normals = np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
+            points += [lug, arc[1:-1]]
+            normals += [np.repeat(lug_normals[:, None], 2, 1), arc_normals]
+        return np.concatenate([*points, points[0][:1]]), np.concatenate(normals)
 
 
 @dataclass(frozen=True)
 class Polygon(Shape):
-    """Straight edges between points. points (m): (x, z) of each. closed (-): the last is joined to the first, and it has an
-    inside."""
+    """Straight edges between points.
 
-    points: tuple[tuple[float, float], ...]
-    width: Width
-    closed: bool = True
-
-    def __post_init__(self):
-        super().__post_init__()
-        object.__setattr__(self, "points", _listed(self.points, self.closed))
-        Outline(_joined(self.points, self.closed), self.width)
-
-    def curve(self, elements: int):
-        return _divided(_joined(self.points, self.closed), elements), None
-
-
-@dataclass(frozen=True)
-class Spline(Shape):
-    """A smooth curve through points, a cubic spline over the chords' length.
-
-    points (m): (x, z) of each. closed (-): the last is joined to the first, and it has an inside.
+    points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
     """
 
     points: tuple[tuple[float, float], ...]
@@ -225,26 +206,46 @@ class Spline(Shape):
 
     def __post_init__(self):
         super().__post_init__()
-        object.__setattr__(self, "points", _listed(self.points, self.closed))
+        object.__setattr__(self, "points", _checked_points(self.points, self.closed))
+        Outline(_corners(self.points, self.closed), self.width)
+
+    def curve(self, elements: int):
+        return _subdivided(_corners(self.points, self.closed), elements), None
+
+
+@dataclass(frozen=True)
+class Spline(Shape):
+    """A smooth curve through points: a cubic spline, its parameter the length of the chords.
+
+    points (m): (x, z) of each. closed (-): the last point is joined to the first, and the body has an inside.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    width: Width
+    closed: bool = True
+
+    def __post_init__(self):
+        super().__post_init__()
+        object.__setattr__(self, "points", _checked_points(self.points, self.closed))
         Polygon(self.points, self.width, self.closed)
-        self.outline(min(4 * len(self.points), MOST_ELEMENTS))  # it may cross where its chords do not
+        self.outline(min(4 * len(self.points), MOST_ELEMENTS))  # a spline may cross itself where its chords do not
 
     def curve(self, elements: int):
         from scipy.interpolate import CubicSpline
 
-        points = _joined(self.points, self.closed)
+        points = _corners(self.points, self.closed)
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         spline = CubicSpline(s, points, bc_type="periodic" if self.closed else "not-a-knot")
-        at = np.linspace(0.0, s[-1], max(elements, FEWEST_ROUND) + 1)
-        curve, along = spline(at), spline(at, 1)
+        ends = np.linspace(0.0, s[-1], max(elements, FEWEST_ROUND) + 1)
+        curve, along = spline(ends), spline(ends, 1)
         if self.closed:
             curve[-1], along[-1] = curve[0], along[0]
         normal = np.stack([along[:, 1], -along[:, 0]], -1) / np.hypot(*along.T)[:, None]
-        bends = np.stack([normal[:-1], normal[1:]], 1)
+        normals = np.stack([normal[:-1], normal[1:]], 1)
         x, z = curve.T
         if self.closed and np.sum(x[:-1] * z[1:] - x[1:] * z[:-1]) < 0:
-            bends = -bends  # an outline turns itself counter-clockwise, with these outwards
-        return curve, bends
+            normals = -normals  # `Outline` reverses clockwise points; normals have to point outwards
+        return curve, normals
 
 
 SHAPES = {
@@ -254,36 +255,40 @@ SHAPES = {
 
 
 def _arc(radius: float, begin: float, end: float, elements: int):
-    """Counter-clockwise about the origin, with its outward normals; closed if it goes all the way round."""
-    whole = end - begin > 6.28
-    angle = np.linspace(begin, end, max(elements, FEWEST_ROUND if whole else 1) + 1)
+    """Return points (N + 1, 2) and outward normals (N, 2, 2) of a counter-clockwise arc about the origin between two
+    angles, closed if it is a full circle."""
+    full_circle = end - begin > 6.28
+    angle = np.linspace(begin, end, max(elements, FEWEST_ROUND if full_circle else 1) + 1)
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
-    if whole:
+    if full_circle:
         normal[-1] = normal[0]
     return radius * normal, np.stack([normal[:-1], normal[1:]], 1)
 
 
-def _divided(points, elements: int):
-    """Edges cut into equal pieces, each as many as its share of the whole length, rounded up."""
+def _subdivided(points, elements: int):
+    """Return the ends of elements, equal on each edge, whose number is the edge's share of the length, rounded up."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     pieces = np.maximum(1, np.ceil(elements * lengths / lengths.sum() - 1e-9)).astype(int)
     cut = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(points[:-1], points[1:], pieces)]
     return np.concatenate([*cut, points[-1:]])
 
 
-def _listed(points, closed) -> tuple[tuple[float, float], ...]:
+def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
+    """Return the points as pairs of numbers, without a last one that repeats the first; ValueError for bad ones."""
     require(isinstance(closed, bool), f"closed must be true or false, got {shown(closed)}")
     array = real_array("points", points)
     require(array.ndim == 2 and array.shape[1] == 2, f"points must be a list of (x, z), got {shown(points)}")
     if closed and len(array) > 1 and (array[0] == array[-1]).all():
         array = array[:-1]
     fewest = 3 if closed else 2
-    told = f"a {'closed' if closed else 'open'} outline takes {fewest} to {MOST_POINTS} points, got {len(array)}"
-    require(fewest <= len(array) <= MOST_POINTS, told)
+    kind = "closed" if closed else "open"
+    valid = fewest <= len(array) <= MOST_POINTS
+    require(valid, f"a {kind} outline takes {fewest} to {MOST_POINTS} points, got {len(array)}")
     require(bool((np.abs(array) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
     return tuple(map(tuple, array.tolist()))
 
 
-def _joined(points, closed: bool):
+def _corners(points, closed: bool):
+    """Return points (N, 2) as an array, the first once more at the end if the outline is closed."""
     points = np.array(points)
     return np.concatenate([points, points[:1]]) if closed else points

@@ -16,7 +16,7 @@ import numpy as np
 from rft.checks import Number, check_numbers, real_array, require, shown
 from rft.vectors import absolute, formula, where
 
-PER_CUBIC_METRE = 1e6  # N/m^3 in a N/cm^3
+PER_CUBIC_METRE = 1e6  # N/m^3 in one N/cm^3
 TENSION = ("keep", "cut")
 GRAZING = math.radians(0.25)  # assumed; the drag of smooth rods is 0.2 % less than with a jump
 
@@ -42,11 +42,11 @@ Grazing = Annotated[
 
 @formula
 def alpha(law, n, v):
-    """Return (alpha_x, alpha_z), N/cm^3, of a law's `PlateStress.alpha_ahead` for any unit normal n = (n_x, n_z) and
-    unit velocity v = (v_x, v_z): the map is its own mirror image."""
-    side = where(v[0] < 0.0, -1.0, 1.0)
-    a_x, a_z = law.alpha_ahead((side * n[0], n[1]), (absolute(v[0]), v[1]))
-    a_x = side * a_x
+    """Return (alpha_x, alpha_z), N/cm^3, for any unit normal n = (n_x, n_z) and unit velocity v = (v_x, v_z), from
+    `PlateStress.alpha_ahead` and the mirror symmetry of the map."""
+    mirror = where(v[0] < 0.0, -1.0, 1.0)
+    a_x, a_z = law.alpha_ahead((mirror * n[0], n[1]), (absolute(v[0]), v[1]))
+    a_x = mirror * a_x
     if law.cut == 0.0:
         return a_x, a_z
     pushes = (n[1] * a_z - n[0] * a_x) * (n[0] * v[0] + n[1] * v[1]) <= 0.0
@@ -54,42 +54,44 @@ def alpha(law, n, v):
 
 
 class PlateStress:
-    """Base of stress maps. A map gives `alpha_ahead` for motion forwards, gamma within +-pi/2; the rest follows here, by
-    mirror symmetry and because a plate turned by pi is the same plate:
+    """Base of stress maps. A map gives `alpha_ahead` for motion forwards, gamma within +-pi/2. All other directions follow
+    by mirror symmetry, and because a plate rotated by pi is the same plate:
 
         alpha_z(beta, gamma) = alpha_z(-beta, +-pi - gamma),  alpha_x(beta, gamma) = -alpha_x(-beta, +-pi - gamma).
 
-    grazing: the angle in radians between motion and face over which the stress on the face of a closed body rises. A thin
-    plate has no jump where it slides along itself: its other face leads. tension: what happens to faces that the map pulls
-    on instead of pushing. "keep" leaves them, "cut" frees them of stress.
+    grazing: angle between motion and face, rad, over which the stress on the face of a closed body rises. A thin plate has
+    no jump where it slides along itself: its other face leads. tension: "keep" leaves the stress on faces that the map
+    pulls on instead of pushing, "cut" sets it to 0.
     """
 
     grazing: float
     tension: str
 
     def alpha_ahead(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha_x, alpha_z) in N/cm^3 for unit normals n = (n_x, n_z), either of the plate's two, and unit velocities
-        v = (v_x, v_z) with v_x >= 0."""
+        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z), either of the plate's two, and unit
+        velocities v = (v_x, v_z) with v_x >= 0."""
         raise NotImplementedError
 
     def __call__(self, beta, gamma) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha_x, alpha_z) in N/cm^3 for angles in radians, of any size, that broadcast together."""
+        """Return (alpha_x, alpha_z), N/cm^3, for angles in radians, of any size, that broadcast together."""
         beta, gamma = real_array("beta", beta), real_array("gamma", gamma)
         return self.alpha((np.sin(beta), -np.cos(beta)), (np.cos(gamma), -np.sin(gamma)))
 
     def alpha(self, n, v) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha_x, alpha_z) in N/cm^3 for unit normals n = (n_x, n_z) and unit velocities v = (v_x, v_z), pairs of arrays."""
+        """Return (alpha_x, alpha_z), N/cm^3, for unit normals n = (n_x, n_z) and unit velocities v = (v_x, v_z), pairs of
+        arrays."""
         return alpha(self, n, v)
 
     @property
     def cut(self) -> float:
-        """1 where faces that the map pulls on are freed of stress, else 0."""
+        """1 if faces that the map pulls on have no stress, else 0."""
         return float(self.tension == "cut")
 
     def _check(self) -> None:
+        """Raise ValueError for numbers out of range and for an unknown tension."""
         check_numbers(self)
-        good = isinstance(self.tension, str) and self.tension in TENSION
-        require(good, f"tension must be {' or '.join(map(repr, TENSION))}, got {shown(self.tension)}")
+        valid = isinstance(self.tension, str) and self.tension in TENSION
+        require(valid, f"tension must be {' or '.join(map(repr, TENSION))}, got {shown(self.tension)}")
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,6 @@ class StressMap(PlateStress):
     zeta: Zeta = 1.0
     grazing: Grazing = GRAZING
     tension: str = "keep"
-    angles = ("grazing",)
 
     def __post_init__(self):
         self._check()
@@ -124,13 +125,10 @@ class StressMap(PlateStress):
     def alpha_ahead(self, n, v):
         cos_2b, sin_2b = n[1] * n[1] - n[0] * n[0], -2.0 * n[0] * n[1]
         cos_g, sin_g = v[0], -v[1]
-        both, turned = (
-            cos_2b * sin_g,
-            sin_2b * cos_g,
-        )  # their sum is sin(2 beta + gamma), sin(gamma - 2 beta) the difference
-        a_z = self.A00 + self.A10 * cos_2b + (self.B11 + self.Bm11) * both + (self.B11 - self.Bm11) * turned
-        both, turned = cos_2b * cos_g, sin_2b * sin_g  # cos(2 beta + gamma) the difference, cos(gamma - 2 beta) the sum
-        a_x = (self.C11 + self.Cm11) * both + (self.Cm11 - self.C11) * turned + self.C01 * cos_g + self.D10 * sin_2b
+        # sin(gamma +- 2 beta) = cos_sin +- sin_cos, cos(gamma +- 2 beta) = cos_cos -+ sin_sin
+        cos_sin, sin_cos, cos_cos, sin_sin = cos_2b * sin_g, sin_2b * cos_g, cos_2b * cos_g, sin_2b * sin_g
+        a_z = self.A00 + self.A10 * cos_2b + (self.B11 + self.Bm11) * cos_sin + (self.B11 - self.Bm11) * sin_cos
+        a_x = (self.C11 + self.Cm11) * cos_cos + (self.Cm11 - self.C11) * sin_sin + self.C01 * cos_g + self.D10 * sin_2b
         return self.zeta * a_x, self.zeta * (a_z + self.B01 * sin_g)
 
 

@@ -1,4 +1,4 @@
-"""What a stress map does over its whole plane: whether it takes power everywhere, and where it pulls."""
+"""Survey of a stress map over all tilts and directions: where it dissipates power, and where it pulls."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rft.plates.stress import PlateStress
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """A map over all tilts and directions, before any cut of tension. beta (B,) within +-pi/2 and gamma (G,) within +-pi,
-    radians, midpoints of equal cells; alpha_x, alpha_z, normal and power (B, G) in N/cm^3.
+    """A map over all tilts and directions, before any cut of tension.
 
-    normal: stress along the leading normal, positive where the grains pull. power: of the stress at unit speed, negative
-    where the grains take it, as they should.
+    beta: (B,), within +-pi/2, and gamma: (G,), within +-pi, rad, midpoints of equal cells. alpha_x, alpha_z, normal,
+    power: (B, G), N/cm^3. normal: stress along the leading normal, positive where the grains pull. power: power of the
+    stress at unit speed, negative where the grains dissipate, as they should.
     """
 
     beta: np.ndarray
@@ -27,30 +27,30 @@ class Survey:
 
     @property
     def pulling(self) -> float:
-        """The part of the plane where the map pulls."""
+        """Share of the plane (beta, gamma) where the map pulls."""
         return float((self.normal > 0.0).mean())
 
     @property
     def pushing(self) -> float:
-        """The part of the plane where it drives the motion on, which no ground can."""
+        """Share of the plane (beta, gamma) where the map drives the motion, which no ground can."""
         return float((self.power > 0.0).mean())
 
-    def told(self) -> str:
-        """One line."""
+    def description(self) -> str:
+        """Return one line on where the map drives motion and where it pulls."""
         pulls = f"pulls on {100 * self.pulling:.1f} % of the plane" if self.pulling else "pulls nowhere"
         if not self.pushing:
             return f"takes power at all angles, {pulls}"
         b, g = np.unravel_index(self.power.argmax(), self.power.shape)
-        place = f"most at beta = {np.degrees(self.beta[b]):.0f}, gamma = {np.degrees(self.gamma[g]):.0f} degrees"
-        return f"drives motion on over {100 * self.pushing:.1f} % of the plane, {place}; {pulls}"
+        most = f"most at beta = {np.degrees(self.beta[b]):.0f}, gamma = {np.degrees(self.gamma[g]):.0f} degrees"
+        return f"drives motion on over {100 * self.pushing:.1f} % of the plane, {most}; {pulls}"
 
 
 def survey(stress: PlateStress, cells: int = 180) -> Survey:
-    """The map on ``cells`` tilts and twice as many directions."""
+    """Return the survey of a map on ``cells`` tilts and twice as many directions."""
     beta = (np.arange(cells) + 0.5) / cells * np.pi - np.pi / 2
     gamma = (np.arange(2 * cells) + 0.5) / cells * np.pi - np.pi
     n, v = (np.sin(beta)[:, None], -np.cos(beta)[:, None]), (np.cos(gamma), -np.sin(gamma))
     a_x, a_z = replace(stress, tension="keep").alpha(n, v)
-    leading = np.sign((n[0] * v[0] + n[1] * v[1]).round(12))  # none at grazing incidence
+    leading = np.sign((n[0] * v[0] + n[1] * v[1]).round(12))  # 0 at grazing incidence
     normal, power = leading * (n[1] * a_z - n[0] * a_x), v[1] * a_z - v[0] * a_x
     return Survey(beta, gamma, a_x, a_z, normal, power)

@@ -1,12 +1,11 @@
-"""Walking on grains: robots and their clocks, what computes how they walk, and wheels and
-screws that are driven at a given slip."""
+"""Walking on grains: robots and their clocks, engines that compute walks, and wheels and screws at a given slip."""
 
 from rft.walking.craft import Screws
 from rft.walking.engines import ENGINES, Fineness, Walker, engine
 from rft.walking.mjcf import Mjcf
 from rft.walking.robot import Rhex, Robot, Roller, Tripod
 from rft.walking.robots import ROBOTS
-from rft.walking.screws import Cruise, Turning, cruise, freely, turning
+from rft.walking.screws import Cruise, Turning, cruise, free_turning, turning
 from rft.walking.stride import Walk
 from rft.walking.wheel import Rolling, rolling
 
@@ -27,7 +26,7 @@ __all__ = [
     "Walker",
     "cruise",
     "engine",
-    "freely",
+    "free_turning",
     "rolling",
     "turning",
 ]

@@ -1,4 +1,4 @@
-"""A craft that two screws drive: a box over screws side by side, along its own x axis, which turn as they are told."""
+"""A craft that two screws drive: a box over screws along its x axis, side by side, which rotate at a given rate."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from rft.metres import LARGEST, metres
 from rft.walking.robot import Mass, Robot
 
 PAIRS = ("mirrored", "alike")
-PER_SQUARE = 10  # triangles of a screw
+PER_SQUARE = 10  # triangles of a screw over the square of the number of elements
 
 
 @dataclass(frozen=True)
 class Screws(Robot):
     """Two screws under a box, which has all the mass. x forwards, y to the left, z up.
 
-    screw (-): that on the left; both drive forwards. pair (-): "mirrored", the one on the right is its mirror image and
-    turns the other way, or "alike", the same and turns the same way.
+    screw (-): the left screw; both drive forwards. pair (-): "mirrored", the right screw is the mirror image of the left and
+    rotates in the other direction, or "alike", both are the same and rotate in the same direction.
     """
 
     mass: Mass
@@ -42,27 +42,27 @@ class Screws(Robot):
             isinstance(self.screw, Screw), f"a robot without screws: screw must be a Screw, got {shown(self.screw)}"
         )
         require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}, got {shown(self.pair)}")
-        told = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
-        require(self.track > 2 * self.screw.radius, told)
+        message = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
+        require(self.track > 2 * self.screw.radius, message)
 
     @property
     def screws(self) -> tuple[tuple[Screw, tuple[float, float, float]], ...]:
-        """(screw, its middle from the centre of mass, m), left and right."""
+        """The left and the right screw, each with its middle from the centre of mass, m."""
         right = self.screw.mirrored if self.pair == "mirrored" else self.screw
         return (self.screw, (0.0, self.track / 2, -self.drop)), (right, (0.0, -self.track / 2, -self.drop))
 
     @property
     def inertia(self) -> np.ndarray:
-        """(3,): kg m^2, of the box about x, y, z."""
+        """Moments of inertia (3,), kg m^2, of the box about x, y, z."""
         squares = np.array([self.length, self.width, self.height]) ** 2
         return self.mass / 12 * (squares.sum() - squares)
 
     def meshes(self, elements: int) -> list[Mesh]:
-        """Of the screws, `PER_SQUARE` triangles for the square of so many elements."""
+        """Return the meshes of the screws, of `PER_SQUARE` elements^2 triangles."""
         return [screw.mesh(PER_SQUARE * elements**2) for screw, _ in self.screws]
 
     def hull(self, elements: int) -> Mesh:
-        """Of the box, about the centre of mass."""
+        """Return the mesh of the box, about the centre of mass."""
         return shapes.box((self.length, self.width, self.height), max(1, elements // 6))
 
     def check(self, elements: int) -> None:

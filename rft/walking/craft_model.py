@@ -1,6 +1,7 @@
-"""Craft on two screws as MuJoCo models: a box that is free to go anywhere, on screws that servos turn.
+"""Craft on two screws as MuJoCo models: a box that moves freely, on screws that servos rotate.
 
-Screws have hardly any mass. Their servos are as stiff as those of legs (`rft.walking.hexapod`), so that angles are as told.
+Screws have hardly any mass. Their servos are as stiff as those of legs (`rft.walking.hexapod`), so that angles are those of
+the clock.
 """
 
 from __future__ import annotations
@@ -13,37 +14,48 @@ from rft.laws.catalogue import GRAVITY
 from rft.meshes.mesh import Mesh
 from rft.walking.craft import Screws
 from rft.walking.facets import Surface
-from rft.walking.hexapod import COLOURS, GIVES, LIGHT, QUICK, UNTOUCHED, begun, boxed, inertial, text
+from rft.walking.hexapod import (
+    COLOURS,
+    DEFLECTION,
+    LEG_MASS,
+    NO_CONTACT,
+    add_box,
+    add_inertia,
+    add_servo,
+    empty_model,
+    text,
+)
 
-DRAWN = 2000  # triangles of a screw, as drawn
+DRAWN = 2000  # triangles of a screw as drawn
 
 
 def mjcf(robot: Screws) -> str:
-    """The model as XML: a body "hull", "screw0" and "screw1" hinged to it, left and right, with position actuators of the same
-    names, at a positive rate of which the screw drives forwards."""
-    root, hull = begun()
+    """Return the model as XML: a body "hull", and "screw0" and "screw1" hinged to it, left and right, with position actuators
+    of the same names. At a positive rate a screw drives forwards."""
+    root, hull = empty_model()
     ET.SubElement(hull, "freejoint")
-    inertial(hull, robot.mass * (1 - 2 * LIGHT), robot.inertia)
-    boxed(hull, [robot.length, robot.width, robot.height])
+    add_inertia(hull, robot.mass * (1 - 2 * LEG_MASS), robot.inertia)
+    add_box(hull, [robot.length, robot.width, robot.height])
     assets, motors = root.find("asset"), ET.SubElement(root, "actuator")
-    stiff = robot.mass * GRAVITY * robot.screw.radius / GIVES
+    stiffness = robot.mass * GRAVITY * robot.screw.radius / DEFLECTION
     for k, (screw, place) in enumerate(robot.screws):
         name = f"screw{k}"
-        ET.SubElement(assets, "mesh", name=name, inertia="shell", **_written(screw.mesh(DRAWN)))
+        ET.SubElement(assets, "mesh", name=name, inertia="shell", **_mesh_text(screw.mesh(DRAWN)))
         body = ET.SubElement(hull, "body", name=name, pos=text(place))
         ET.SubElement(body, "joint", name=name, type="hinge", axis=text((screw.sense, 0.0, 0.0)))
-        light = robot.mass * LIGHT
-        inertial(body, light, np.full(3, light * screw.length**2 / 12))
-        ET.SubElement(body, "geom", type="mesh", mesh=name, rgba=COLOURS[k], **UNTOUCHED)
-        ET.SubElement(motors, "position", name=name, joint=name, kp=repr(stiff), kv=repr(stiff * QUICK))
+        mass = robot.mass * LEG_MASS
+        add_inertia(body, mass, np.full(3, mass * screw.length**2 / 12))
+        ET.SubElement(body, "geom", type="mesh", mesh=name, rgba=COLOURS[k], **NO_CONTACT)
+        add_servo(motors, name, stiffness)
     return ET.tostring(root, encoding="unicode")
 
 
 def surfaces(robot: Screws, elements: int = 12) -> list[Surface]:
-    """What touches the ground: the hull, body 1 of the model, and its screws."""
-    screws = [Surface.of_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))]
-    return [Surface.of_mesh(1, robot.hull(elements)), *screws]
+    """Return the surfaces that touch the ground: the hull, body 1 of the model, and its screws."""
+    screws = [Surface.from_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))]
+    return [Surface.from_mesh(1, robot.hull(elements)), *screws]
 
 
-def _written(mesh: Mesh) -> dict[str, str]:
+def _mesh_text(mesh: Mesh) -> dict[str, str]:
+    """Return the XML attributes of a mesh."""
     return {"vertex": text(mesh.vertices.ravel()), "face": " ".join(map(str, mesh.faces.ravel()))}

@@ -1,4 +1,4 @@
-"""What computes how robots walk, by name. An engine is one module and its name here."""
+"""Engines that compute walks, by name. An engine is one module with the functions of `Engine`, and a line in `ENGINES`."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol
 
 from rft.checks import Number, check_numbers, require, shown
-from rft.ground import Ground, GroundEffect, checked, ground_of
+from rft.ground import Ground, GroundEffect, checked_effects, ground_of
 from rft.meshes.law import Spatial
 from rft.plates.stress import PlateStress
 from rft.walking.robot import SMALLEST, Robot, Tripod
-from rft.walking.stride import Walk, advanced
+from rft.walking.stride import Walk, compute_stride
 
 
 @dataclass(frozen=True)
 class Walker:
-    """A robot, its clock and its ground: a stress map of the vertical plane, or a law of three dimensions. effects: aeration
-    and grain inertia."""
+    """A robot, its clock and its ground. stress: a stress map of the vertical plane, or a law of three dimensions. effects:
+    aeration and grain inertia."""
 
     robot: Robot
     gait: Tripod
@@ -27,15 +27,15 @@ class Walker:
 
     def __post_init__(self):
         for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress | Spatial)):
-            value, such = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
-            require(isinstance(value, kind), f"{name} must be a {such}, got {shown(value)}")
-        object.__setattr__(self, "effects", checked(self.effects))
+            value, kinds = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
+            require(isinstance(value, kind), f"{name} must be a {kinds}, got {shown(value)}")
+        object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
             require(effect.walks, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
 
     @property
     def ground(self) -> Ground:
-        """What the effects make of it."""
+        """Ground with all effects."""
         return ground_of(self.effects)
 
 
@@ -43,7 +43,7 @@ class Walker:
 class Fineness:
     """Numerical settings of a walk.
 
-    engine (-): planar or mujoco; if left out the planar one, but for robots and ground of three dimensions.
+    engine (-): planar or mujoco; by default planar, but mujoco for robots and ground of three dimensions.
     """
 
     steps: Annotated[int, Number(8, 10_000, "-", "time steps of a cycle", whole=True)] = 32
@@ -62,49 +62,52 @@ class Fineness:
     engine: str | None = None
 
     def __post_init__(self):
-        good = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
-        require(good, f"engine must be one of {', '.join(ENGINES)}, got {shown(self.engine)}")
+        valid = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
+        require(valid, f"engine must be one of {', '.join(ENGINES)}, got {shown(self.engine)}")
         check_numbers(self)
 
 
 class Engine(Protocol):
-    """A module with these four."""
+    """A module that computes walks."""
 
     def refuse(self, walker: Walker) -> None:
-        """ValueError for a walker that this engine does not take."""
+        """Raise ValueError for a walker that this engine cannot compute."""
         ...
 
     def walk(
         self,
         walkers: Sequence[Walker],
         numerics: Fineness,
-        settling: int | None = None,
+        cycles: int | None = None,
         progress: Callable | None = None,
-        advance: Callable = advanced,
+        advance: Callable = compute_stride,
     ) -> list[Walk]:
-        """Each walker from rest for the duration, or so many cycles, or to its end; its speed at the limit cycle.
-        progress: told the fraction done. advance: takes the strides, as `rft.walking.stride.advanced`."""
+        """Return the walks of walkers from rest, with their speeds at the limit cycle.
+
+        A walk lasts ``cycles`` cycles, by default the duration of the numerics, or until the robot's end. progress:
+        receives the finished fraction. advance: computes a stride, as `rft.walking.stride.compute_stride`."""
         ...
 
-    def again(
+    def rerun(
         self,
         walkers: Sequence[Walker],
         numerics: Fineness,
         walks: Sequence[Walk],
-        settling: int | None = None,
-        advance: Callable = advanced,
+        cycles: int | None = None,
+        advance: Callable = compute_stride,
     ) -> list[Walk]:
-        """The speeds with other numerics, of walks that are known."""
+        """Return known walks with other numerics. A walk with a limit cycle starts near it, and only the fields of the limit
+        cycle change; others are computed from rest."""
         ...
 
-    def pace(self, walker: Walker, numerics: Fineness, enough: float) -> tuple[float, float]:
-        """(s of computing, times that forces are evaluated) of a time step: of the first ones from rest, till ``enough`` s
-        are over or a stride is."""
+    def step_cost(self, walker: Walker, numerics: Fineness, seconds: float) -> tuple[float, float]:
+        """Return s of computing and number of evaluations of forces in a time step, from the first steps of a walk: those of
+        a stride, or as many as ``seconds`` s of computing allow."""
         ...
 
 
 def engine(name: str) -> Engine:
-    """The engine of that name; ValueError for one that is not here."""
+    """Return the engine of a name; ValueError for unknown engines and those that are not installed."""
     require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}, got {shown(name)}")
     try:
         return importlib.import_module(ENGINES[name])
@@ -112,7 +115,7 @@ def engine(name: str) -> Engine:
         if error.name != name:
             raise
         raise ValueError(f"the {name} engine is not installed: pip install 'geomech[{name}]'") from None
-    except Exception as error:  # MuJoCo loads what MUJOCO_GL names as it is imported
+    except Exception as error:  # importing MuJoCo loads the library that MUJOCO_GL names
         raise ValueError(f"the {name} engine cannot be loaded: {shown(str(error))}; is MUJOCO_GL right?") from None
 
 

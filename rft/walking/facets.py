@@ -1,13 +1,13 @@
-"""Force and moment of grains on many rigid bodies at once, and how they change with the bodies' motion.
+"""Force and moment of grains on many rigid bodies at once, and their slopes by the bodies' velocities.
 
-The surfaces of all bodies are triangles, told in the frames of their bodies. Everything is summed about the bodies' origins
-and told along the axes of the world, z = 0 the surface and z up. SI units.
+The surfaces of all bodies are triangles in the frames of their bodies. Forces and moments are about the bodies' origins and
+along the axes of the world, z = 0 the surface and z up. SI units.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, NamedTuple
 
@@ -22,7 +22,7 @@ from rft.meshes.mesh import Mesh
 from rft.meshes.submerged import submerged
 from rft.plates.outline import Outline
 
-NUDGE = 1e-3  # times the rounding, for differences
+NUDGE = 1e-3  # change of a velocity for differences, over the rounding
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class Grains:
 
     @property
     def ground(self) -> Ground:
-        """Under every face."""
-        return Ground(self.strength, self.flux, self.rounding, self.law.sine)
+        """Ground under every face."""
+        return Ground(self.strength, self.flux, self.rounding, self.law.grazing_sine)
 
 
 class Surface(NamedTuple):
-    """Of one body: corners (T, 3, 3) and unit normals (T, 3) of triangles in the body's frame, m; sheet: whether they are a
-    thin sheet, either side of which may lead, and which is given once. geom: the number of the geom that they stand for; None
-    for all of the body's."""
+    """A surface of one body. body: number of the body. corners: (T, 3, 3), m, and normals: (T, 3), unit vectors, of triangles
+    in the body's frame. sheet: whether they are one side of a thin sheet, of which either side may lead. geom: number of the
+    geom that the surface stands for; None for all geoms of the body."""
 
     body: int
     corners: np.ndarray
@@ -58,15 +58,18 @@ class Surface(NamedTuple):
     geom: int | None = None
 
     @classmethod
-    def of_mesh(cls, body: int, mesh: Mesh, rotation=None, place=(0.0, 0.0, 0.0)) -> Surface:
-        """A mesh whose frame is turned (3, 3) and moved (3,) in that of the body; an open one is a sheet."""
-        turn = np.eye(3) if rotation is None else np.asarray(rotation, float).reshape(3, 3)
-        return cls(body, mesh.vertices[mesh.faces] @ turn.T + place, mesh.facing @ turn.T, not mesh.closed)
+    def from_mesh(cls, body: int, mesh: Mesh, rotation=None, place=(0.0, 0.0, 0.0)) -> Surface:
+        """Return the surface of a mesh, a sheet if the mesh is open. rotation: (3, 3), and place: (3,), m, of the mesh's frame
+        in that of the body."""
+        matrix = np.eye(3) if rotation is None else np.asarray(rotation, float).reshape(3, 3)
+        return cls(body, mesh.vertices[mesh.faces] @ matrix.T + place, mesh.middle_normals @ matrix.T, not mesh.closed)
 
     @classmethod
-    def of_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0), side: int = 0) -> Surface:
-        """An outline of the vertical plane across its width, and the sides of a closed one. side: 0 cuts it along its middle
-        in halves that are mirror images; 1 and -1 are cut in one piece each, the one the mirror image of the other."""
+    def from_outline(cls, body: int, outline: Outline, place=(0.0, 0.0, 0.0), side: int = 0) -> Surface:
+        """Return the surface of an outline of the vertical plane across its width, with the sides of a closed one.
+
+        side: 0 for triangles in two halves that are mirror images; 1 and -1 for triangles in one piece, each the mirror image
+        of the other."""
         edges = np.linspace(-outline.width / 2, outline.width / 2, 2 if side else 3)
         corners = [_strip(outline, a, b, (side or a + b) > 0) for a, b in pairwise(edges)]
         near, far = (np.insert(outline.end_normals[:, k], 1, 0.0, axis=1) for k in (0, 1))
@@ -80,7 +83,7 @@ class Surface(NamedTuple):
 
 
 def _strip(outline: Outline, low: float, high: float, left: bool) -> np.ndarray:
-    """(2 N, 3, 3): of an outline from y = low to high, two triangles an element, one on each of its ends."""
+    """Return triangles (2 N, 3, 3) of an outline from y = low to high, two for each element."""
     low, high = (np.insert(outline.points, 1, y, axis=1) for y in (low, high))
     a, b, c, d = low[:-1], low[1:], high[1:], high[:-1]
     first, second = ((a, d, b), (b, d, c)) if left else ((a, d, c), (a, c, b))
@@ -88,14 +91,15 @@ def _strip(outline: Outline, low: float, high: float, left: bool) -> np.ndarray:
 
 
 def _side(outline: Outline, y: float) -> np.ndarray:
-    """(N - 2, 3, 3): a fan of triangles in the plane at y, looking away from the middle."""
+    """Return a fan of triangles (N - 2, 3, 3) in the plane at y, with normals away from the middle."""
     ring = np.insert(outline.points[:-1], 1, y, axis=1)
     first = np.broadcast_to(ring[0], ring[2:].shape)
     return np.stack([first, ring[1:-1], ring[2:]] if y < 0 else [first, ring[2:], ring[1:-1]], 1)
 
 
 class Poses(NamedTuple):
-    """Of B bodies: rotation (B, 3, 3), place (B, 3), velocity (B, 3) and spin (B, 3) in the world."""
+    """Motions of B bodies in the world. rotation: (B, 3, 3). place: (B, 3), m, and velocity: (B, 3), m/s, of the origin. spin:
+    (B, 3), angular velocity, rad/s."""
 
     rotation: np.ndarray
     place: np.ndarray
@@ -104,8 +108,10 @@ class Poses(NamedTuple):
 
 
 class Facets:
-    """All surfaces; ``bodies``: (B,) the numbers they name, in the order of what is given and returned. A triangle whose
-    corners turn clockwise seen from where its normal points counts as negative."""
+    """All surfaces that touch the ground.
+
+    bodies: (B,), numbers of their bodies, in the order of all arrays over bodies. owner: (T,), index into ``bodies`` of each
+    triangle. A triangle with corners that run clockwise about its normal has a negative area."""
 
     def __init__(self, surfaces: Sequence[Surface]):
         require(len(surfaces) > 0, "no geoms that touch the ground")
@@ -114,56 +120,54 @@ class Facets:
         sizes = [len(s.corners) for s in surfaces]
         self.corners = np.concatenate([s.corners for s in surfaces])
         self.normals = np.concatenate([s.normals for s in surfaces])
-        self.sheet, self.of = np.repeat([s.sheet for s in surfaces], sizes), np.repeat(counts, sizes)
+        self.sheet, self.owner = np.repeat([s.sheet for s in surfaces], sizes), np.repeat(counts, sizes)
         a, b, c = self.corners.swapaxes(0, 1)
         across = np.cross(b - a, c - a)
         self.areas = np.copysign(np.linalg.norm(across, axis=1) / 2, (across * self.normals).sum(1))
-        self.first = np.searchsorted(self.of, np.arange(len(self.bodies)))
-        self.reach = np.maximum.reduceat(np.linalg.norm(self.corners, axis=2).max(1), self.first)
+        first = np.searchsorted(self.owner, np.arange(len(self.bodies)))
+        self.reach = np.maximum.reduceat(np.linalg.norm(self.corners, axis=2).max(1), first)
 
     def heights(self, rotation, place) -> np.ndarray:
-        """(T, 3): of the corners."""
-        return np.einsum("tcj,tj->tc", self.corners, rotation[self.of, 2]) + place[self.of, 2:]
+        """Return the heights (T, 3), m, of the corners for rotations (B, 3, 3) and places (B, 3) of the bodies."""
+        return np.einsum("tcj,tj->tc", self.corners, rotation[self.owner, 2]) + place[self.owner, 2:]
 
-    def loads(self, grains: Grains, at: Poses, k: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Wrenches (B, 6), force and moment, and, with a time k (s), their slopes (B, 6, 6) by velocity and spin of bodies
-        whose poses change by k times that, else None."""
-        heights = self.heights(at.rotation, at.place)
-        some = np.flatnonzero((heights < 0.0).any(1))
+    def loads(self, grains: Grains, poses: Poses, k: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return wrenches (B, 6), force, N, and moment, N m, and their slopes (B, 6, 6) by velocity and spin.
+
+        k: time, s, by which a pose changes with its velocity; None for no slopes."""
+        heights = self.heights(poses.rotation, poses.place)
+        under = np.flatnonzero((heights < 0.0).any(1))
         count = len(self.bodies)
-        if not some.size:
+        if not under.size:
             return np.zeros((count, 6)), None if k is None else np.zeros((count, 6, 6))
-        of, turn = self.of[some], at.rotation[self.of[some]]
-        r = np.einsum("tij,tcj->ict", turn, self.corners[some])[:, :, None]  # (xyz, corner, column, triangle)
-        n = np.einsum("tij,tj->it", turn, self.normals[some])[:, None]
-        heights = heights[some].T[:, None]
-        v, spin = at.velocity[of].T[:, None], at.spin[of].T[:, None]
+        owner, rotation = self.owner[under], poses.rotation[self.owner[under]]
+        r = np.einsum("tij,tcj->ict", rotation, self.corners[under])[:, :, None]  # (xyz, corner, column, triangle)
+        n = np.einsum("tij,tj->it", rotation, self.normals[under])[:, None]
+        heights = heights[under].T[:, None]
+        v, spin = poses.velocity[owner].T[:, None], poses.spin[owner].T[:, None]
         if k is not None:
             nudge = grains.rounding * NUDGE / np.stack([np.ones(count), self.reach])
-            dv, dw = np.zeros((3, 7, len(of))), np.zeros((3, 7, len(of)))
+            dv, dw = np.zeros((3, 7, len(owner))), np.zeros((3, 7, len(owner)))
             for j in range(3):
-                dv[j, 1 + j], dw[j, 4 + j] = nudge[0, of], nudge[1, of]
-            turned = k * dw
-            r = r + cross(turned[:, None], r)
+                dv[j, 1 + j], dw[j, 4 + j] = nudge[0, owner], nudge[1, owner]
+            angle = k * dw
+            r = r + cross(angle[:, None], r)
             heights = heights + k * dv[2] + (r[2] - r[2, :, :1])
-            n, v, spin = n + cross(turned, n), v + dv, spin + dw
-        wrench = self._summed(grains, some, of, r, heights, n, v, spin)
+            n, v, spin = n + cross(angle, n), v + dv, spin + dw
+        wrench = self._wrenches(grains, under, owner, r, heights, n, v, spin)
         if k is None:
             return wrench[:, 0], None
         change = (wrench[:, 1:] - wrench[:, :1]) / np.repeat(nudge, 3, 0).T[:, :, None]
         return wrench[:, 0], change.swapaxes(1, 2)
 
-    def _summed(self, grains, some, of, r, heights, n, v, spin) -> np.ndarray:
-        """(B, C, 6): of C columns."""
+    def _wrenches(self, grains, under, owner, r, heights, n, v, spin) -> np.ndarray:
+        """Return the wrenches (B, C, 6) on triangles ``under`` the surface in C motions."""
         share, middle, moments = submerged(heights)
-        middle, arms, areas = (middle * r).sum(1), (moments * r).sum(1), self.areas[some]
+        middle, arms, areas = (middle * r).sum(1), (moments * r).sum(1), self.areas[under]
         part = Part(n, middle, areas * share, areas * moments.sum(0), areas * arms)
-        force, moment, _ = load(grains.law, grains.ground, part, Motion(v, spin), self.sheet[some])
+        force, moment, _ = load(grains.law, grains.ground, part, Motion(v, spin), self.sheet[under])
         out = np.zeros((len(self.bodies), share.shape[0], 6))
-        first = np.flatnonzero(np.diff(of, prepend=-1))
+        first = np.flatnonzero(np.diff(owner, prepend=-1))
         sums = np.add.reduceat(np.concatenate([force, moment]), first, axis=2)
-        out[of[first]] = sums.transpose(2, 1, 0)
+        out[owner[first]] = sums.transpose(2, 1, 0)
         return out
-
-    def rounded(self, grains: Grains, wider: float) -> Grains:
-        return replace(grains, rounding=wider * grains.rounding)

@@ -1,8 +1,8 @@
-"""Steps in time of many robots at once, each at its own pace (`rft.walking.sdirk`).
+"""Steps in time of many robots at once, each at its own rate (`rft.walking.sdirk`).
 
-Steps end where the clock's rate jumps. Some robots stick where others slip, and take ten times as many iterations. So
-none waits for another: all that are under way are in the batch of which the next forces come, each in its own step,
-stage and iteration."""
+Steps end where the clock's rate jumps. Some robots stick where others slip, and take ten times as many iterations. So no
+robot waits for another: each evaluation of forces is a batch of all robots under way, every one in its own step, stage and
+iteration."""
 
 from __future__ import annotations
 
@@ -11,78 +11,104 @@ import numpy as np
 from rft.balance.backend import compiles
 from rft.vectors import at
 from rft.walking.planar import Robots, State
-from rft.walking.sdirk import EFFORT, GAMMA, SOLVED, Effort, Way, advanced, begun, ended, judged, when
+from rft.walking.sdirk import (
+    EFFORT,
+    GAMMA,
+    SOLVED,
+    Effort,
+    Step,
+    has_ended,
+    newton_step,
+    next_problem,
+    stage_time,
+    start_of_step,
+)
 
-UNENDING = np.inf, np.inf  # heights over which a robot is airborne, and below which it is sunk
+UNENDING = np.inf, np.inf  # `rft.walking.sdirk.has_ended`: robots neither sink nor fly
 
 
-def march(robots: Robots, which, state: State, phases, of, ends=UNENDING) -> tuple[State, np.ndarray]:
-    """From a state of these robots, the states after every step (S, B): from phase to phase (S + 1,), while the legs
-    turn at the rates that hold at the phases ``of`` (S,); and how often forces were evaluated (B,). ends: as of
-    `rft.walking.sdirk.ended`; who is at an end goes no further."""
-    which, phases = np.asarray(which), np.asarray(phases)
-    here = np.broadcast_to(phases[:-1, None], (len(of), len(which)))
-    angles, rates = robots.turned(here, np.broadcast_to(np.asarray(of)[:, None], here.shape), which)
-    lengths = np.diff(phases)[:, None] / robots.frequency[which, 0]
-    ends = np.stack([np.broadcast_to(x, len(which)) for x in ends])
+def march(robots: Robots, index, state: State, phases, rate_phases, ends=UNENDING) -> tuple[State, np.ndarray]:
+    """Return the states after every step (S, B) of the robots ``index`` from a state, and how often forces were evaluated
+    (B,).
+
+    The steps go from phase to phase (S + 1,), in cycles. In each the legs rotate at the rates of the clock at
+    ``rate_phases`` (S,), which tell the side of a kink. ends: see `rft.walking.sdirk.has_ended`; a robot at an end stays
+    there."""
+    index, phases = np.asarray(index), np.asarray(phases)
+    starts = np.broadcast_to(phases[:-1, None], (len(rate_phases), len(index)))
+    angles, rates = robots.leg_motion(starts, np.broadcast_to(np.asarray(rate_phases)[:, None], starts.shape), index)
+    lengths = np.diff(phases)[:, None] / robots.frequency[index, 0]
+    ends = np.stack([np.broadcast_to(x, len(index)) for x in ends])
     if compiles("auto", robots.elements.law):
-        from rft.walking.compiled import stepped
+        from rft.walking.compiled import run_steps
     else:
-        stepped = stepped_by_numpy
-    states, tries = stepped(robots, which, state.packed(), angles, rates, lengths, ends, EFFORT)
+        run_steps = run_steps_by_numpy
+    states, tries = run_steps(robots, index, state.packed(), angles, rates, lengths, ends, EFFORT)
     return State.unpacked(states), tries
 
 
-def step(robots: Robots, state: State, phase: float, of: float, dt: float) -> State:
-    """From a phase on for dt, s, while the legs turn at the rates that hold at the phase ``of``; robots of one frequency."""
+def step(robots: Robots, state: State, phase: float, rate_phase: float, dt: float) -> State:
+    """Return the state of robots of one frequency after a time step dt, s, from a phase, with the legs at the rates of the
+    clock at ``rate_phase``."""
     phases = phase, phase + dt * robots.frequency[0, 0]
-    return march(robots, range(len(robots)), state, phases, [of])[0].take(0)
+    return march(robots, range(len(robots)), state, phases, [rate_phase])[0].take(0)
 
 
-def stepped_by_numpy(robots: Robots, which, state: np.ndarray, angles, rates, lengths, ends, effort: Effort):
-    """(states (S, B, 11) after each step, evaluations (B,)) from a packed state (B, 11), with legs at angles (S, B, K) at
-    the begin of each step and turning at rates (S, B, K) for lengths (S, B), s."""
+def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, lengths, ends, effort: Effort):
+    """Return the states after each step (S, B, 11) and the numbers of evaluations (B,), from packed states (B, 11).
+
+    angles: (S, B, K), of the legs at the beginning of each step, rad. rates: (S, B, K), rad/s. lengths: (S, B), s. ends:
+    (2, B)."""
     count, size = lengths.shape
-    states, tries, one = np.empty((count, *state.shape)), np.zeros(size, int), np.arange(size)
-    w, now = way(state), np.zeros(size, int)  # of those that go on, numbered by ``one``, which are at the steps ``now``
-    while one.size:
-        robot, length = which[one], lengths[now, one]
-        h, turned = w.part * length, (when(w) * length)[:, None]
-        width, rate = at(effort.widths, w.width, 0), rates[now, one]
+    states, tries = np.empty((count, *start.shape)), np.zeros(size, int)
+    # Of the robots under way: their columns, the numbers of their steps, and where they are in them.
+    column, number, steps = np.arange(size), np.zeros(size, int), unpacked(start)
+    while column.size:
+        robot, length = index[column], lengths[number, column]
+        h, time = steps.stage.part * length, (stage_time(steps.stage) * length)[:, None]
+        width, rate = at(effort.widths, steps.newton.width, 0), rates[number, column]
         ground, k = robots.ground_under(robot, width), GAMMA * h
-        off, slopes, power = robots.residual(
-            robot, w.base, w.start, w.trial, angles[now, one] + turned * rate, rate, k, ground
+        residual, slopes, power = robots.residual(
+            robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
+            ground,
+        )  # fmt: skip
+        tolerance = SOLVED * ground.rounding
+        newton, solved, failed = newton_step(
+            steps.newton, residual, slopes, power, k, robots.reach[robot], tolerance, effort
         )
-        solved = SOLVED * ground.rounding
-        w, good, lost = judged(w, off, slopes, power, k, robots.reach[robot], solved, effort)
-        tries[one] += 1
-        if not (good | lost).any():
+        steps = Step(steps.accepted, steps.stage, newton)
+        tries[column] += 1
+        if not (solved | failed).any():
             continue
-        w, over = advanced(w, good, lost, solved, k, h, effort)
+        steps, over = next_problem(steps, solved, failed, tolerance, k, h, effort)
         if over.any():
-            new = packed(w)
-            states[now[over], one[over]] = new[over]
-            now = now + over
-            done = over & ended(w.pose[1], w.pose[2], ends[:, one])
-            for j in np.flatnonzero(done):
-                states[now[j] :, one[j]] = new[j]
-            on = ~done & (now < count)
-            if not on.all():
-                w, one, now = taken(w, on), one[on], now[on]
+            row, pose = packed(steps), steps.accepted.pose
+            states[number[over], column[over]] = row[over]
+            number = number + over
+            ended = over & has_ended(pose[1], pose[2], ends[:, column])
+            for j in np.flatnonzero(ended):
+                states[number[j] :, column[j]] = row[j]
+            active = ~ended & (number < count)
+            if not active.all():
+                steps, column, number = select(steps, active), column[active], number[active]
     return states, tries
 
 
-def way(state: np.ndarray) -> Way:
-    """The begin of a step in a packed state (B, 11)."""
+def unpacked(state: np.ndarray) -> Step:
+    """Return robots in packed states (B, 11) at the start of a time step."""
     x = tuple(state.T)
-    return begun(x[:3], x[3:6], *x[6:])
+    return start_of_step(x[:3], x[3:6], *x[6:])
 
 
-def packed(w: Way) -> np.ndarray:
-    """(B, 11): the state at the begin of the present part of a step."""
-    return np.stack([*w.pose, *w.twist, *w[2:7]], -1)
+def packed(steps: Step) -> np.ndarray:
+    """Return the accepted states (B, 11)."""
+    pose, twist, *sums = steps.accepted
+    return np.stack([*pose, *twist, *sums], -1)
 
 
-def taken(w: Way, some) -> Way:
-    """The ways of some of the robots."""
-    return Way(*(tuple(y[some] for y in x) if isinstance(x, tuple) else x[some] for x in w))
+def select(values, rows):
+    """Return these rows of all arrays in nested tuples."""
+    if not isinstance(values, tuple):
+        return values[rows]
+    parts = [select(x, rows) for x in values]
+    return type(values)(*parts) if hasattr(values, "_fields") else tuple(parts)

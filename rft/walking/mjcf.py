@@ -1,4 +1,4 @@
-"""Robots of one's own: any MJCF, with a list of the geoms that touch the ground. Needs MuJoCo."""
+"""Custom robots: any MJCF, with a list of the geoms that touch the ground. Needs MuJoCo."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rft.walking.facets import Surface
 from rft.walking.robot import Robot
 
 LARGEST_FILE = 20_000_000  # bytes of XML
-MOST_ALIKE = 200  # geoms, and actuators
+MOST_NAMES = 200  # of geoms, and of actuators
 MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 
 
@@ -22,12 +22,12 @@ MISSING = "an MJCF needs MuJoCo: pip install 'geomech[mujoco]'"
 class Mjcf(Robot):
     """A robot of an MJCF file, walking along x, the ground at z = 0.
 
-    mjcf (-): name of the file; in a scene file, from the folder of that. geoms (-): names of those that touch the ground,
-    and nothing else. actuators (-): names of those that the gait's clock turns, <position> or <velocity> ones; if left out
-    all such. phases (-): of each of them, in cycles; if left out 0.
+    mjcf (-): name of the file; in a scene file, from the scene's folder. geoms (-): names of the geoms that touch the ground,
+    and nothing else. actuators (-): names of the <position> or <velocity> actuators that the gait's clock drives; by default
+    all of them. phases (-): phase of each of these actuators, in cycles; by default 0.
 
     Other actuators keep the controls of the first keyframe, or 0. The robot starts as in the first keyframe, if there is one,
-    lifted or lowered so that the lowest of its geoms is on the ground.
+    at the height where the lowest of its geoms is on the ground.
     """
 
     mjcf: str
@@ -35,7 +35,7 @@ class Mjcf(Robot):
     actuators: tuple[str, ...] | None = None
     phases: tuple[float, ...] | None = None
     digest: str = field(init=False, default="")
-    apart = ()
+    hip_phases = ()
     period = 1.0
 
     def __post_init__(self):
@@ -44,8 +44,8 @@ class Mjcf(Robot):
             value = getattr(self, name)
             if value is None and name == "actuators":
                 continue
-            good = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
-            require(good and len(value) <= MOST_ALIKE, f"{name} must be a list of names, got {shown(value)}")
+            valid = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
+            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names, got {shown(value)}")
             require(len({*value}) == len(value), f"{name} names one twice: {shown(value)}")
             object.__setattr__(self, name, tuple(value))
         require(len(self.geoms) > 0, "a robot without legs: geoms must name those that touch the ground")
@@ -65,22 +65,23 @@ class Mjcf(Robot):
 
     @property
     def mass(self) -> float:
-        """kg, of all bodies."""
+        """Mass of all bodies, kg."""
         return float(self.model.body_mass.sum())
 
     def _find_geoms(self) -> None:
+        """Set the numbers of the geoms; ValueError for unknown ones and for those of the world."""
         model = self.model
         require(model.nv > 0, f"{self.mjcf}: nothing can move: it has no joints")
-        found = []
+        numbers = []
         for name in self.geoms:
             geom = self._number("geom", name, model.ngeom)
-            still = model.body_weldid[model.geom_bodyid[geom]] == 0
-            require(not still, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
-            found.append(geom)
-        object.__setattr__(self, "found", np.array(found))
+            fixed = model.body_weldid[model.geom_bodyid[geom]] == 0
+            require(not fixed, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
+            numbers.append(geom)
+        object.__setattr__(self, "geom_numbers", np.array(numbers))
 
     def _number(self, kind: str, name: str, count: int) -> int:
-        """Of the model's geom or actuator of that name; ValueError that names the nearest, or the first few, if it has none."""
+        """Return the number of the model's geom or actuator of a name; a ValueError names the nearest, or the first few."""
         import mujoco
 
         kinds = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
@@ -89,11 +90,12 @@ class Mjcf(Robot):
             names = [x for x in (mujoco.mj_id2name(self.model, kinds, k) for k in range(count)) if x]
             near = difflib.get_close_matches(name, names, 1, 0.5)
             few = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
-            told = f"did you mean {shown(near[0])}?" if near else f"it has {few}"
-            raise ValueError(f"{self.mjcf} has no {kind} {shown(name)}: {told}")
+            cure = f"did you mean {shown(near[0])}?" if near else f"it has {few}"
+            raise ValueError(f"{self.mjcf} has no {kind} {shown(name)}: {cure}")
         return number
 
     def _find_driven(self) -> None:
+        """Set the numbers and phases of the actuators that the clock drives; ValueError for actuators that it cannot drive."""
         import mujoco
 
         model = self.model
@@ -108,8 +110,8 @@ class Mjcf(Robot):
         cure = "make it <position> or <velocity>"
         if self.actuators is None:
             driven = np.flatnonzero(able)
-            told = f"{self.mjcf}: no actuator can follow the clock: {cure}, or actuators = [] for the first keyframe's controls"
-            require(len(driven) > 0, told)
+            cure = f"{cure}, or actuators = [] for the first keyframe's controls"
+            require(len(driven) > 0, f"{self.mjcf}: no actuator can follow the clock: {cure}")
         else:
             ids = [self._number("actuator", name, model.nu) for name in self.actuators]
             for name, k in zip(self.actuators, ids):
@@ -117,23 +119,23 @@ class Mjcf(Robot):
             driven = np.array(ids, int)
         for k in driven:
             name = shown(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
-            told = f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round needs none; drop it"
-            require(not model.actuator_ctrllimited[k], told)
+            message = f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round needs none; drop it"
+            require(not model.actuator_ctrllimited[k], message)
         phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
-        good = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
-        require(good, f"phases must be {len(driven)} numbers, one for each actuator, got {shown(self.phases)}")
+        valid = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
+        require(valid, f"phases must be {len(driven)} numbers, one for each actuator, got {shown(self.phases)}")
         object.__setattr__(self, "phases", tuple(map(float, phases)))
         object.__setattr__(self, "driven", driven)
 
     def surfaces(self, elements: int) -> list[Surface]:
-        """What touches the ground, round geoms of ``elements`` edges around."""
+        """Return the surfaces of the geoms, with ``elements`` edges around round ones."""
         from rft.walking import geoms
 
         in_range("elements", elements, 4, 1000, whole=True)
         out = []
-        for name, geom in zip(self.geoms, self.found):
+        for name, geom in zip(self.geoms, self.geom_numbers):
             try:
-                out.append(geoms.surface(self.model, geom, geoms.mesh_of(self.model, geom, elements)))
+                out.append(geoms.surface(self.model, geom, geoms.geom_mesh(self.model, geom, elements)))
             except ValueError as error:
                 raise ValueError(f"{self.mjcf}: geom {shown(name)}: {error}") from None
         return out
@@ -143,12 +145,12 @@ class Mjcf(Robot):
 
 
 def _compiled(file: str):
-    """(model, digest) of an ordinary file; ValueError in one line if it is none."""
+    """Return the model of a file and its digest; ValueError of one line if MuJoCo cannot read the file."""
     try:
         import mujoco
     except ImportError:
         raise ValueError(MISSING) from None
-    # MuJoCo writes warnings to the screen and to a file; what matters of them is refused below.
+    # MuJoCo writes warnings to the screen and to a file; the checks below refuse what matters.
     mujoco.set_mju_user_warning(lambda _: None)
     path = Path(file)
     try:
@@ -159,21 +161,22 @@ def _compiled(file: str):
         raise ValueError(f"cannot read MJCF {file}: {error.strerror}") from None
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
-    except Exception as error:  # whatever the parser makes of a file that is none
-        told = " ".join(str(error).split())
-        raise ValueError(f"{file} is no MJCF that MuJoCo reads: {told[:300]}") from None
-    if wrong := _not_finite(model):
-        raise ValueError(f"{file}: nan or inf in {wrong}: every number of an MJCF must be finite")
+    except Exception as error:  # MuJoCo raises many kinds of errors for a file that is no MJCF
+        message = " ".join(str(error).split())
+        raise ValueError(f"{file} is no MJCF that MuJoCo reads: {message[:300]}") from None
+    if names := _not_finite(model):
+        raise ValueError(f"{file}: nan or inf in {names}: every number of an MJCF must be finite")
     down = model.opt.gravity
     upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
     require(bool(upright), f"{file}: gravity must be along -z, the ground is at z = 0")
-    whole = np.empty(mujoco.mj_sizeModel(model), np.uint8)  # with what its includes and meshes say
-    mujoco.mj_saveModel(model, None, whole)
-    return model, hashlib.sha256(whole).hexdigest()[:16]
+    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)  # with that of included files and meshes
+    mujoco.mj_saveModel(model, None, content)
+    return model, hashlib.sha256(content).hexdigest()[:16]
 
 
 def _not_finite(model) -> str:
-    """Names of arrays that are not all numbers, as "keyframe qpos, body_pos", but for those that MuJoCo makes of others."""
+    """Return the names of arrays with nan or inf, as "keyframe qpos, body_pos", but for those that MuJoCo computes from
+    others."""
     arrays = {name: getattr(model, name) for name in dir(model) if not name.endswith(("0", "_spring"))}
     floats = {name: x for name, x in arrays.items() if isinstance(x, np.ndarray) and x.dtype.kind == "f"}
     return ", ".join(name.replace("key_", "keyframe ") for name, x in floats.items() if not np.isfinite(x).all())

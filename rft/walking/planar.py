@@ -1,7 +1,7 @@
 """Newton's equations of light-legged robots on grains in the vertical plane, many robots at once.
 
-The state is the body's pose (x, z, pitch) and its rates; the legs have no mass and turn as the clock says.
-`rft.walking.march` takes the steps.
+The state is the body's pose (x, z, pitch) and its rates; the legs have no mass and rotate by the clock.
+`rft.walking.march` steps in time.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from rft.laws.catalogue import GRAVITY
 from rft.plates.stress import PlateStress
 from rft.vectors import formula
 from rft.walking.elements import Elements, Outlines
-from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate, rounded
+from rft.walking.robot import Robot, Tripod, leg_angle, leg_rate, walking_rounding
 
-FIRST = np.eye(4)[1:, :, None]  # of four residuals the first is as it is, in the others one rate is changed
-NUDGE = 1e-3  # of the rates, times the rounding, for differences
+CHANGED = np.eye(4)[1:, :, None]  # which rate is changed in each of four residuals; none in the first
+NUDGE = 1e-3  # change of a rate for differences, over the rounding
 
 
 class State(NamedTuple):
-    """pose, twist: (..., B, 3) as (x, z, pitch) and their rates. work, loss: (..., B), J, of the motors and in the
-    ground, so far. unsolved: (..., B), steps so far that Newton's method left unsolved, however short, and that were
-    taken as they were.
-    defect: (..., B), m/s, what these are off by, in all. residual: (..., B), m/s, the largest that a step is off by."""
+    """State of B robots. pose, twist: (..., B, 3) as (x, z, pitch) and their rates. work, loss: (..., B), J, of the motors
+    and in the ground since the start. unsolved: (..., B), number of steps that were accepted unsolved, since Newton's
+    method failed even at the shortest length. defect: (..., B), m/s, sum of the residuals of these steps. residual: (...,
+    B), m/s, the largest of all steps."""
 
     pose: np.ndarray
     twist: np.ndarray
@@ -37,126 +37,136 @@ class State(NamedTuple):
     residual: np.ndarray
 
     @classmethod
-    def still(cls, pose: np.ndarray) -> State:
-        """At rest there."""
+    def at_rest(cls, pose: np.ndarray) -> State:
+        """Return the state at rest in a pose."""
         return cls(pose, np.zeros_like(pose), *np.zeros((5, *pose.shape[:-1])))
 
     def packed(self) -> np.ndarray:
-        """(..., B, 11)."""
+        """Return the state as one array (..., B, 11)."""
         return np.concatenate([self.pose, self.twist, *(x[..., None] for x in self[2:])], -1)
 
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> State:
+        """Return the state that `packed` has put into an array (..., B, 11)."""
         return cls(numbers[..., :3], numbers[..., 3:6], *np.moveaxis(numbers[..., 6:], -1, 0))
 
-    def take(self, some) -> State:
-        return State(*(x[some] for x in self))
+    def take(self, index) -> State:
+        """Return the states at an index of the first axis."""
+        return State(*(x[index] for x in self))
 
-    def put(self, some, other: State) -> State:
-        """With these samples as in the other."""
+    def put(self, index, other: State) -> State:
+        """Return a copy with the states at an index of the first axis from ``other``."""
         new = State(*(x.copy() for x in self))
         for x, y in zip(new, other):
-            x[some] = y
+            x[index] = y
         return new
 
 
 class Robots:
-    """B robots of equally many legs and elements on the same kind of ground; ``at``: (K,) phases of the legs. ground:
-    (B,), one rounding for all, of which slow legs take less."""
+    """B robots of equally many legs and elements on one kind of ground.
+
+    ground: (B,), with one rounding for all, which is reduced for slow legs. masses: (B, 3), mass, mass and moment of
+    inertia: those of x, z and pitch. frequency: (B, 1), Hz. hips: (2, B, K), x and z from the centre of mass, m.
+    leg_phases: (K,), cycles. reach: (B,), m, of the legs from their hips."""
 
     def __init__(self, robots: list[Robot], gaits: list[Tripod], stress: PlateStress, ground: Ground, elements: int):
-        column = lambda of, names: np.array([[getattr(x, name) for name in names] for x in of], float)
-        self.weighed = column(robots, ("mass", "mass", "inertia"))
-        self.frequency, *self.clock = column(gaits, ("frequency", "duty", "sweep", "middle")).T[..., None]
-        first, count = robots[0], len(robots[0].apart)
-        self.at = np.array([(k + j) % count / count for k in range(len(first.hips)) for j in range(count)])
+        self.masses = _columns(robots, ("mass", "mass", "inertia"))
+        self.frequency, *self.clock = _columns(gaits, ("frequency", "duty", "sweep", "middle")).T[..., None]
+        first, count = robots[0], len(robots[0].hip_phases)
+        self.leg_phases = np.array([(k + j) % count / count for k in range(len(first.hips)) for j in range(count)])
         hip_x = np.array([np.repeat(r.hips, count) for r in robots])
-        self.hips = np.stack([hip_x, np.zeros_like(hip_x) + column(robots, ("hip_height",))])
-        self.legs, belly = Outlines.of(_each(robots, "leg", elements)), _each(robots, "belly", elements)
-        self.belly = None if belly[0] is None else Outlines.of(belly)
+        self.hips = np.stack([hip_x, np.zeros_like(hip_x) + _columns(robots, ("hip_height",))])
+        self.legs, belly = Outlines.from_list(_outlines(robots, "leg", elements)), _outlines(robots, "belly", elements)
+        self.belly = None if belly[0] is None else Outlines.from_list(belly)
         self.elements = Elements(self.legs, self.belly, self.hips, stress)
         self.reach = np.abs(self.legs.points).max((1, 2)) + np.zeros(len(robots))
-        self.ground = ground._replace(rounding=rounded(ground.rounding, self.frequency[:, 0], self.reach))
+        self.ground = ground._replace(rounding=walking_rounding(ground.rounding, self.frequency[:, 0], self.reach))
 
     def __len__(self) -> int:
-        return len(self.weighed)
+        return len(self.masses)
 
-    def ground_under(self, which, width=1.0) -> Ground:
-        """The ground of these robots, (B,), its rounding times a width, and its grazing angle by the root of that."""
+    def ground_under(self, index, width=1.0) -> Ground:
+        """Return the ground of these robots (B,), with the rounding times a width and the grazing sine times its root."""
         g = self.ground
-        wide = {"rounding": g.rounding[which] * width, "sine": g.sine * np.sqrt(width)}
-        return g._replace(strength=g.strength[which], flux=g.flux[which], **wide)
+        wide = {"rounding": g.rounding[index] * width, "grazing_sine": g.grazing_sine * np.sqrt(width)}
+        return g._replace(strength=g.strength[index], flux=g.flux[index], **wide)
 
-    def energy(self, state: State, which=slice(None)) -> np.ndarray:
-        """(..., B), J: of motion and height, of these robots."""
-        mass, inertia = self.weighed[which, 0], self.weighed[which, 2]
+    def energy(self, state: State, index=slice(None)) -> np.ndarray:
+        """Return the kinetic and potential energy (..., B), J, of these robots."""
+        mass, inertia = self.masses[index, 0], self.masses[index, 2]
         v_x, v_z, rate = np.moveaxis(state.twist, -1, 0)
         turning = np.where(np.isfinite(inertia), inertia, 0.0) * rate**2
         return mass * (v_x**2 + v_z**2) / 2 + turning / 2 + mass * GRAVITY * state.pose[..., 1]
 
-    def placed(self) -> State:
-        """At rest, level, the lowest point of legs and body on the surface at the phase 0."""
-        angle = self.turned(np.zeros(len(self)), 0.0)[0]
-        low = [z + self.legs.lowest(turn) for z, turn in zip(self.hips[1].T, angle.T)]
+    def start(self) -> State:
+        """Return the state at rest at phase 0: level, with the lowest point of legs and body on the surface."""
+        angles = self.leg_motion(np.zeros(len(self)), 0.0)[0]
+        low = [z + self.legs.lowest(angle) for z, angle in zip(self.hips[1].T, angles.T)]
         if self.belly:
             low.append(self.belly.lowest(np.zeros(len(self))) + np.zeros(len(self)))
         pose = np.zeros((len(self), 3))
         pose[:, 1] = -np.min(low, axis=0)
-        return State.still(pose)
+        return State.at_rest(pose)
 
-    def turned(self, phase, of, which=slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Angles (..., B, K) and rates (..., B, K), rad/s, of the legs of these robots at phases (..., B), by the rates
-        that hold at ``of``, which is as long or a number."""
-        of, clock = np.asarray(of)[..., None] + self.at, [x[which] for x in self.clock]
-        angle = leg_angle(np.asarray(phase)[..., None] + self.at, of, *clock)
-        return angle, self.frequency[which] * leg_rate(of, *clock[:2]) + 0.0 * angle
+    def leg_motion(self, phase, rate_phase, index=slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Return angles (..., B, K), rad, and rates (..., B, K), rad/s, of the legs of these robots at phases (..., B), by
+        the rates of the clock at ``rate_phase``, (..., B) or a number."""
+        rate_phase, clock = np.asarray(rate_phase)[..., None] + self.leg_phases, [x[index] for x in self.clock]
+        angle = leg_angle(np.asarray(phase)[..., None] + self.leg_phases, rate_phase, *clock)
+        return angle, self.frequency[index] * leg_rate(rate_phase, *clock[:2]) + 0.0 * angle
 
-    def forces(self, pose, twist, angle, rate, which=None, ground: Ground | None = None):
-        """Accelerations (C, B, 3) of bodies (C, B, 3) of these robots, at hardly different places, with legs at (B, K) that
-        turn at (B, K), and power of the motors and into the ground, (C, B)."""
-        which = np.arange(len(self)) if which is None else which
+    def accelerations(self, pose, twist, angle, rate, index=None, ground: Ground | None = None):
+        """Return accelerations (C, B, 3) of these robots, and power of the motors and into the ground, W, (C, B).
+
+        pose, twist: (C, B, 3); the C motions of a robot hardly differ. angle, rate: (B, K), of the legs, rad and rad/s."""
+        index = np.arange(len(self)) if index is None else index
         pose, twist = (tuple(np.moveaxis(x, -1, 0)) for x in (pose, twist))
-        found = self.elements.sums(ground or self.ground_under(which), which, pose, twist, angle, rate)
-        a = accelerations(found, self.weighed[which, 0], self.weighed[which, 2])
-        return np.stack(a, -1), found.motors, found.into
+        load = self.elements.load(ground or self.ground_under(index), index, pose, twist, angle, rate)
+        a = accelerations(load, self.masses[index, 0], self.masses[index, 2])
+        return np.stack(a, -1), load.motor_power, load.ground_power
 
-    def residual(self, which, base, start, v, angle, rate, k, ground: Ground):
-        """Of the rates v = start + k a(base + k v, v), triples of (B,), of these robots: (what they are off by, its slopes
-        by differences, three columns, power of the motors and into the ground, (B,))."""
-        nudge = nudges(ground.rounding, self.reach[which])
-        tried = tuple(x + FIRST[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
-        pose = plus(base, times(k, tried))
-        found = self.elements.sums(ground, which, pose, tried, angle, rate)
-        off = imbalance(found, tried, start, k, self.weighed[which, 0], self.weighed[which, 2])
-        slopes = tuple(tuple((x[j + 1] - x[0]) / y for x in off) for j, y in enumerate(nudge))
-        return tuple(x[0] for x in off), slopes, (found.motors[0], found.into[0])
-
-
-@formula
-def accelerations(sums, mass, inertia):
-    """Return those of a body, (x, z, pitch)."""
-    return sums.f_x / mass, sums.f_z / mass - GRAVITY, sums.moment / inertia
+    def residual(self, index, base, start, v, angle, rate, k, ground: Ground):
+        """Return the residual of v = start + k a(base + k v, v) of these robots, triples of (B,), its slopes by differences,
+        three columns, and power of the motors and into the ground, W, (B,)."""
+        nudge = difference_steps(ground.rounding, self.reach[index])
+        trial = tuple(x + CHANGED[j] * y for j, (x, y) in enumerate(zip(v, nudge)))
+        pose = plus(base, times(k, trial))
+        load = self.elements.load(ground, index, pose, trial, angle, rate)
+        residual = stage_residual(load, trial, start, k, self.masses[index, 0], self.masses[index, 2])
+        slopes = tuple(tuple((x[j + 1] - x[0]) / y for x in residual) for j, y in enumerate(nudge))
+        return tuple(x[0] for x in residual), slopes, (load.motor_power[0], load.ground_power[0])
 
 
 @formula
-def imbalance(sums, v, start, k, mass, inertia):
-    """Return v - start - k a."""
-    x, z, pitch = accelerations(sums, mass, inertia)
+def accelerations(load, mass, inertia):
+    """Return the accelerations (x, z, pitch) of a body under a `BodyLoad` and gravity."""
+    return load.f_x / mass, load.f_z / mass - GRAVITY, load.moment / inertia
+
+
+@formula
+def stage_residual(load, v, start, k, mass, inertia):
+    """Return v - start - k a, a triple, m/s and rad/s."""
+    x, z, pitch = accelerations(load, mass, inertia)
     return v[0] - start[0] - k * x, v[1] - start[1] - k * z, v[2] - start[2] - k * pitch
 
 
 @formula
-def nudges(rounding, reach):
-    """Return by how much the rates are changed for differences."""
+def difference_steps(rounding, reach):
+    """Return the changes of the rates (x, z, pitch) for differences."""
     nudge = NUDGE * rounding
     return nudge, nudge, nudge / reach
 
 
-def _each(robots: list[Robot], what: str, elements: int) -> list:
-    """Outlines, the same object for robots alike."""
-    made: dict = {}
+def _columns(objects: list, names: tuple[str, ...]) -> np.ndarray:
+    """Return attributes of objects, an array with a row for each object."""
+    return np.array([[getattr(x, name) for name in names] for x in objects], float)
+
+
+def _outlines(robots: list[Robot], method: str, elements: int) -> list:
+    """Return the outlines of robots by one of their methods, the same object for equal robots."""
+    outlines: dict = {}
     keys = [repr(r) for r in robots]
     for r, key in zip(robots, keys):
-        if key not in made:
-            made[key] = getattr(r, what)(elements)
-    return [made[key] for key in keys]
+        if key not in outlines:
+            outlines[key] = getattr(r, method)(elements)
+    return [outlines[key] for key in keys]

@@ -1,4 +1,4 @@
-"""Robots of the vertical plane: a rigid body on legs that turn as they are told, and the clock that tells them.
+"""Robots of the vertical plane: a rigid body on legs, and the clock by which the legs rotate.
 
 Signs are those of `rft.plates.loads`: x forwards, z up, angles and rates about the y axis that points away, so a positive
 pitch has the nose down, and a leg that points down and turns at a positive rate drives the body forwards. SI units.
@@ -20,9 +20,9 @@ from rft.plates.outline import Outline
 from rft.plates.shapes import Polygon, Shape
 
 MOST_HIPS = 20
-LEAST_PART = 1 / 8  # of a cycle, as which a shorter part of it counts: a robot may be driven in that alone
-SMALLEST = 1e-7  # m/s, that a rounding may be
-CREEP = 0.05  # of the speed of the legs' ends, that it may be: above it legs sink as they stand, the more the slower
+SHORTEST = 1 / 8  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
+SMALLEST = 1e-7  # m/s, least rounding
+CREEP = 0.05  # largest rounding over the speed of the legs' ends: with more, slow legs sink as they stand
 
 Mass = Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that moves")]
 Axle = Annotated[float, metres("height of the axle about which legs turn, above the origin of their outline", -LARGEST)]
@@ -30,11 +30,11 @@ Axle = Annotated[float, metres("height of the axle about which legs turn, above 
 
 @dataclass(frozen=True)
 class Tripod:
-    """The clock of a leg (RHex): for a share ``duty`` of the cycle it turns by ``sweep``, in the middle of which its
-    angle is ``middle``, for the rest by what a whole turn lacks. 0 is straight down from the body; as it stands, a
-    constant rate.
+    """The clock of a leg (RHex): for a share ``duty`` of the cycle it rotates by ``sweep``, with the angle ``middle`` in the
+    middle of that time, for the rest by 2 pi - sweep. Angle 0 is straight down from the body. Both rates are constant; by
+    default they are equal.
 
-    The legs at a hip are half a cycle apart.
+    The legs at a hip differ by half a cycle.
     """
 
     frequency: Annotated[float, Number(1e-3, 200, "Hz", "turns a second")]
@@ -43,99 +43,101 @@ class Tripod:
         math.pi
     )
     middle: Annotated[float, Number(-math.pi, math.pi, "rad", "angle of a leg in the middle of its stance")] = 0.0
-    angles = ("sweep", "middle")
 
     def __post_init__(self):
         check_numbers(self)
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Phases, of the first half of the cycle, at which a leg of either tripod changes its rate, with both ends."""
+        """Phases from 0 to 0.5 at which a leg of either tripod changes its rate, with 0 and 0.5."""
         if abs(self.sweep - 2 * math.pi * self.duty) < 1e-12:
             return 0.0, 0.5
         first = min(self.duty, 1.0 - self.duty) / 2
         return (0.0, first, 0.5) if abs(first - 0.25) < 1e-12 else (0.0, first, 0.5 - first, 0.5)
 
-    def angle(self, phase, of) -> np.ndarray:
-        """Of a leg at ``phase`` (cycles), by the rate that holds at the phase ``of``, on whose side of a kink it is."""
-        return leg_angle(phase, of, self.duty, self.sweep, self.middle)
+    def angle(self, phase, rate_phase) -> np.ndarray:
+        """Return the angle of a leg at ``phase``, cycles, by the rate at ``rate_phase``, which tells the side of a kink."""
+        return leg_angle(phase, rate_phase, self.duty, self.sweep, self.middle)
 
-    def rate(self, of) -> np.ndarray:
-        """rad a cycle, at the phase ``of``."""
-        return leg_rate(of, self.duty, self.sweep)
-
-
-def parts(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
-    """(begin, end, time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, an eighth of them at least
-    in each part, however short, so that half of the steps are half of them there, too."""
-    return [(a, b, max(1, round(steps * max(b - a, LEAST_PART)))) for a, b in pairwise(kinks)]
+    def rate(self, phase) -> np.ndarray:
+        """Return the rate of a leg at ``phase``, rad a cycle."""
+        return leg_rate(phase, self.duty, self.sweep)
 
 
-def leg_angle(phase, of, duty, sweep, middle) -> np.ndarray:
-    """`Tripod.angle` of many clocks."""
-    turns = np.floor(np.asarray(of) + 0.5)
-    place, there = np.asarray(phase) - turns, np.asarray(of) - turns  # of the second, -0.5 to 0.5
-    slow = sweep / duty * place
-    fast = np.sign(there) * math.pi + _fast(duty, sweep) * (place - np.sign(there) * 0.5)
-    return middle + 2 * math.pi * turns + np.where(np.abs(there) <= duty / 2, slow, fast)
+def intervals(kinks: Sequence[float], steps: int) -> list[tuple[float, float, int]]:
+    """Return (begin, end, number of time steps) between neighbouring kinks of a clock: about ``steps`` to a cycle, and in each
+    interval at least those of `SHORTEST`, so that half of the steps are half of them in every interval."""
+    return [(a, b, max(1, round(steps * max(b - a, SHORTEST)))) for a, b in pairwise(kinks)]
 
 
-def leg_rate(of, duty, sweep) -> np.ndarray:
-    """`Tripod.rate` of many clocks."""
-    there = np.asarray(of) - np.floor(np.asarray(of) + 0.5)
-    return np.where(np.abs(there) <= duty / 2, sweep / duty, _fast(duty, sweep))
+def leg_angle(phase, rate_phase, duty, sweep, middle) -> np.ndarray:
+    """Return `Tripod.angle` of many clocks."""
+    turns = np.floor(np.asarray(rate_phase) + 0.5)
+    phase, within = np.asarray(phase) - turns, np.asarray(rate_phase) - turns  # the second from -0.5 to 0.5
+    stance = sweep / duty * phase
+    recovery = np.sign(within) * math.pi + _recovery_rate(duty, sweep) * (phase - np.sign(within) * 0.5)
+    return middle + 2 * math.pi * turns + np.where(np.abs(within) <= duty / 2, stance, recovery)
 
 
-def _fast(duty, sweep):
-    """rad a cycle, while a leg recovers."""
+def leg_rate(phase, duty, sweep) -> np.ndarray:
+    """Return `Tripod.rate` of many clocks."""
+    within = np.asarray(phase) - np.floor(np.asarray(phase) + 0.5)
+    return np.where(np.abs(within) <= duty / 2, sweep / duty, _recovery_rate(duty, sweep))
+
+
+def _recovery_rate(duty, sweep):
+    """Return the rate of a leg that recovers, rad a cycle."""
     return (2 * math.pi - sweep) / (1.0 - duty)
 
 
-def rounded(rounding: float, frequency, reach):
-    """m/s: the rounding of the ground's law at rest that does for legs of a reach, m, that turn at a frequency, Hz."""
+def walking_rounding(rounding: float, frequency, reach):
+    """Return the rounding, m/s, for legs of a reach, m, at a frequency, Hz: less than ``rounding`` for slow legs."""
     return np.clip(CREEP * 2 * math.pi * np.asarray(frequency) * reach, SMALLEST, rounding)
 
 
 class Robot:
-    """Base of robots. legs: the outline they share turns about its axle at each of the hips. inertia: kg m^2,
-    infinite for one that keeps its pitch.
+    """Base of robots. legs: shape of every leg, which rotates about its axle at a hip. inertia: kg m^2, infinite for a robot
+    that keeps its pitch.
     """
 
     mass: float
     legs: Shape
     axle: float
-    part: ClassVar[str] = "legs"  # the field, and the table of a scene, that says what it moves by
-    parts: ClassVar[str] = "legs"  # what these are
-    apart: ClassVar[tuple[float, ...]]  # phases of the legs at a hip
+    part: ClassVar[str] = "legs"  # field, and table of a scene, of the parts that drive the robot
+    parts: ClassVar[str] = "legs"  # name of these parts in messages
+    hip_phases: ClassVar[tuple[float, ...]]  # phases of the legs at a hip, cycles
     period: ClassVar[float]  # cycles after which the robot looks the same
 
     def leg(self, elements: int) -> Outline:
-        """The outline of a leg about its hip."""
+        """Return the outline of a leg about its hip."""
         outline = self.legs.outline(elements)
-        return Outline(outline.points - [0.0, self.axle], outline.width, outline.bends) if self.axle else outline
+        return (
+            Outline(outline.points - [0.0, self.axle], outline.width, outline.smooth_normals) if self.axle else outline
+        )
 
     def belly(self, elements: int) -> Outline | None:
-        """The outline of the body, if it can touch the ground."""
+        """Return the outline of the body; None if it cannot touch the ground."""
         return None
 
     def check(self, elements: int) -> None:
-        """ValueError unless what touches the ground can be cut into so many elements."""
+        """Raise ValueError unless the robot's surfaces can have so many elements."""
         self.leg(elements)
 
     def _check(self) -> None:
+        """Raise ValueError for numbers out of range, and without legs."""
         check_numbers(self)
         require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {shown(self.legs)}")
 
 
 @dataclass(frozen=True)
 class Rhex(Robot):
-    """A box on two legs at each hip, half a cycle apart and alternating from hip to hip: an alternating tripod.
+    """A box on two legs at each hip, which differ by half a cycle and alternate from hip to hip: an alternating tripod.
 
     hips (m): x of each hip from the centre of mass.
 
     aside (m): distance of the legs at each hip from the middle plane, one on either side, for the engine of three
-    dimensions; where none are given, beside the box, and at every other one of an odd number of hips so much farther out
-    that a tripod whose legs bear alike neither rolls nor yaws the body.
+    dimensions. By default legs touch the box; of an odd number of hips every second one has its legs farther out, so that a
+    tripod with equal forces on its legs neither rolls nor yaws the body.
     """
 
     mass: Mass
@@ -150,7 +152,7 @@ class Rhex(Robot):
     ] = None
     axle: Axle = 0.0
     aside: tuple[float, ...] | None = None
-    apart = (0.0, 0.5)
+    hip_phases = (0.0, 0.5)
     period = 1.0
 
     def __post_init__(self):
@@ -168,16 +170,14 @@ class Rhex(Robot):
             check_numbers(self)
         if self.aside is not None:
             aside = real_array("aside", self.aside)
-            good = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
-            told = (
-                f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip, got {shown(self.aside)}"
-            )
-            require(good, told)
+            valid = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
+            message = f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip"
+            require(valid, f"{message}, got {shown(self.aside)}")
             object.__setattr__(self, "aside", tuple(map(float, aside)))
 
     @property
     def sides(self) -> np.ndarray:
-        """m, of each hip: its legs from the middle plane."""
+        """Distances (K,), m, of the legs at each hip from the middle plane."""
         if self.aside is not None:
             return np.array(self.aside)
         count, near = len(self.hips), (self.width + self.legs.width) / 2
@@ -191,7 +191,7 @@ class Rhex(Robot):
 
 @dataclass(frozen=True)
 class Roller(Robot):
-    """A wheel, or whatever turns, on an axle that is kept level: a mass that moves forwards and up and down, driven by
+    """A wheel, or any other rotating shape, on an axle that is kept level: a mass that moves forwards and up and down under
     its own weight."""
 
     mass: Annotated[float, Number(1e-6, 1e4, "kg", "mass of all that the wheel carries, and its own")]
@@ -201,7 +201,7 @@ class Roller(Robot):
     hip_height = 0.0
     inertia = math.inf
     height = 0.0
-    apart = (0.0,)
+    hip_phases = (0.0,)
     period = 1.0
 
     def __post_init__(self):

@@ -1,12 +1,12 @@
-"""SDIRK2, of which each stage is solved to its end by Newton's method: one robot's way through its time steps.
+"""SDIRK2 with Newton's method: one robot's time steps, stage by stage and evaluation by evaluation.
 
-The law of stress knows of speed its direction alone, so it is stiff wherever something is nearly at rest: explicit
-steps chatter there, and linearly implicit ones too, as a step may begin in slip and end in stick. So each stage is
-solved to its end: SDIRK2 of Alexander, SIAM J. Numer. Anal. 14, 1006 (1977), of order 2, L-stable and stiffly accurate,
-by Newton's method on the three rates. What that does not solve it tries by way of wider roundings; a step it does not
-solve even so is halved.
+The law of stress depends on the direction of a velocity alone, so it is stiff wherever something is nearly at rest. Explicit
+steps chatter there, and linearly implicit ones too, as a step may begin in slip and end in stick. So each stage is solved to
+convergence: SDIRK2 of Alexander, SIAM J. Numer. Anal. 14, 1006 (1977), of order 2, L-stable and stiffly accurate, by
+Newton's method on the three rates. Where Newton's method fails, it goes through wider roundings of the law down to the
+law's own; where this fails, too, the step is halved.
 
-The functions are formulas (`rft.vectors`): `rft.walking.march` takes many robots through them side by side by NumPy,
+All functions are formulas (`rft.vectors`): `rft.walking.march` takes many robots through them side by side by NumPy,
 `rft.walking.compiled` one after the other. Triples are (x, z, pitch)."""
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from rft.vectors import absolute, floor, formula, maximum, where
 
 ORDER = 2  # of the error in 1 / steps
 GAMMA = 1.0 - 0.5**0.5
-SOLVED = 1e-3  # m/s, times the rounding: residual of a solved stage
+SOLVED = 1e-3  # residual of a solved stage over the rounding
 HALVINGS = 3  # of a step
 FARTHEST = 0.5  # of a leg's reach, that a step of Newton's method moves a body by
-LEAST = 0.05  # of a step of Newton's method, below which it is given up
-ENOUGH = 0.1  # of the fall of the residual that Newton's method foretells
+LEAST = 0.05  # share of a step of Newton's method, below which the method has failed
+ENOUGH = 0.1  # of the fall of the residual that Newton's method predicts
 
 
 class Effort(NamedTuple):
-    """What is done to solve a stage. widths: (W, 1), times the rounding, one after another until one is solved as it
-    is, the first and the last 1. iterations: of Newton's method at a width. smallest: part of a step."""
+    """Limits of the work on a stage. widths: (W, 1), factors of the rounding, one after another until the stage is solved
+    at the first or last, which are 1. iterations: of Newton's method at a width. smallest: part of a step."""
 
     widths: np.ndarray
     iterations: float
@@ -39,15 +39,8 @@ class Effort(NamedTuple):
 EFFORT = Effort(np.array([[1.0, 30.0, 10.0, 5.0, 3.0, 2.0, 1.5, 1.2, 1.0]]).T, 14.0, 0.5**HALVINGS)
 
 
-class Way(NamedTuple):
-    """A robot on its way.
-
-    pose, twist: at the start of the present part of a step. work, loss, unsolved, defect, residual: as of
-    `rft.walking.planar.State`. part, done: the present part of the step, and what is done of it, both over the step. At
-    the first or second ``stage``, 0 or 1, v = start + k a(base + k v, v). width: which rounding; tries: evaluations at
-    it. found: of all v tried the one with the smallest residual ``off``, m/s, with power of the motors and into the
-    ground, W; trial: the next, a ``share`` of Newton's step ``newton`` away, at first ``most`` of it. first: power and
-    residual of the first stage."""
+class Accepted(NamedTuple):
+    """State at the start of the present part of a step, with the fields of `rft.walking.planar.State`."""
 
     pose: tuple[float, float, float]
     twist: tuple[float, float, float]
@@ -56,33 +49,60 @@ class Way(NamedTuple):
     unsolved: float
     defect: float
     residual: float
+
+
+class Stage(NamedTuple):
+    """A stage of a part of a step: v = start + k a(base + k v, v).
+
+    part, elapsed: the present part, and the sum of those before it, over the step. second: 0 at the first stage, 1 at the
+    second. base, start: triples of the equation. guess: first trial for v. first: power of the motors and into the ground,
+    W, and residual, m/s, at the end of the first stage."""
+
     part: float
-    done: float
-    stage: float
-    width: float
-    tries: float
+    elapsed: float
+    second: float
     base: tuple[float, float, float]
     start: tuple[float, float, float]
     guess: tuple[float, float, float]
-    found: tuple[float, float, float]
-    trial: tuple[float, float, float]
-    newton: tuple[float, float, float]
-    off: float
-    share: float
-    most: float
-    power: tuple[float, float]
     first: tuple[float, float, float]
 
 
+class Newton(NamedTuple):
+    """Newton's method for a stage at one rounding.
+
+    width: index of the rounding in `Effort.widths`. tries: evaluations at it. best: of all v tried, that of the smallest
+    ``residual``, m/s. power: of the motors and into the ground, W, at the best v. step: Newton's step from there. trial: v
+    to be tried next, a ``share`` of the step from the best. largest: first share that is tried."""
+
+    width: float
+    tries: float
+    best: tuple[float, float, float]
+    trial: tuple[float, float, float]
+    step: tuple[float, float, float]
+    residual: float
+    share: float
+    largest: float
+    power: tuple[float, float]
+
+
+class Step(NamedTuple):
+    """A robot within a time step."""
+
+    accepted: Accepted
+    stage: Stage
+    newton: Newton
+
+
 @formula
-def begun(pose, twist, work, loss, unsolved, defect, residual):
-    """Return the way of a robot in a state at the start of a step."""
+def start_of_step(pose, twist, work, loss, unsolved, defect, residual):
+    """Return a robot in a state at the start of a time step."""
     zero = 0.0 * work
     one, none = zero + 1.0, (zero, zero, zero)
-    return Way(
-        pose, twist, work, loss, unsolved, defect, residual, one, zero, zero, zero, zero,
-        pose, twist, twist, twist, twist, none, zero + np.inf, one, one, (zero, zero), none,
-    )  # fmt: skip
+    return Step(
+        Accepted(pose, twist, work, loss, unsolved, defect, residual),
+        Stage(one, zero, zero, pose, twist, twist, none),
+        Newton(zero, zero, twist, twist, none, zero + np.inf, one, one, (zero, zero)),
+    )
 
 
 @formula
@@ -92,87 +112,106 @@ def pick(condition, a, b):
 
 
 @formula
-def gained(condition, now, more):
-    """Return now + more where the condition holds, now elsewhere."""
-    return now + where(condition, more, 0.0)
+def largest_speed(v, reach):
+    """Return the largest of the speeds v_x, v_z and reach times the rate of pitch."""
+    return maximum(maximum(absolute(v[0]), absolute(v[1])), reach * absolute(v[2]))
 
 
 @formula
-def largest(a, size):
-    """Return the largest of a triple, its third times ``size``."""
-    return maximum(maximum(absolute(a[0]), absolute(a[1])), size * absolute(a[2]))
+def stage_time(stage):
+    """Return the time at which a stage is evaluated, over the step."""
+    return stage.elapsed + where(stage.second > 0.0, 1.0, GAMMA) * stage.part
 
 
 @formula
-def when(w):
-    """Return the time at which the present stage is evaluated, over the step."""
-    return w.done + where(w.stage > 0.0, 1.0, GAMMA) * w.part
+def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
+    """Return Newton's method after an evaluation at its trial, whether the stage is solved, and whether the method failed.
+
+    residual: a triple, m/s. slopes: of the residual, three columns. tolerance: of the residual, m/s."""
+    # Not a number where any of the three is not.
+    size = largest_speed(residual, reach) + 0.0 * (residual[0] + residual[1] + residual[2])
+    better = size <= (1.0 - ENOUGH * newton.share) * newton.residual
+    x, z, pitch = solve3(slopes[0], slopes[1], slopes[2], residual)
+    step = pick(better, (-x, -z, -pitch), newton.step)
+    longest = 1.0 / maximum(1.0, largest_speed(step, reach) * k / (FARTHEST * reach))
+    largest = where(better, longest, newton.largest)
+    share, best = where(better, largest, 0.5 * newton.share), pick(better, newton.trial, newton.best)
+    power = where(better, power[0], newton.power[0]), where(better, power[1], newton.power[1])
+    tries, size = newton.tries + 1.0, where(better, size, newton.residual)
+    solved = better & (size <= tolerance)
+    failed = (where(solved, np.inf, share) <= LEAST * largest) | (where(solved, 0.0, tries) >= effort.iterations)
+    trial = plus(best, times(share, step))
+    return Newton(newton.width, tries, best, trial, step, size, share, largest, power), solved, failed
 
 
 @formula
-def judged(w, off, slopes, power, k, reach, solved, effort):
-    """Return the way after an evaluation, the residual ``off`` (triple) of the trial and its slopes, three columns;
-    whether that is below ``solved``, m/s; and whether Newton's method is to be given up."""
-    size = largest(off, reach) + 0.0 * (off[0] + off[1] + off[2])  # no number where one of them is none
-    better = size <= (1.0 - ENOUGH * w.share) * w.off
-    x, z, pitch = solve3(slopes[0], slopes[1], slopes[2], off)
-    newton = pick(better, (-x, -z, -pitch), w.newton)
-    most = where(better, 1.0 / maximum(1.0, largest(newton, reach) * k / (FARTHEST * reach)), w.most)
-    share, found = where(better, most, 0.5 * w.share), pick(better, w.trial, w.found)
-    power = where(better, power[0], w.power[0]), where(better, power[1], w.power[1])
-    tries, size = w.tries + 1.0, where(better, size, w.off)
-    good = better & (size <= solved)
-    lost = (where(good, np.inf, share) <= LEAST * most) | (where(good, 0.0, tries) >= effort.iterations)
-    after = Way(
-        w.pose, w.twist, w.work, w.loss, w.unsolved, w.defect, w.residual, w.part, w.done, w.stage, w.width, tries, w.base,
-        w.start, w.guess, found, plus(found, times(share, newton)), newton, size, share, most, power, w.first,
-    )  # fmt: skip
-    return after, good, lost
+def end_of_part(old, stage, newton, ended, tolerance, k, h):
+    """Return the accepted state after a part of a step, h s long, that has ended, or the old one."""
+    unsolved = where(newton.residual > tolerance, newton.residual, 0.0)
+    unsolved = unsolved + where(stage.first[2] > tolerance, stage.first[2], 0.0)
+    work = h * (1.0 - GAMMA) * stage.first[0] + k * newton.power[0]
+    loss = h * (1.0 - GAMMA) * stage.first[1] + k * newton.power[1]
+    return Accepted(
+        pick(ended, plus(stage.base, times(k, newton.best)), old.pose),
+        pick(ended, newton.best, old.twist),
+        old.work + where(ended, work, 0.0),
+        old.loss + where(ended, loss, 0.0),
+        old.unsolved + where(ended, where(unsolved > 0.0, 1.0, 0.0), 0.0),
+        old.defect + where(ended, unsolved, 0.0),
+        where(ended, maximum(old.residual, maximum(newton.residual, stage.first[2])), old.residual),
+    )
 
 
 @formula
-def advanced(w, good, lost, solved, k, h, effort):
-    """Return the way of a robot that has solved a stage at a rounding, or given it up, on to the next rounding, stage or
-    part of a step, and whether a step has ended; of others as it is. h: s, of the present part of the step."""
-    at_last, whole, small = w.width >= len(effort.widths) - 1.0, w.width <= 0.0, w.part <= effort.smallest
-    ready = (good & (whole | at_last)) | (lost & at_last & small)
-    moves = good | lost
-    halved, wider = where(ready, False, lost & at_last), where(ready | at_last, False, moves)
-    second, ended = ready & (w.stage <= 0.0), ready & (w.stage > 0.0)
-    again = ended | halved
-
-    left = where(w.off > solved, w.off, 0.0) + where(w.first[2] > solved, w.first[2], 0.0)
-    pose, twist = pick(ended, plus(w.base, times(k, w.found)), w.pose), pick(ended, w.found, w.twist)
-    done = w.done + where(ended, w.part, 0.0)
-    part = where(halved, 0.5 * w.part, w.part)
-    for _ in range(HALVINGS):  # two halves make one
-        pairs = done / (2.0 * part)
+def next_part(stage, ended, halved):
+    """Return the part of the step that comes next, the sum of those before it, and whether the step is over."""
+    elapsed = stage.elapsed + where(ended, stage.part, 0.0)
+    part = where(halved, 0.5 * stage.part, stage.part)
+    for _ in range(HALVINGS):  # two halves join
+        pairs = elapsed / (2.0 * part)
         part = where(ended & (part < 1.0) & (pairs == floor(pairs)), 2.0 * part, part)
-    over = ended & (done >= 1.0)
-    rest = h - k
-    base = pick(again, pose, pick(second, plus(w.pose, times(rest, w.found)), w.base))
-    on = plus(w.twist, times(rest / k, plus(w.found, times(-1.0, w.start))))
-    start = pick(again, twist, pick(second, on, w.start))
-    guess = pick(again, twist, pick(second, w.found, w.guess))
-    fresh = again | second | wider
-    at = pick(wider & (w.width > 0.0), w.found, guess)
-    first = pick(second, (w.power[0], w.power[1], w.off), w.first)
-    return Way(
-        pose, twist,
-        gained(ended, w.work, h * (1.0 - GAMMA) * w.first[0] + k * w.power[0]),
-        gained(ended, w.loss, h * (1.0 - GAMMA) * w.first[1] + k * w.power[1]),
-        gained(ended, w.unsolved, where(left > 0.0, 1.0, 0.0)), gained(ended, w.defect, left),
-        where(ended, maximum(w.residual, maximum(w.off, w.first[2])), w.residual),
-        part, where(over, 0.0, done), where(again, 0.0, where(second, 1.0, w.stage)),
-        where(wider, w.width + 1.0, where(fresh, 0.0, w.width)), where(fresh, 0.0, w.tries),
-        base, start, guess, pick(fresh, at, w.found), pick(fresh, at, w.trial),
-        pick(fresh, (0.0, 0.0, 0.0), w.newton),
-        where(fresh, np.inf, w.off), where(fresh, 1.0, w.share), where(fresh, 1.0, w.most), w.power, first,
-    ), over  # fmt: skip
+    over = ended & (elapsed >= 1.0)
+    return part, where(over, 0.0, elapsed), over
 
 
 @formula
-def ended(z, pitch, ends):
-    """Return whether a robot is at an end: sunk, -z above the first of ``ends``, airborne, z above the second, or
-    flipped."""
+def next_problem(step, solved, failed, tolerance, k, h, effort):
+    """Return a robot with the next rounding, stage or part of a step to solve where Newton's method has solved a stage or
+    failed, and whether the time step is over; elsewhere the robot as it is. h: s, of the present part of the step."""
+    old, stage, newton = step.accepted, step.stage, step.newton
+    at_last, at_first = newton.width >= len(effort.widths) - 1.0, newton.width <= 0.0
+    ready = (solved & (at_first | at_last)) | (failed & at_last & (stage.part <= effort.smallest))
+    halved, next_width = where(ready, False, failed & at_last), where(ready | at_last, False, solved | failed)
+    second, ended = ready & (stage.second <= 0.0), ready & (stage.second > 0.0)
+    restarts = ended | halved
+
+    accepted = end_of_part(old, stage, newton, ended, tolerance, k, h)
+    part, elapsed, over = next_part(stage, ended, halved)
+    rest = h - k
+    base = pick(restarts, accepted.pose, pick(second, plus(old.pose, times(rest, newton.best)), stage.base))
+    explicit = plus(old.twist, times(rest / k, plus(newton.best, times(-1.0, stage.start))))
+    start = pick(restarts, accepted.twist, pick(second, explicit, stage.start))
+    guess = pick(restarts, accepted.twist, pick(second, newton.best, stage.guess))
+    first = pick(second, (newton.power[0], newton.power[1], newton.residual), stage.first)
+    second_stage = where(restarts, 0.0, where(second, 1.0, stage.second))
+
+    fresh = restarts | second | next_width
+    trial = pick(next_width & (newton.width > 0.0), newton.best, guess)
+    next_newton = Newton(
+        where(next_width, newton.width + 1.0, where(fresh, 0.0, newton.width)),
+        where(fresh, 0.0, newton.tries),
+        pick(fresh, trial, newton.best),
+        pick(fresh, trial, newton.trial),
+        pick(fresh, (0.0, 0.0, 0.0), newton.step),
+        where(fresh, np.inf, newton.residual),
+        where(fresh, 1.0, newton.share),
+        where(fresh, 1.0, newton.largest),
+        newton.power,
+    )
+    return Step(accepted, Stage(part, elapsed, second_stage, base, start, guess, first), next_newton), over
+
+
+@formula
+def has_ended(z, pitch, ends):
+    """Return whether a robot has sunk, -z above the first of ``ends``, is airborne, z above the second, or flipped."""
     return (z + ends[0] < 0.0) | (z > ends[1]) | (absolute(pitch) > 0.5 * np.pi)

@@ -1,4 +1,4 @@
-"""A wheel that is driven at a given slip: how deep it goes, and what it pulls."""
+"""A wheel that is driven at a given slip: its sinkage, pull and torque."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rft.plates.shapes import Shape
 from rft.plates.stress import PlateStress
 
 HALVINGS = 40  # of the interval that holds the hub's height
-TURN = 24  # angles of a wheel that is not round
+ANGLES = 24  # of a turn of a wheel that is not round
 
 
 class Rolling(NamedTuple):
-    """(...,) for each slip. sinkage: m, of the lowest point. pull: N, of the drawbar, the net force of the grains forwards.
-    torque: N m, of the axle. carried: whether the ground bears the load at all; nan where it does not."""
+    """Rolling of a wheel, (...,) for each slip. sinkage: m, of the lowest point. pull: N, of the drawbar, the net force of the
+    grains forwards. torque: N m, of the axle. carried: whether the ground bears the load; where not, the others are nan."""
 
     slip: np.ndarray
     sinkage: np.ndarray
@@ -32,10 +32,11 @@ def rolling(
     stress: PlateStress, wheel: Shape, load: float, rate: float, slip, effects: Sequence[GroundEffect] = (),
     radius: float | None = None, elements: int = 100,
 ) -> Rolling:  # fmt: skip
-    """A wheel under ``load``, N, that turns at ``rate``, rad/s, and goes forwards at (1 - slip) rate radius, level.
+    """Return the rolling of a wheel under ``load``, N, that rotates at ``rate``, rad/s, and moves level at
+    (1 - slip) rate radius.
 
-    The hub's height is that at which the grains bear the load, in the mean over a turn at that height for a wheel with lugs.
-    radius: m, the wheel's own where it has one. slip: (...,), 0 as it rolls, 1 as it spins on the spot, below 0 as it brakes.
+    At the hub's height the grains bear the load, in the mean over a turn for a wheel with lugs. radius: m, by default the
+    wheel's own. slip: (...,), 0 for pure rolling, 1 for a wheel that rotates without moving, below 0 for braking.
     """
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
@@ -44,20 +45,21 @@ def rolling(
     in_range("load", load, 1e-6, 1e6)
     in_range("rate", rate, 1e-9, 1e4)
     reach = float(np.hypot(*points.points.T).max())
-    angle = np.linspace(0.0, 2 * np.pi, TURN if getattr(wheel, "lugs", 1) else 1, endpoint=False)
+    angle = np.linspace(0.0, 2 * np.pi, ANGLES if getattr(wheel, "lugs", 1) else 1, endpoint=False)
     twist = np.stack([(1.0 - slip) * rate * radius, np.zeros_like(slip), np.full_like(slip, rate)], -1)[..., None, :]
 
-    def at(height):
+    def mean_loads(height):
         pose = np.stack(np.broadcast_arrays(0.0, height[..., None], angle), -1)
-        found = loads(stress, points, pose, np.broadcast_to(twist, pose.shape), effects)
-        return found.force.mean(-2), found.moment.mean(-1)
+        force, moment = loads(stress, points, pose, np.broadcast_to(twist, pose.shape), effects)
+        return force.mean(-2), moment.mean(-1)
 
     low, high = np.full(slip.shape, -2 * reach), np.full(slip.shape, reach)
-    carried = at(low)[0][..., 1] >= load
+    carried = mean_loads(low)[0][..., 1] >= load
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        bears = at(middle)[0][..., 1] >= load
+        bears = mean_loads(middle)[0][..., 1] >= load
         low, high = np.where(bears, middle, low), np.where(bears, high, middle)
-    force, moment = at((low + high) / 2)
-    only = lambda x: np.where(carried, x, np.nan)
-    return Rolling(slip, only(reach - (low + high) / 2), only(force[..., 0]), only(-moment), carried)
+    height = (low + high) / 2
+    force, moment = mean_loads(height)
+    numbers = reach - height, force[..., 0], -moment
+    return Rolling(slip, *(np.where(carried, x, np.nan) for x in numbers), carried)

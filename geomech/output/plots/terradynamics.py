@@ -66,7 +66,7 @@ def intrusion_figure(scene, found) -> Any:
     poses, a mesh where the force is largest, with the stress on its faces."""
     fig, axes = figure(10.2, 3.2, 3)
     columns = scene.table(found)
-    if hasattr(found, "passage"):
+    if hasattr(found, "trajectory"):
         step = int(np.linalg.norm(found.force, axis=-1).argmax())
         axes[0, 0].remove()
         ax = fig.add_subplot(1, 3, 1, projection="3d")

@@ -1,0 +1,127 @@
+"""What a request costs, and when that is too much to begin without being told to.
+
+Balances and memory are counted beforehand. Seconds are assumed at first, from what balances took on the machine that
+this was written on; where the assumption does not decide, the first balances of the request itself tell what they take
+here. They are part of the request: nothing is computed to be timed. No number that is computed depends on seconds, which
+are of computing, so that other work on the machine does not count.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from geomech.core.errors import SceneError
+from geomech.run.backend import listen, listener, preferred
+
+LONGEST = 60.0  # s of computing that a command begins without being told to
+LARGEST = 2e9  # bytes of memory, likewise
+WORTH_SAYING = 5.0  # s
+BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
+SURE = 10.0  # factor by which the assumed seconds may be wrong
+ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that tell how long others take
+LOADING = 20.0  # times what is usual: a batch that takes longer has loaded or compiled code
+
+# Assumed seconds, for each place of the body where forces are evaluated; measured 3.5e-6 to 6e-6 by NumPy and 0.7e-6 to
+# 1.8e-6 compiled in dry media, 0.4e-6 and 0.2e-6 in a linear one; and for each batch of balances, however small.
+BALANCE = {"numpy": 5e-6, "numba": 1.2e-6}
+LINEAR = 0.1
+BATCH = {"numpy": 2e-3, "numba": 5e-4}
+
+
+class TooLong(SceneError):
+    """What is asked for takes more computing or memory than a command begins without being told to."""
+
+
+class Cost(NamedTuple):
+    """balances: of force. seconds: of computing, ``besides`` of which are of other work. memory: bytes at the peak."""
+
+    balances: int
+    seconds: float
+    memory: float
+    besides: float = 0.0
+
+    def __str__(self) -> str:
+        balances = f"{self.balances:,} force balances"
+        return f"{balances}, about {_duration(self.seconds)} of computing and {_size(self.memory)} of memory"
+
+    @property
+    def as_balances(self) -> float:
+        """Balances that take NumPy about as long, for the choice of a back end."""
+        return self.balances
+
+    @property
+    def small(self) -> bool:
+        """Not worth saying."""
+        return self.seconds < WORTH_SAYING and self.memory < LARGEST
+
+    def scaled(self, factor: float) -> Cost:
+        """Return the cost where balances take so many times as long."""
+        return self._replace(seconds=self.besides + factor * (self.seconds - self.besides))
+
+    def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
+        """`TooLong` where it goes beyond the limits and ``yes`` does not allow that. less: what to do else."""
+        if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
+            limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
+            raise TooLong(f"{place}: {self}: to compute for more than {limits} say --yes, or {less}")
+
+
+def assumed(samples: float, points: int, linear: bool, batches: float) -> float:
+    """Return the seconds that balances take, so many in all in so many batches."""
+    back_end = preferred()
+    return samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end] + batches * BATCH[back_end]
+
+
+def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
+    """Call judge(cost) at once where the assumed seconds tell enough, else once the balances to come have told theirs; what
+    it raises ends the request."""
+    of_balances = cost.seconds - cost.besides
+    tells_enough = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
+    if tells_enough or cost.memory > LARGEST:
+        judge(cost)
+    else:
+        listen(_Watch(cost, judge))
+
+
+def is_undecided() -> bool:
+    """Return whether balances to come are still to tell what they take."""
+    return isinstance(listener(), _Watch) and not listener().over
+
+
+class _Watch:
+    """Times the first balances of a request, but for those that load code."""
+
+    def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
+        self.cost, self.judge, self.over = cost, judge, False
+        self.last: float | None = None
+        self.batches: list[tuple[float, float]] = []  # (seconds, those assumed)
+
+    def __call__(self, samples: int, points: int, linear: bool) -> None:
+        if self.over:
+            return
+        now = time.process_time()
+        if self.last is not None:
+            self.batches.append((now - self.last, assumed(samples, points, linear, 1)))
+        self.last = now
+        if len(self.batches) >= FEWEST and sum(took for took, _ in self.batches) >= ENOUGH:
+            self.over = True
+            self.judge(self.cost.scaled(self._factor()))
+
+    def _factor(self) -> float:
+        """Return what balances take over what was assumed."""
+        factors = sorted(took / each for took, each in self.batches)
+        most = LOADING * factors[len(factors) // 2]
+        took, told = map(sum, zip(*((took, each) for took, each in self.batches if took <= most * each)))
+        return took / told
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}" if seconds < 100 * size else f"{seconds / size:,.0f} {unit}"
+    return f"{max(1.0, seconds):.0f} s"
+
+
+def _size(memory: float) -> str:
+    return f"{memory / 1e9:,.2g} GB" if memory >= 1e9 else f"{memory / 1e6:.0f} MB"
