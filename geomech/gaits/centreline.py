@@ -154,6 +154,10 @@ class Centreline(Gait):
     def unit_rate(self, t) -> np.ndarray:
         return self._curve(np.asarray(t, float), 1)
 
+    @classmethod
+    def examples(cls) -> dict[str, Centreline]:
+        return {}  # of a file
+
 
 def _series(fitted: np.ndarray, t: np.ndarray, order: int) -> np.ndarray:
     return _waves(t, len(fitted) // 2, order) @ fitted

@@ -58,6 +58,10 @@ class Circle(Series):
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
 
+    @classmethod
+    def examples(cls) -> dict[str, Circle]:
+        return {"circle": cls(amplitude=0.9, centre=(0.2, -0.1))}
+
 
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +88,10 @@ class Ellipse(Series):
         (a, b), c, s = self.semi_axes, math.cos(self.tilt), math.sin(self.tilt)
         return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
 
+    @classmethod
+    def examples(cls) -> dict[str, Ellipse]:
+        return {"ellipse": cls(semi_axes=(1.0, 0.4), tilt=0.7)}
+
 
 @GAITS.register
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +106,10 @@ class Butterfly(Series):
         sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
         difference_sin = np.array([1.052, 0.0, 0.0859, 0.0, 0.0])
         return np.array([sum_cos, sum_cos]), np.array([difference_sin, -difference_sin])
+
+    @classmethod
+    def examples(cls) -> dict[str, Butterfly]:
+        return {"butterfly": cls(amplitude=0.8), "backwards": cls(reverse=True)}
 
 
 @GAITS.register
@@ -123,3 +135,7 @@ class Fourier(Series):
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.cos), np.array(self.sin)
+
+    @classmethod
+    def examples(cls) -> dict[str, Fourier]:
+        return {"fourier": cls(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)))}

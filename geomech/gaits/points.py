@@ -48,3 +48,7 @@ class Points(Gait):
 
     def unit_rate(self, t) -> np.ndarray:
         return self._spline()(np.asarray(t, float), 1)
+
+    @classmethod
+    def examples(cls) -> dict[str, Points]:
+        return {"points": cls(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9)))}

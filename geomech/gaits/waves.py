@@ -64,6 +64,10 @@ class Wave(Series):
     def _sizes(self, amplitudes) -> np.ndarray:
         return np.abs(real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes))
 
+    @classmethod
+    def examples(cls) -> dict[str, Wave]:
+        return {"wave": cls(amplitude=0.8, waves=0.6, offset=0.2, joints=2)}
+
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """p at which the sine y = sin, of largest slope ``slope``, has run the share u / 2 pi of its length per wave.
@@ -169,3 +173,7 @@ class Sine(Gait):
     def relative_curvature(self, amplitudes=None) -> np.ndarray:
         """Mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
         return 4 * np.arctan(np.abs(self._slopes(amplitudes)))
+
+    @classmethod
+    def examples(cls) -> dict[str, Sine]:
+        return {}  # of as many joints as elements, of which there are many

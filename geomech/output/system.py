@@ -8,7 +8,7 @@ from geomech.core import summary
 from geomech.core.errors import short
 from geomech.io.tables.base import SIGNS
 from geomech.systems import Swimmer, Table
-from geomech.systems.base import System, kind_of
+from geomech.systems.base import Given, System, kind_of
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.swimmer import name_in
 from rft.bodies import KINDS as BODIES
@@ -28,6 +28,8 @@ def described(system: System) -> list[str]:
     if isinstance(system, Framed):
         first, *rest = described(system.inner)
         return [f"{first}, seen from its {NAME} frame", *rest]
+    if isinstance(system, Given):
+        return described(system.given)
     if isinstance(system, Swimmer):
         return _swimmer(system)
     if isinstance(system, Table):

@@ -59,3 +59,7 @@ class DifferentialDrive:
         from geomech.symbolic import connections
 
         return connections.differential_drive(self.wheel_radius, self.track)
+
+    @classmethod
+    def examples(cls) -> dict[str, DifferentialDrive]:
+        return {"differential-drive": cls(0.03, 0.15)}

@@ -42,3 +42,7 @@ class FloatingChain(Momentum):
         body, whole = sum(lengths), sum(masses)
         masses = [m / whole for m in masses]
         return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, about, lengths)]
+
+    @classmethod
+    def examples(cls) -> dict[str, FloatingChain]:
+        return {"floating-chain": cls((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05))}

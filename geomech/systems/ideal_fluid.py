@@ -51,3 +51,7 @@ class IdealFluidSwimmer(Momentum):
         return masses, [
             [m + y**2, m + x**2, k * m * 4 * x**2 + (x**2 - y**2) ** 2 / 8] for m, k, x, y in zip(masses, about, a, b)
         ]
+
+    @classmethod
+    def examples(cls) -> dict[str, IdealFluidSwimmer]:
+        return {"ideal-fluid-swimmer": cls((0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0))}

@@ -84,3 +84,7 @@ class NoSlipSnake:
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
         return connections.in_units_of(self.length, A), alpha
+
+    @classmethod
+    def examples(cls) -> dict[str, NoSlipSnake]:
+        return {"no-slip-snake": cls((0.8, 1.3, 1.0), length=0.4, frame="link-1")}

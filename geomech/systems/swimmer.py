@@ -303,6 +303,10 @@ class Swimmer:
             finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
         return self.with_solver(dataclasses.replace(self.solver, **finer)) if finer else None
 
+    @classmethod
+    def examples(cls) -> dict[str, Swimmer]:
+        return {"swimmer": cls(MEDIA["glass-0.3mm-loose"], rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3))}
+
 
 def _has_joint_angles(body: rft.Body) -> bool:
     """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""

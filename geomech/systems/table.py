@@ -195,3 +195,7 @@ class Table:
     def left_open(self) -> tuple[str, ...]:
         """The lines of `assumed`, without the file's name."""
         return self.held.said if self.held.sized or self.body_length is not None else (*self.held.said, LENGTHS)
+
+    @classmethod
+    def examples(cls) -> dict[str, Table]:
+        return {}  # of a file
