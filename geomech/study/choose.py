@@ -16,6 +16,7 @@ from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
 from geomech.tiers.base import solved
+from geomech.tiers.direct import DIRECT
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # that a tolerance asks for
@@ -79,7 +80,7 @@ def cheapest(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             f"raise --tol, or {finer}"
         )
-    return answer("direct", poses, error, settings)
+    return answer(DIRECT.name, poses, error, settings)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
