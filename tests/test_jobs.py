@@ -18,6 +18,7 @@ from geomech import scene as scenes
 from geomech import terminal
 from geomech.commands.pipeline import allow, storing
 from geomech.core.errors import SceneError
+from geomech.core.knob import Knob
 from geomech.geometry import connection
 from geomech.optimise import checked, search
 from geomech.output import plots
@@ -29,7 +30,6 @@ from geomech.run.workers import using
 from geomech.scene import inputs, kinds
 from geomech.study import accuracy, cost, estimate, tiered, walking
 from geomech.study.bench import Study
-from geomech.study.knob import Knob
 from geomech.study.motion import Trajectory
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient

@@ -292,15 +292,15 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
 def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     """Even where the force balance is near by chance."""
     spread = np.array([[0.3, 0.2], [1e-9, 0.4]])
-    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: spread))
+    monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: spread))
     scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
     table = Study(scene).study([0.4, 0.5], ["area"])
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
-    monkeypatch.setitem(TIERS, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
+    monkeypatch.setitem(TIERS._parts, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
     monkeypatch.setattr("geomech.study.choose.solved", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
-    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
+    monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
     assert found["tier"] == "area" and min(found["estimate"]["area"]) == 0.01
 

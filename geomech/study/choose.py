@@ -17,6 +17,7 @@ from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart,
 from geomech.study.results import Displacements
 from geomech.systems.capabilities import pieces_of, settling, solver_of
 from geomech.tiers.base import solved
+from geomech.tiers.direct import DIRECT
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # that a tolerance asks for
@@ -80,7 +81,7 @@ def cheapest(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             f"raise --tol, or {finer}"
         )
-    return answer("direct", poses, error, settings)
+    return answer(DIRECT.name, poses, error, settings)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):

@@ -26,7 +26,7 @@ from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
 
-CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, for each of a system's ``evaluations``; assumed
+CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, measured for those that ship, assumed for others
 LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number of it that this sums; measured
 CYCLES = 3  # until they repeat, assumed
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated

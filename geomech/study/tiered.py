@@ -6,18 +6,18 @@ direct tier, far finer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.core.knob import Knob
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.study.knob import Knob
 from geomech.study.offer import tiers
 from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic
@@ -29,37 +29,11 @@ TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
-GRIDS = (7, 11, 15, 21, 31, 45, 61)
-NOTHING = "nothing that exact link integrals do not give for less"
-
-KNOBS = (
-    Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer", tier="direct"),
-    Knob("segments", (2, 4, 8, 16, 32, 64), "2; less with pivots in links", NOTHING, "limit", "direct", "loads", "midpoint"),
-    Knob(
-        "nodes", (2, 4, 8, 16, 32, 64), "spectral; about 1 to 2 with pivots in links", NOTHING, "limit", "direct", "loads",
-        "gauss",
-    ),
-    Knob(
-        "regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit", "direct",
-    ),
-    Knob(
-        "pieces", (5, 10, 20, 40, 80), "2 in the mean, scattered by pivots", "effects that vary along long links", "limit",
-        "direct",
-    ),
-    Knob(
-        "curves", (4, 6, 8, 12, 16, 24, 48), "4 if smooth, about 2 across kinks",
-        "every amplitude of one family from one table", tier="adapted",
-    ),
-    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table", tier="harmonic"),
-    Knob(
-        "harmonics", (1, 3, 5, 9, 15, 21), "1 to 2, set by the kinks",
-        "the part of the velocity that is not linear in alphadot", tier="harmonic",
-    ),
-    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further", tier="path"),
-    Knob("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit", "path"),
-    Knob("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit", "path"),
-    Knob("grid", GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits", tier="area"),
-)  # fmt: skip
+KNOBS = tuple(
+    replace(knob, tier=tier.name)
+    for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
+    for knob in tier.knobs
+)  # of the truth first, then of one gait's family, then of fields
 
 
 @dataclass(frozen=True)
@@ -129,7 +103,7 @@ class Settings:
 
     def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
-        tier = knob.tier if knob else "direct"
+        tier = knob.tier if knob else DIRECT.name
         return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
 
     def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:

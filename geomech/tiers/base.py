@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from geomech.core.errors import real_array
+from geomech.core.knob import Knob
 from geomech.core.registry import Registry
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
@@ -111,7 +112,7 @@ class Tier:
     amplitudes). rests_on: premises without which it says nothing, and no ``result`` exists. joints: shape variables that it
     takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
     named. regular: there must be no singular shapes. common: a plain study takes it.
-    markers: their colour, that of the line if left out.
+    markers: their colour, that of the line if left out. knobs: settings that an error study sweeps.
     """
 
     name: str
@@ -127,6 +128,7 @@ class Tier:
     regular: bool = False
     common: bool = True
     markers: str = ""
+    knobs: tuple[Knob, ...] = ()
 
     @property
     def colour(self) -> str:

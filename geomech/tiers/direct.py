@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from geomech.core.errors import number
+from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
@@ -12,6 +13,9 @@ from geomech.geometry.reconstruct import displacement
 from geomech.systems.capabilities import at_once
 from geomech.tiers.base import Plan, Tier, in_groups, solved
 from rft.premise import NONE
+
+COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
+NOTHING = "nothing that exact link integrals do not give for less"
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -55,4 +59,25 @@ DIRECT = Tier(
     _plan,
     rests_on=NONE,
     markers="black",
+    knobs=(
+        Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer"),
+        Knob("segments", COUNTS, "2; less with pivots in links", NOTHING, "limit", setting="loads", rule="midpoint"),
+        Knob(
+            "nodes",
+            COUNTS,
+            "spectral; about 1 to 2 with pivots in links",
+            NOTHING,
+            "limit",
+            setting="loads",
+            rule="gauss",
+        ),
+        Knob("regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit"),
+        Knob(
+            "pieces",
+            (5, 10, 20, 40, 80),
+            "2 in the mean, scattered by pivots",
+            "effects that vary along long links",
+            "limit",
+        ),
+    ),
 )

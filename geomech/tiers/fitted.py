@@ -26,6 +26,7 @@ INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and dir
 
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
+GRIDS = 7, 11, 15, 21, 31, 45, 61  # that an error study tries
 DEPENDS_ON = ("grid", "extent", "directions", "interpolation")  # of [numerics]
 
 
