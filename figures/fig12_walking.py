@@ -11,9 +11,10 @@ import numpy as np
 
 from figures import main, style
 from geomech.output import plots
-from geomech.output.walk_sweeps import curves
+from geomech.output.plots import curves
 from geomech.scene import load
 from geomech.study import walking
+from geomech.study.sweep import sweep
 
 CURVATURES = np.linspace(-1.0, 1.0, 9).tolist()
 FREQUENCIES = [1.0, 2.0, 3.0, 4.0]
@@ -22,11 +23,11 @@ AIR = np.linspace(0.0, 0.24, 9).tolist()  # m/s
 
 
 def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR) -> dict:
-    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.study.walking.sweep` gives them."""
+    """Return the walk of Xplorer as it is built in, and legs and flow as `geomech.study.sweep.sweep` gives them."""
     xplorer, sandbot = load("xplorer"), load("sandbot")
     over = {"robot.legs.relative_curvature": curvatures, "gait.frequency": frequencies}
     flows = {"effects.aeration.air_speed": air, "gait.frequency": (np.asarray(rates) / (2 * np.pi)).tolist()}
-    return {"walk": walking.run(xplorer), "legs": walking.sweep(xplorer, over), "flow": walking.sweep(sandbot, flows)}
+    return {"walk": walking.run(xplorer), "legs": sweep(xplorer, over), "flow": sweep(sandbot, flows)}
 
 
 @plots.styled

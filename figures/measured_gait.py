@@ -12,8 +12,9 @@ import numpy as np
 from figures import main
 from geomech.gaits import Ellipse
 from geomech.measured import Fitted, Log, fit_log, synthetic
-from geomech.output import measured, plots
+from geomech.output import plots
 from geomech.scene import load
+from geomech.text import measured
 
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 JOINTS = ("alpha_1", "alpha_2")
@@ -31,7 +32,7 @@ def draw(numbers: Fitted):
 
 def table(numbers: Fitted) -> str:
     """Return displacements and what the connection explains."""
-    return measured.text(numbers)
+    return measured.described(numbers)
 
 
 if __name__ == "__main__":

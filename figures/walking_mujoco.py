@@ -22,7 +22,7 @@ HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: witho
 FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
 
 
-def _course(steps: int):
+def _simulation(steps: int):
     """Return the walk of Xplorer by so many steps a cycle, not begun yet."""
     from rft.walking.mujoco_walk import Simulation
 
@@ -35,7 +35,7 @@ def way(start, steps: int, how: str) -> float:
     """Return the way in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
     import mujoco
 
-    body, h = _course(steps).body, 1 / (FREQUENCY * steps)
+    body, h = _simulation(steps).body, 1 / (FREQUENCY * steps)
     model, data = body.model, body.data
     data.qpos[:], data.qvel[:] = start
     mujoco.mj_forward(model, data)
@@ -57,7 +57,7 @@ def way(start, steps: int, how: str) -> float:
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
     """Return {"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
-    start = _course(64).walk(SETTLED).limit
+    start = _simulation(64).walk(SETTLED).limit
     truth = way(start, finest, "implicit")
     study = {how: (n, np.array([abs(way(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
     speeds = {}

@@ -34,7 +34,7 @@ def geomech(
     """Geometric mechanics of locomotion in sand and fluid: from a force law to the displacement of a gait."""
     from geomech.run.backend import prefer
 
-    prefer("numpy")  # its first call takes half a second less; `commands.asked.allow` knows who has much to do
+    prefer("numpy")  # its first call takes half a second less; `commands.pipeline` knows who has much to do
     load_plugins(plugin)
 
 

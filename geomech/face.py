@@ -20,9 +20,10 @@ class Connection:
         """Return a Dataset of A, its fit residual and the rms of xi, as in the file of `geomech connection`.
 
         shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
-        from geomech.output import datasets
+        from geomech.io.results import to_xarray
+        from geomech.study.fields import of_fitted
 
-        return datasets.connection(self, shapes)
+        return to_xarray(of_fitted(self, shapes))
 
     @classmethod
     def load(cls, path: str | Path, sign: str = "", order: str = "") -> Any:
@@ -45,9 +46,10 @@ class Field:
         """Return a DataArray; of three components it is taken for a CCF, with its units.
 
         shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
-        from geomech.output import datasets
+        from geomech.io.results import to_xarray
+        from geomech.study.fields import of_field
 
-        return datasets.field(self, name, shapes)
+        return to_xarray(of_field(self, name, shapes))[name]
 
 
 class Study:
@@ -58,17 +60,18 @@ class Study:
 
     def to_xarray(self) -> Any:
         """Return a Dataset with all that the file of `geomech connection` has. ImportError without the package xarray."""
-        from geomech.output import datasets
+        from geomech.io.results import to_xarray
+        from geomech.study.fields import of_study
 
-        return datasets.of_study(self)
+        return to_xarray(of_study(self))
 
 
 class Displacements:
     def __repr__(self) -> str:
         from geomech.core.errors import plain
-        from geomech.output.report import text_table
+        from geomech.text.displacement import text
 
-        return plain(text_table(self.scene.name, self, self.scene))
+        return plain(text(self.result))
 
     def _repr_html_(self) -> str:
         from geomech.output import display
@@ -77,9 +80,10 @@ class Displacements:
 
     def to_xarray(self) -> Any:
         """Return a Dataset over tier, amplitude and component, with units and error estimates."""
-        from geomech.output import datasets
+        from geomech.io.results import to_xarray
+        from geomech.study.tables import as_stored
 
-        return datasets.displacements(self)
+        return to_xarray(as_stored(self.result))
 
 
 class Swept:
@@ -90,9 +94,10 @@ class Swept:
 
     def to_xarray(self) -> Any:
         """Return a Dataset over the parameters and component, as the file of `geomech sweep`."""
-        from geomech.output import datasets
+        from geomech.io.results import to_xarray
+        from geomech.study.sweep import as_stored
 
-        return datasets.swept(self)
+        return to_xarray(as_stored(self.result))
 
 
 for _face in (Connection, Field, Study, Displacements, Swept):

@@ -1,4 +1,4 @@
-"""Resistive force theory: force laws, bodies and the balance of forces. Knows nothing of gaits."""
+"""Resistive force theory: force laws, bodies and the balance of forces. Gaits are in `geomech`."""
 
 from rft.balance import Solution, body_velocity
 from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
@@ -17,7 +17,7 @@ from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Visco
 from rft.stepping import TimeSteps, time_steps
 from rft.work import Work, work_done
 
-SOLVER = 8  # raised with every change that moves a number: what was computed before is not taken up after it
+SOLVER = 8  # version of the numbers, raised with every change of one; results of other versions are not resumed
 
 __all__ = [
     "CATALOGUE",

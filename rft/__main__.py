@@ -1,4 +1,4 @@
-"""python -m rft: compile the solver, the contact with the ground and the steps of robots now, so that no later run has to."""
+"""`python -m rft` compiles the solver, the contact with the ground and the steps of robots, so that no later run has to."""
 
 import sys
 
@@ -18,8 +18,8 @@ with preferring("numba"):
     loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
     engine("planar").pace(Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress), Fineness(), 0.0)
 
-from rft.balance.compiled import kernel  # noqa: E402  # which loads numba
+from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 
 path = kernel(type(record(law)))._cache.path
-none = "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
-print(f"compiled code is kept in {path.parent}" if path.exists() else none)
+not_stored = "compiled code is not kept: set NUMBA_CACHE_DIR to a folder that has room for it"
+print(f"compiled code is kept in {path.parent}" if path.exists() else not_stored)

@@ -1,6 +1,6 @@
 """Checks of arguments: numbers within bounds, arrays of real numbers, covariances. All raise ValueError with one line.
 
-The bounds, unit and meaning of a number that a class takes stand at the field, in its annotation (`Number`):
+The bounds, the unit and the meaning of a number field of a class stand in its annotation (`Number`):
 
     radius: Annotated[float, Number(0, 1, "body lengths", "of the body")]
 """
@@ -15,8 +15,10 @@ import numpy as np
 
 
 class Number(NamedTuple):
-    """A number in a field. low, high: bounds, allowed themselves. unit: "-" for none. meaning: for lists of keys. whole:
-    whether only whole numbers will do."""
+    """Bounds, unit and meaning of a number field.
+
+    low, high: smallest and largest allowed value. unit: "-" for none. meaning: as lists of keys print it. whole: whether
+    the number must be an integer."""
 
     low: float
     high: float
@@ -26,21 +28,21 @@ class Number(NamedTuple):
 
 
 @functools.cache
-def numbers_of(kind: type) -> dict[str, Number]:
-    """Return the annotations `Number` of a class by field."""
+def number_fields(kind: type) -> dict[str, Number]:
+    """Return the `Number` annotations of a class by field."""
     try:
         hints = get_type_hints(kind, include_extras=True)
-    except (NameError, TypeError):  # of a class of a user's, whose annotations name what is not there
+    except (NameError, TypeError):  # annotations of a user's class may name what is not importable
         return {}
-    marked = {name: [x for x in get_args(hint) if isinstance(x, Number)] for name, hint in hints.items()}
-    return {name: found[0] for name, found in marked.items() if found}
+    numbers = {name: [x for x in get_args(hint) if isinstance(x, Number)] for name, hint in hints.items()}
+    return {name: annotations[0] for name, annotations in numbers.items() if annotations}
 
 
 def check_numbers(owner: Any) -> None:
-    """Raise ValueError unless the numbers of a dataclass lie within the bounds of their annotations; None may stand
-    where it is the default. Whole numbers are stored as integers."""
+    """Raise ValueError unless the number fields of an object lie within the bounds of their annotations, or are None where
+    that is the default; store integers as int."""
     defaults = {f.name: f.default for f in fields(owner)} if is_dataclass(owner) else {}
-    for name, number in numbers_of(type(owner)).items():
+    for name, number in number_fields(type(owner)).items():
         value = getattr(owner, name)
         if value is not None or defaults.get(name) is not None:
             in_range(name, value, number.low, number.high, number.whole, number.unit)
@@ -49,50 +51,52 @@ def check_numbers(owner: Any) -> None:
 
 
 def real_array(name: str, x) -> np.ndarray:
-    """Return x as an array of floats; ValueError with its name if it is none."""
+    """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
     try:
         array = np.asarray(x)
         if array.dtype.kind in "iuf" or (array.dtype.kind == "O" and all(map(is_number, array.flat))):
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ValueError(f"{name} must be real numbers in equal rows, got {shown(x)}")
+    raise ValueError(f"{name} must be real numbers in equal rows, got {formatted(x)}")
 
 
 def is_number(value) -> bool:
-    """Return whether a value is one real number; True and False are none."""
+    """Return whether a value is one real number; True and False are not."""
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def in_range(name: str, value, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
-    """Raise ValueError with the name unless value is a number, or a whole one, from low to high."""
+    """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
     if not (is_number(value) and low <= value <= high and (not whole or value == int(value))):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {shown(value)}")
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {formatted(value)}")
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
-    """Return a covariance matrix as rows of floats, None as it is. ValueError unless it is one of as many parameters as
-    ``sizes`` allow: square, finite, symmetric and, to roundoff, without a negative eigenvalue."""
+    """Return a covariance matrix as rows of floats, None as it is; ValueError unless it is finite, n x n for an n among
+    ``sizes``, symmetric and, to roundoff, without a negative eigenvalue."""
     if value is None:
         return None
     matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
-        f"covariance must be {allowed} finite numbers, got {shown(value)}",
+        f"covariance must be {allowed} finite numbers, got {formatted(value)}",
     )
-    spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    unit = np.where(spread > 0, spread, 1.0)
-    scaled = matrix / unit[:, None] / unit  # correlations
-    sound = bool((np.abs(scaled - scaled.T) <= 1e-9).all() and np.linalg.eigvalsh(scaled)[0] >= -1e-9)
+    deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    scale = np.where(deviation > 0, deviation, 1.0)
+    correlation = matrix / scale[:, None] / scale
+    is_symmetric = bool((np.abs(correlation - correlation.T) <= 1e-9).all())
     require(
-        sound and bool((matrix[:, spread == 0] == 0).all()),
-        f"covariance must be symmetric and without negative eigenvalues, got {shown(value)}",
+        is_symmetric
+        and bool(np.linalg.eigvalsh(correlation)[0] >= -1e-9)
+        and bool((matrix[:, deviation == 0] == 0).all()),
+        f"covariance must be symmetric and without negative eigenvalues, got {formatted(value)}",
     )
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def shown(value) -> str:
+def formatted(value) -> str:
     """Return repr(value) as one line of at most 60 characters."""
     try:
         text = " ".join(repr(value).split())

@@ -1,4 +1,4 @@
-"""Drag measured on a rod: attack angles, forces along and across it, the rod's sizes and the grains' density."""
+"""Measured drag on a rod: attack angles, forces along and across the rod, its sizes and the density of the bed."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import numpy as np
 from rft.checks import in_range, real_array, require
 from rft.laws.catalogue import GRAVITY
 
-NEGATIVE = 0.1  # of the largest force: what may be missing to zero before a force counts as pushing
-LIKE_RADIANS = 7.0  # degrees: angles that stay below are taken for radians
+PUSHING = 0.1  # of the largest force: a force below minus that pushes; a smaller one counts as an error of measurement
+LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as radians
 
 
 @dataclass(frozen=True)
 class Rod:
-    """A rod and the bed it was dragged through; None for what is not known. radius, length, depth (of its axis): m. density:
-    kg/m^3 of the bed, that of the grains times their volume fraction."""
+    """A rod and the bed that it was dragged through; None for an unknown number.
+
+    radius, length, depth (of the axis): m. density: kg/m^3, of the bed, which is that of the grains times their volume
+    fraction."""
 
     radius: float | None = None
     length: float | None = None
@@ -30,39 +32,44 @@ class Rod:
 
     @property
     def area(self) -> float | None:
-        """Projected, 2 r L, m^2."""
+        """Projected area 2 r L, m^2."""
         return 2 * self.radius * self.length if self.radius and self.length else None
 
     @property
     def pressure(self) -> float | None:
-        """Of the weight of grains above its axis, rho g |z|, Pa."""
+        """Pressure rho g |z| of the grains above the axis, Pa."""
         return self.density * GRAVITY * self.depth if self.density and self.depth else None
 
 
 @dataclass(frozen=True, eq=False)
 class RodDrag:
-    """Forces on the whole rod (N), positive against the velocity's parts along and across it. psi: (N,), rad, from 0 to pi/2.
-    forces: (2, N), along and across. weight: (N,), of the squares, 1 in the mean."""
+    """Forces on the whole rod, positive where they oppose the velocity.
+
+    psi: (N,), attack angles, rad, from 0 to pi/2. forces: (2, N), along and across the rod, N. weight: (N,), of the squares
+    of residuals, with mean 1."""
 
     psi: np.ndarray
     forces: np.ndarray
     weight: np.ndarray
 
     @property
-    def count(self) -> int:
-        """Forces that weigh something."""
+    def n_forces(self) -> int:
+        """Number of forces of positive weight."""
         return 2 * int(np.count_nonzero(self.weight))
 
     @property
-    def angles(self) -> int:
-        """Different ones."""
+    def n_angles(self) -> int:
+        """Number of different angles."""
         return np.unique(self.psi.round(9)).size
 
 
 def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
-    """Measurements at attack angles in degrees, folded into 0 to 90: a law of a rod knows neither front from back nor left
-    from right. Beyond, forces may have the signs of the velocity's parts, or be magnitudes throughout. Equal angles all count.
-    ValueError for what cannot be drag: forces that push, columns exchanged, angles in radians."""
+    """Return measurements at attack angles in degrees, mapped to 0 to 90 by symmetry: the ends of a rod are alike, and so
+    are its sides.
+
+    At angles beyond 0 to 90 forces may have the signs of the velocity's components, or all be magnitudes. Equal angles are
+    separate measurements. Raises ValueError for numbers that cannot be drag: forces that push, exchanged columns, angles
+    in radians."""
     columns = {"psi_deg": psi_deg, "forces along": along, "forces across": across}
     psi, *forces = (real_array(name, x) for name, x in columns.items())
     forces = np.array(forces) if all(x.shape == psi.shape for x in forces) else np.zeros(0)
@@ -72,43 +79,45 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
     require(finite and psi.size > 0, "angles, forces and weights must be finite numbers, one at least")
     require(bool((weight >= 0).all() and weight.any()), "weights must be 0 or more, and not all 0")
     require(
-        not 0 < np.abs(psi).max() <= LIKE_RADIANS,
+        not 0 < np.abs(psi).max() <= LARGEST_IN_RADIANS,
         f"psi_deg reaches only {np.abs(psi).max():.3g}: angles look like radians, give degrees from 0 to 90",
     )
     angle = np.arctan2(np.abs(np.sin(np.radians(psi))), np.abs(np.cos(np.radians(psi))))
-    data = RodDrag(angle, _against(psi, forces), weight / weight[weight > 0].mean())
+    data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean())
     _require_not_exchanged(data)
     return data
 
 
-def _against(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The forces, positive where they oppose the motion; ValueError naming the angle of one that does not."""
-    parts = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
-    signs = np.where(np.abs(parts) < 1e-9, 1.0, np.sign(parts))
+def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Return the forces, positive where they oppose the motion; ValueError with the angle of a force that pushes."""
+    velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
+    signs = np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
     largest = np.abs(forces).max()
     require(largest > 0, "all forces are zero: there is no drag to fit")
     require(bool((forces > 0).any()), "no force is positive: drag is, where it opposes the motion; change the sign")
     opposing = max(signs * forces, forces, key=lambda x: x.min())
-    which, row = np.unravel_index(np.argmin(opposing), opposing.shape)
+    component, row = np.unravel_index(np.argmin(opposing), opposing.shape)
+    direction, force = ("along", "across")[component], forces[component, row]
     require(
-        opposing[which, row] >= -NEGATIVE * largest,
-        f"at psi = {psi[row]:g} degrees the force {('along', 'across')[which]} the rod is {forces[which, row]:g} N and pushes: "
+        opposing[component, row] >= -PUSHING * largest,
+        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes: "
         "drag is positive where it opposes the motion",
     )
     return opposing
 
 
 def _require_not_exchanged(data: RodDrag) -> None:
-    """ValueError if the forces along go like sin psi and those across like cos psi, much better than the right way round."""
-    wave = np.array([np.cos(data.psi), np.sin(data.psi)])
+    """Raise ValueError if forces along are nearer to a multiple of sin psi, and forces across to one of cos psi, than the
+    other way round, by a factor of 4 in the sum of squares."""
+    directions = np.array([np.cos(data.psi), np.sin(data.psi)])
 
-    def missed(shape):
+    def misfit(shape):
         size = (shape * data.forces).sum(1) / np.maximum((shape**2).sum(1), 1e-12)
         return float(((data.forces - size[:, None] * shape) ** 2).sum())
 
-    wrong = missed(wave)
+    as_given = misfit(directions)
     require(
-        missed(wave[::-1]) >= 0.25 * wrong or wrong < 1e-6 * (data.forces**2).sum(),
+        misfit(directions[::-1]) >= 0.25 * as_given or as_given < 1e-6 * (data.forces**2).sum(),
         "the forces along the rod grow with psi and those across it fall: the columns are exchanged, or psi is measured from "
         "the rod's normal; it is the angle between velocity and rod axis",
     )

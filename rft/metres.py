@@ -1,10 +1,10 @@
-"""Lengths in m, as plates, meshes and robots have them."""
+"""Annotations of lengths in m, for plates, meshes and robots."""
 
 from __future__ import annotations
 
 from rft.checks import Number
 
-LARGEST = 10.0  # m; what is larger was likely given in mm
+LARGEST = 10.0  # m; a larger number was likely meant in mm
 
 
 def metres(meaning: str, low: float = 1e-6) -> Number:

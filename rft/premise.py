@@ -1,4 +1,4 @@
-"""Premises: what makes a body velocity follow from shape and its rate of change alone, and a local connection exist."""
+"""Premises: assumptions under which the body velocity follows from shape and its rate alone, and a connection exists."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from enum import Flag, auto
 
 
 class Premise(Flag):
-    """Something that holds of the plain force law and that an effect, or a system, may lack."""
+    """Assumptions that hold for the plain force law and that effects and systems may break."""
 
-    RATE_INDEPENDENT = auto()  # the gait's speed does not matter: xi(alpha, c alphadot) = c xi
-    SE2_SYMMETRIC = auto()  # place and heading on the ground do not matter
-    MEMORYLESS = auto()  # the past does not matter
-    QUASI_STATIC = auto()  # mass does not matter: forces balance
+    RATE_INDEPENDENT = auto()  # xi(alpha, c alphadot) = c xi
+    SE2_SYMMETRIC = auto()  # xi does not depend on the pose on the ground
+    MEMORYLESS = auto()  # xi does not depend on the past
+    QUASI_STATIC = auto()  # forces balance, mass is negligible
 
     @property
     def words(self) -> list[str]:
-        """As adjectives, in alphabetical order: a scene that lacks one is "not quasi-static"."""
+        """Adjectives of the premises, such as "quasi-static", in alphabetical order."""
         return sorted(WORDS[premise] for premise in self)
 
     def __str__(self) -> str:
@@ -29,11 +29,10 @@ WORDS = {
     Premise.QUASI_STATIC: "quasi-static",
 }
 NONE, ALL = Premise(0), ~Premise(0)
-SHAPE_ALONE = (
-    Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
-)  # a body velocity follows from shape alone
+# With these a body velocity follows from shape and its rate alone.
+SHAPE_ALONE = Premise.SE2_SYMMETRIC | Premise.MEMORYLESS | Premise.QUASI_STATIC
 
 
-def negated(lacking: Premise) -> str:
-    """ "not memoryless, not quasi-static": how something that lacks premises is told."""
-    return ", ".join(f"not {word}" for word in lacking.words)
+def negated(broken: Premise) -> str:
+    """Return the description of something that breaks premises, such as "not memoryless, not quasi-static"."""
+    return ", ".join(f"not {word}" for word in broken.words)

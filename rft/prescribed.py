@@ -1,4 +1,4 @@
-"""What prescribed motions have in common, of outlines in the vertical plane and of meshes."""
+"""The base of prescribed motions, of outlines in the vertical plane and of meshes."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ Height = Annotated[float, metres("height of the frame's origin above the surface
 
 
 class Motion:
-    """Base of motions. turns: whether the angle tells where the body is, not its place."""
+    """Base of motions. turns: whether the progress of the motion is the angle of the body, not its position."""
 
     samples: int
     turns = False
 
     def require_downwards(self) -> None:
         """Raise ValueError unless the direction points into the ground."""
-        told = "direction must point downwards, between 0 and 180 degrees below the horizontal"
-        require(0.01 < self.direction < math.pi - 0.01, told)
+        message = "direction must point downwards, between 0 and 180 degrees below the horizontal"
+        require(0.01 < self.direction < math.pi - 0.01, message)
 
     def require_turning(self) -> None:
         """Raise ValueError unless the rate leads from start to stop."""

@@ -1,5 +1,4 @@
-"""Drag on a straight element by a quadrature rule, for any traction; the exact averages of closed forms are in
-`rft.link`."""
+"""Averages of any law over a straight element by a quadrature rule; `rft.link` has the exact averages of closed forms."""
 
 from __future__ import annotations
 
@@ -10,14 +9,14 @@ import numpy as np
 from rft.link import TINY, Load, sum_loads
 from rft.vectors import formula, over_nodes, sqrt
 
-QUADRATURE = "gauss:24"  # in place of "exact" where a medium has no closed form
-SMALL = 1e-6  # step of central differences, over the speed
+QUADRATURE = "gauss:24"  # in place of "exact" for a law without a closed form
+DIFFERENCE = 1e-6  # step of central differences, over the speed
 
 
 @formula
 def slopes_by_differences(law, v_t, v_n, rounding):
     """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n) of a law's traction, by central differences."""
-    h = SMALL * sqrt(v_t * v_t + v_n * v_n + rounding * rounding) + TINY
+    h = DIFFERENCE * sqrt(v_t * v_t + v_n * v_n + rounding * rounding) + TINY
     (t1, n1), (t2, n2) = law.traction(v_t + h, v_n, rounding), law.traction(v_t - h, v_n, rounding)
     (t3, n3), (t4, n4) = law.traction(v_t, v_n + h, rounding), law.traction(v_t, v_n - h, rounding)
     a = 0.5 / h
@@ -26,7 +25,8 @@ def slopes_by_differences(law, v_t, v_n, rounding):
 
 @formula
 def by_nodes(law, v_t, v_n, v_w, rounding):
-    """Return the load of a law at the nodes s in [-1, 1] of its rule, with weights that sum to 1."""
+    """Return the load of a law on an element from its traction and slopes at the nodes s in [-1, 1] of its rule, with
+    weights that sum to 1."""
     zero = 0.0 * v_t
     load = Load(zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)
     for j in range(len(law.nodes)):
@@ -42,11 +42,11 @@ def by_nodes(law, v_t, v_n, v_w, rounding):
     return load
 
 
-def nodes_of(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights of a rule: "gauss" (Gauss-Legendre) or "midpoint" (equal parts that move like their
-    middles).
+def nodes_and_weights(rule: tuple[str, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes and weights of a rule: "gauss" (Gauss-Legendre) or "midpoint" (equal parts with the velocity of their
+    middle).
 
-    Midpoints are the paper's way, of order 2. Gauss's nodes converge slowly where the pivot lies in the element, since
+    The paper uses midpoints, of order 2. Gauss-Legendre rules converge slowly where the pivot lies in the element, for
     the law has a kink there."""
     kind, count = rule
     if kind == "gauss":

@@ -1,8 +1,8 @@
-"""The functions of `rft.vectors` inside compiled code: on numbers, and on eight numbers at once.
+"""The functions of `rft.vectors` inside compiled code, on numbers and on eight numbers at once.
 
 A `Vector` is eight doubles in a register, a `Mask` eight truth values; LLVM splits them where a processor's registers
-are narrower. A formula written for one element, compiled for vectors, works on eight elements at the pace of one.
-Importing this module loads numba, which takes some 0.2 s, so only what compiles imports it."""
+are narrower. A formula of one element, compiled for vectors, computes eight elements in the time of one. Importing this
+module loads numba, which takes some 0.2 s."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from numba.extending import (
 from rft import vectors
 
 WIDTH = 8
-DOUBLES, WHOLES, BITS = (ir.VectorType(kind, WIDTH) for kind in (ir.DoubleType(), ir.IntType(64), ir.IntType(1)))
+DOUBLES, INTEGERS, BITS = (ir.VectorType(kind, WIDTH) for kind in (ir.DoubleType(), ir.IntType(64), ir.IntType(1)))
 
 
 class Vector(types.Type):
-    """Eight doubles; a number stands for eight alike."""
+    """Eight doubles; a number converts to eight equal ones."""
 
     def can_convert_from(self, context, other):
         return Conversion.safe if isinstance(other, (types.Float, types.Integer)) else None
 
 
 class Mask(types.Type):
-    """Eight truth values; one stands for eight alike."""
+    """Eight truth values; a single one converts to eight equal ones."""
 
     def can_convert_from(self, context, other):
         return Conversion.safe if isinstance(other, types.Boolean) else None
@@ -60,7 +60,7 @@ _register_model(Mask, BITS)
 
 
 def _repeated(builder, x, llvm):
-    """Return a vector of eight times the same value."""
+    """Return a vector of eight copies of a value."""
     one = builder.insert_element(ir.Constant(llvm, ir.Undefined), x, ir.IntType(32)(0))
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), None)
     return builder.shuffle_vector(one, ir.Constant(llvm, ir.Undefined), zeros)
@@ -88,8 +88,8 @@ def _takes_masks(a, b):
     return mask in (a, b) and all(isinstance(x, (Mask, types.Boolean)) for x in (a, b))
 
 
-def _operator(function, takes, argument, result, emit):
-    """Define a binary operator for arguments of one kind."""
+def _define_operator(function, takes, argument, result, emit):
+    """Define a binary operator for arguments of one type."""
 
     @type_callable(function)
     def typed(context):
@@ -112,7 +112,7 @@ for _function, _name in (
     (operator.mul, "fmul"),
     (operator.truediv, "fdiv"),
 ):
-    _operator(_function, _takes_vectors, vector, vector, _arithmetic(_name))
+    _define_operator(_function, _takes_vectors, vector, vector, _arithmetic(_name))
 for _function, _sign in (
     (operator.lt, "<"),
     (operator.le, "<="),
@@ -120,9 +120,9 @@ for _function, _sign in (
     (operator.ge, ">="),
     (operator.eq, "=="),
 ):
-    _operator(_function, _takes_vectors, vector, mask, _comparison(_sign))
-_operator(operator.and_, _takes_masks, mask, mask, lambda builder, x, y: builder.and_(x, y))
-_operator(operator.or_, _takes_masks, mask, mask, lambda builder, x, y: builder.or_(x, y))
+    _define_operator(_function, _takes_vectors, vector, mask, _comparison(_sign))
+_define_operator(operator.and_, _takes_masks, mask, mask, lambda builder, x, y: builder.and_(x, y))
+_define_operator(operator.or_, _takes_masks, mask, mask, lambda builder, x, y: builder.or_(x, y))
 
 
 @type_callable(operator.neg)
@@ -139,7 +139,7 @@ def _negative(context, builder, sig, args):
 
 
 def _intrinsic(name, count):
-    """Return what emits a call of LLVM's intrinsic of this name."""
+    """Return a function that emits a call of LLVM's intrinsic of this name with ``count`` arguments."""
 
     def emit(builder, *args):
         full, module = f"llvm.{name}.v{WIDTH}f64", builder.module
@@ -154,7 +154,8 @@ def _selected(sign):
 
 
 def _define(function, takes, emit, number):
-    """Give a function of `rft.vectors` its meaning for vectors, and ``number``, its meaning for single numbers."""
+    """Define a function of `rft.vectors` in compiled code: for vectors by ``emit``, for numbers as the function
+    ``number``."""
     result = signature(vector, *takes)
 
     def typed(*args):
@@ -164,12 +165,12 @@ def _define(function, takes, emit, number):
     typers = lambda x: typed(x), lambda x, y: typed(x, y), lambda x, y, z: typed(x, y, z)
     type_callable(function)(lambda context: typers[len(takes) - 1])
     lower_builtin(function, *takes)(lambda context, builder, sig, args: emit(builder, *args))
-    chosen = (
+    for_numbers = (
         lambda x: number if isinstance(x, types.Number) else None,
         lambda x, y: number if isinstance(x, types.Number) and isinstance(y, types.Number) else None,
         lambda condition, x, y: number if isinstance(condition, types.Boolean) else None,
     )
-    overload(function, strict=False)(chosen[len(takes) - 1])
+    overload(function, strict=False)(for_numbers[len(takes) - 1])
 
 
 _define(vectors.sqrt, (vector,), _intrinsic("sqrt", 1), lambda x: np.sqrt(x))
@@ -189,21 +190,24 @@ _define(
 
 @intrinsic
 def _exponents(context, x):
-    """Return the powers of 2 in eight numbers, and the numbers without them, in [1, 2)."""
+    """Return the exponents of 2 and the mantissas, in [1, 2), of eight numbers."""
+
+    def constant(n):
+        return ir.Constant(INTEGERS, [n] * WIDTH)
 
     def emit(context, builder, sig, args):
-        bits = builder.bitcast(args[0], WHOLES)
-        constant = lambda n: ir.Constant(WHOLES, [n] * WIDTH)
+        bits = builder.bitcast(args[0], INTEGERS)
         power = builder.sub(builder.lshr(bits, constant(52)), constant(1023))
-        rest = builder.or_(builder.and_(bits, constant((1 << 52) - 1)), constant(1023 << 52))
-        pair = builder.sitofp(power, DOUBLES), builder.bitcast(rest, DOUBLES)
+        mantissa = builder.or_(builder.and_(bits, constant((1 << 52) - 1)), constant(1023 << 52))
+        pair = builder.sitofp(power, DOUBLES), builder.bitcast(mantissa, DOUBLES)
         return context.make_tuple(builder, sig.return_type, pair)
 
     return types.UniTuple(vector, 2)(vector), emit
 
 
 LN2 = float(np.log(2.0))
-ATANH = tuple(1.0 / (2 * j + 1) for j in range(1, 12))  # of s^2 in 2 atanh s = 2 s (1 + s^2 / 3 + ...), |s| < 0.172
+# Coefficients of s^2, s^4 ... in atanh s = s (1 + s^2 / 3 + ...), to roundoff for |s| < 0.172.
+ATANH = tuple(1.0 / (2 * j + 1) for j in range(1, 12))
 
 
 @overload(vectors.log_ratio, inline="never", jit_options={"forceinline": True})
@@ -211,7 +215,7 @@ def _log_ratio(a, b):
     if isinstance(a, types.Number):
         return lambda a, b: np.log(a / b)
 
-    def of_vectors(a, b):
+    def log_ratio(a, b):
         power_a, a = _exponents(a)
         power_b, b = _exponents(b)
         large, small = a > 1.4142135623730951 * b, b > 1.4142135623730951 * a
@@ -221,27 +225,28 @@ def _log_ratio(a, b):
         z = s * s
         return LN2 * power + (s + s) * (1.0 + z * vectors.polynomial(z, ATANH))
 
-    return of_vectors
+    return log_ratio
 
 
 @overload(vectors.polynomial, inline="never", jit_options={"forceinline": True})
 def _polynomial(z, coefficients):
-    """Unroll Horner's rule, since a loop over the tuple would not be unrolled."""
+    """Return Horner's rule without a loop, for numba would not unroll a loop over a tuple."""
     count = len(coefficients)
     lines = [f"    value = value * z + coefficients[{j}]" for j in range(count - 2, -1, -1)]
-    return _written(
+    return _function_from_source(
         "unrolled", ["z, coefficients", f"    value = coefficients[{count - 1}]", *lines, "    return value"]
     )
 
 
-def _written(name: str, lines: list[str], **names):
-    """Return the function of this name from its source: arguments, then the lines of its body."""
-    space = dict(names)
-    exec("\n".join([f"def {name}({lines[0]}):", *lines[1:]]), space)
-    return space[name]
+def _function_from_source(name: str, lines: list[str], **names):
+    """Return the function of this name from its source, arguments followed by the lines of its body, with ``names`` for
+    globals."""
+    namespace = dict(names)
+    exec("\n".join([f"def {name}({lines[0]}):", *lines[1:]]), namespace)
+    return namespace[name]
 
 
-# Memory. Arrays that hold vectors have eight columns.
+# Memory: vectors are stored in the rows of arrays of eight columns.
 
 
 @intrinsic
@@ -284,34 +289,35 @@ def any_of(context, x):
 
 @intrinsic
 def _gather(context, table, row, column):
-    """Return table[row, column] of an array (n, m), for eight rows given as a vector of whole numbers."""
+    """Return table[row, column] of an array (n, m) for a vector of eight integers ``row``."""
 
     def emit(context, builder, sig, args):
         array = context.make_array(sig.args[0])(context, builder, args[0])
         columns = builder.extract_value(array.shape, 1)
-        rows, column = builder.fptosi(args[1], WHOLES), context.cast(builder, args[2], sig.args[2], types.int64)
+        rows, column = builder.fptosi(args[1], INTEGERS), context.cast(builder, args[2], sig.args[2], types.int64)
         value = ir.Constant(DOUBLES, ir.Undefined)
         for lane in map(ir.IntType(32), range(WIDTH)):
-            place = builder.add(builder.mul(builder.extract_element(rows, lane), columns), column)
-            value = builder.insert_element(value, builder.load(builder.gep(array.data, [place])), lane)
+            offset = builder.add(builder.mul(builder.extract_element(rows, lane), columns), column)
+            value = builder.insert_element(value, builder.load(builder.gep(array.data, [offset])), lane)
         return value
 
     return vector(table, row, column), emit
 
 
-@overload(vectors.at)
-def _at(table, row, column):
+@overload(vectors.gather)
+def _gather_overload(table, row, column):
     if row == vector:
         return lambda table, row, column: _gather(table, row, column)
     return lambda table, row, column: table[int(row), column]
 
 
 def record_access(kind):
-    """Return (read, write) for a NamedTuple of vectors in the rows of an array (rows, 8), from a row ``first`` on."""
+    """Return read(x, first) and write(x, first, record) of a NamedTuple of vectors that is stored in the rows of an array
+    x (rows, 8) from the row ``first`` on."""
     reads = ", ".join(f"load(x, first + {i})" for i in range(len(kind._fields)))
     writes = [f"    store(x, first + {i}, record.{name})" for i, name in enumerate(kind._fields)]
-    read = _written("read", ["x, first", f"    return kind({reads})"], kind=kind, load=load)
-    write = _written("write", ["x, first, record", *writes], store=store)
+    read = _function_from_source("read", ["x, first", f"    return kind({reads})"], kind=kind, load=load)
+    write = _function_from_source("write", ["x, first, record", *writes], store=store)
     return register_jitable(forceinline=True)(read), register_jitable(forceinline=True)(write)
 
 
@@ -324,23 +330,25 @@ def _over_nodes(load):
 
 
 def register_formulas() -> None:
-    """Let compiled code call all formulas that were marked since the last time."""
+    """Register with numba all formulas that were marked since the last call."""
     while vectors.FORMULAS:
         register_jitable(inline="never", forceinline=True)(vectors.FORMULAS.pop(0))
 
 
 def _register_method(name: str, count: int) -> None:
-    """Let compiled code call the formula ``name`` of a law's class, with so many arguments beside the law."""
+    """Let compiled code call the formula ``name`` of a law's class, with ``count`` arguments beside the law."""
     arguments = ", ".join(f"x{i}" for i in range(count))
 
-    def chosen(law):
-        return _written(
+    def implementation(law):
+        return _function_from_source(
             "call",
             [f"law, {arguments}", f"    return method(law, {arguments})"],
             method=getattr(law.instance_class, name),
         )
 
-    typed = _written("typed", [f"law, {arguments}", "    return chosen(law)"], chosen=chosen)
+    typed = _function_from_source(
+        "typed", [f"law, {arguments}", "    return implementation(law)"], implementation=implementation
+    )
     for kind in (types.NamedTuple, types.NamedUniTuple):
         overload_method(kind, name, jit_options={"forceinline": True})(typed)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from rft import limit_cycle
 from rft.balance import checked_input
-from rft.balance.arrays import net_of, velocities, with_frame_velocity
+from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check
 from rft.balance.newton import to_element
 from rft.balance.solver import Accuracy, Solved, solve
@@ -341,7 +341,7 @@ class Stepping:
         """Return force and moment of undisturbed ground on the frame at a velocity, (3, B)."""
         scaled = xi / problem.frame.speed_scale
         v = with_frame_velocity(problem, velocities(problem), *scaled)
-        return np.stack(net_of(problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled).force)
+        return np.stack(frame_net(problem, v, np.full(xi.shape[1], self.accuracy.rounding), *scaled).force)
 
 
 def _velocities(problem: Problem, xi: np.ndarray) -> tuple:

@@ -1,9 +1,8 @@
-"""The functions that formulas are written with, for numbers, NumPy arrays and the vectors of compiled code alike.
+"""The functions that formulas use, for numbers, NumPy arrays and the vectors of compiled code.
 
-A formula is a plain function of one element, written as in the paper and marked with `formula`. Called as it stands it
-works on numbers and on arrays, by NumPy. `rft.simd` gives the functions below, and every formula, a second meaning
-inside compiled code: there they also take eight elements at once, in a register of the processor. This module imports
-no compiler."""
+A formula is a plain function of one element, written as in the paper and marked with `formula`. In Python it takes numbers
+and arrays, by NumPy. `rft.simd` defines the functions below, and every formula, a second time for compiled code, where
+they also take eight elements at once in a register of the processor. This module imports no compiler."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-FORMULAS: list[Callable] = []  # formulas that the compiler has not been given yet (`rft.simd.register_formulas`)
+FORMULAS: list[Callable] = []  # formulas not yet registered with the compiler (`rft.simd.register_formulas`)
 
 
 def formula(function: Callable) -> Callable:
@@ -42,12 +41,12 @@ def exp(x):
 
 
 def floor(x):
-    """Return the largest whole number that is not above x."""
+    """Return the largest integer that is not above x."""
     return np.floor(x)
 
 
 def copysign(x, y):
-    """Return the size of x with the sign of y."""
+    """Return the magnitude of x with the sign of y."""
     return np.copysign(x, y)
 
 
@@ -79,12 +78,11 @@ def polynomial(z, coefficients):
     return value
 
 
-def at(table, row, column):
-    """Return table[row, column], an entry for each of the whole numbers ``row``."""
+def gather(table, row, column):
+    """Return table[row, column] for each of the integers ``row``."""
     return table[np.asarray(row, int), column]
 
 
 def over_nodes(load):
-    """Return a load summed over the nodes of a rule: the first axis of arrays. Compiled code takes one node at a
-    time."""
+    """Return a load summed over the nodes of a rule, the first axis of arrays; compiled code takes one node at a time."""
     return type(load)(*(np.sum(x, 0) for x in load))

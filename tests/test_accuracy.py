@@ -8,8 +8,9 @@ from figures import cost_scaling, work_precision
 from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
-from geomech.study import accuracy
+from geomech.study import accuracy, tiered
 from geomech.study.bench import Study
+from geomech.text import accuracy as text
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
@@ -30,7 +31,7 @@ def line(results, label):
 
 def test_every_knob_gets_better(glass):
     """Each knob's finest setting beats its coarsest, but for those whose tier has an error of its own."""
-    assert len(glass["lines"]) == len(accuracy.KNOBS) - 1  # no effect cuts the body into pieces
+    assert len(glass["lines"]) == len(tiered.KNOBS) - 1  # no effect cuts the body into pieces
     for found in glass["lines"]:
         if found["label"] not in ("path: grid", "area: grid"):
             assert found["error"][-1] < 0.5 * found["error"][0], found["label"]
@@ -102,10 +103,10 @@ def test_phases_are_of_order_two_across_kinks():
 
 
 def test_table_and_sentences(glass):
-    text = accuracy.table(glass)
-    assert text.count("\n") == len(accuracy.TOLERANCES)
-    assert "direct, phases" in text
-    sentences = accuracy.sentences(glass)
+    told = text.table(glass)
+    assert told.count("\n") == len(tiered.Settings.tolerances)
+    assert "direct, phases" in told
+    sentences = text.sentences(glass)
     assert len(sentences) == len(glass["lines"])
     assert all(s.endswith(".") and "buys" in s for s in sentences)
     for cheapest in glass["cheapest"]:
@@ -124,7 +125,7 @@ def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
         made("adapted", "curves", "truth", (6, 4e-3, 3.0), (12, 8e-4, 2.5)),
         made("direct", "segments", "limit", (4, 1e-9, 0.1)),
     ]
-    best = {c["tolerance"]: c for c in (accuracy._cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5))}
+    best = {c["tolerance"]: c for c in (tiered.cheapest(lines, tol) for tol in (0.1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5))}
     assert {tol: (c["tier"], c.get("value"), c.get("seconds")) for tol, c in best.items()} == {
         0.1: ("direct", 16, 1.0),
         3e-2: ("direct", 16, 1.0),
@@ -134,9 +135,9 @@ def test_the_cheapest_setting_is_the_quickest_that_is_good_enough():
         1e-5: (None, None, None),
     }
     assert (best[1e-3]["knob"], best[1e-3]["error"]) == ("curves", 8e-4)
-    text = accuracy.table({"cheapest": list(best.values())})
-    assert "adapted, curves = 12" in text
-    assert text.splitlines()[-1].split() == ["1e-05", "none", "of", "those", "tried"]
+    told = text.table({"cheapest": list(best.values())})
+    assert "adapted, curves = 12" in told
+    assert told.splitlines()[-1].split() == ["1e-05", "none", "of", "those", "tried"]
 
 
 def test_a_linear_medium_has_no_dry_knobs(viscous):

@@ -19,9 +19,9 @@ from test_hard_cases import GLASS, STRANGE_BODIES, hard
 
 from geomech import scene as scenes
 from geomech.gaits import Ellipse
-from geomech.output.explain import explain
-from geomech.output.system import described
 from geomech.systems import solver
+from geomech.text.explain import explain
+from geomech.text.system import described
 from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
 from rft.balance import backend
 from rft.balance import solver as balance

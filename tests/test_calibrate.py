@@ -125,7 +125,7 @@ def test_covariance_and_band_are_those_of_the_law_linearised():
     np.testing.assert_allclose(found.errors**2, np.diag(found.covariance))
     psi = np.radians([5.0, 20.0, 80.0])
     spread = np.einsum("knp,pq,knq->kn", by_hand(found, psi), found.covariance, by_hand(found, psi))
-    assert found.free == 13
+    assert found.degrees_of_freedom == 13
     np.testing.assert_allclose(found.band(psi), 2.1604 * np.sqrt(spread), rtol=1e-4, atol=1e-12)  # Student's, 95 %
     np.testing.assert_allclose(found.intervals[:, 1] - found.values, 2.1604 * found.errors, rtol=1e-4)
     np.testing.assert_allclose(found.intervals.mean(1), found.values)
@@ -141,7 +141,7 @@ def test_intervals_of_few_forces_hold_as_often_as_they_say():
         found = fit("viscous", rod_drag(np.array([0.0, 90.0]), *(np.array([[3.0, 0.0], [0.0, 7.5]]) + some)))
         held.append(np.abs(found.values - [2.5, 3.0]) <= found.intervals[:, 1] - found.values)
         near.append(abs(found.values[0] - 2.5) <= math.sqrt(found.medium.covariance[0][0]))
-    assert found.free == 2 and found.names == ("ratio", "axial_force")
+    assert found.degrees_of_freedom == 2 and found.names == ("ratio", "axial_force")
     np.testing.assert_allclose(np.mean(held, 0), 0.95, atol=0.025)
     assert np.mean(near) == pytest.approx(0.68, abs=0.04)
 

@@ -16,12 +16,14 @@ import xarray
 
 from geomech import cli
 from geomech import scene as scenes
+from geomech.core.variables import Result
 from geomech.geometry import curvature
 from geomech.io import files
 from geomech.output import plots, report
-from geomech.study import accuracy
 from geomech.study.bench import Study
+from geomech.study.report import Report
 from geomech.systems import Swimmer
+from geomech.text import accuracy
 
 SMALL = ["--grid", "9"]
 
@@ -255,7 +257,7 @@ def test_a_failure_half_way_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(plots, "displacement_figure", fail)
     small = scenes.load("three-link-viscous").with_numerics(grid=5)
     with pytest.raises(ValueError, match="half way"), files.whole_folder(tmp_path / "out") as folder:
-        report.write(Study(small), folder, None)
+        report.write(Report(small).ask(), folder)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -296,12 +298,13 @@ def test_run_refuses_before_it_computes(text, said, monkeypatch, tmp_path):
 def quick(monkeypatch):
     """`run` and `accuracy` without their numbers."""
 
-    def write(study, folder, progress):
+    def write(result, folder):
         for name in (report.SCENE, report.TABLES):
-            (folder / name).write_text(study.scene.text if name == report.SCENE else "{}")
-        return {}
+            (folder / name).write_text(result.subject.text if name == report.SCENE else "{}")
 
     monkeypatch.setattr(report, "write", write)
+    monkeypatch.setattr(Report, "answer", lambda self, *_: Result("report", (), {}, self.scene))
+    monkeypatch.setattr("geomech.text.report.text", lambda result: "")
 
 
 def test_run_says_what_it_replaces(quick, tmp_path):

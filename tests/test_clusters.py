@@ -18,7 +18,7 @@ from geomech.run import executors
 from geomech.run.executors import Cluster
 from geomech.run.jobs import runner
 from geomech.run.workers import using
-from geomech.study import sweep
+from geomech.study import cycles, sweep
 
 distributed = pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
 
@@ -36,7 +36,7 @@ def address():
 
 
 def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa: F811
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 4)
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
     for scene, over in ((GLASS, OVER), (GLASS.changed(medium=power(1.0)), {"medium.power": [0.9, 1.0]})):
         alone, told = sweep.sweep(scene, over), []
         with using(scheduler=address):

@@ -10,7 +10,7 @@ import xarray
 from geomech import scene as scenes
 from geomech import symbolic
 from geomech.geometry import connection, curvature
-from geomech.output import netcdf
+from geomech.study import fields
 from geomech.study.bench import Study
 from geomech.tiers import fitted
 from rft import se2
@@ -96,7 +96,7 @@ def test_files_have_values_units_and_conventions(tmp_path, length, unit):
     body = dataclasses.replace(GLASS.system.body, lengths=(1, 2, 3), length=length, frame="link-2")
     scene = GLASS.changed(body=body).with_numerics(grid=7, extent=2.0, regularisation=1e-5)
     study = Study(scene)
-    netcdf.save_connection(tmp_path / "a.nc", study)
+    fields.save_connection(tmp_path / "a.nc", study)
     per = f"{unit} rad-1 (x, y), rad rad-1 (theta)"
     per2 = f"{unit} rad-2 (x, y), rad rad-2 (theta)"
     with xarray.open_dataset(tmp_path / "a.nc") as data:

@@ -13,8 +13,8 @@ from registry import EFFECTS
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
-from geomech.output.explain import explain
 from geomech.study.bench import Study
+from geomech.text.explain import explain
 from rft import (
     CATALOGUE,
     Backbone,
@@ -284,7 +284,7 @@ def test_explain_names_effects_engine_and_losses():
 
 BAD = [
     ('kind = "end-cap"\nradius = 0.1', "'end-cap' is unknown; did you mean 'end-caps'"),
-    ('kind = "end-caps"', "missing required field `radius`"),
+    ('kind = "end-caps"', "has no `radius`"),
     ('kind = "end-caps"\nradius = -1', "radius must be a number from 0 to 1"),
     ('kind = "skin-friction"\nforward = 0', "forward must be a number from 0.001"),
     ('kind = "depth-profile"\nalong = [1]', "along must be two depths or more"),

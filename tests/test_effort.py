@@ -10,9 +10,9 @@ from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import metric
 from geomech.geometry.connection import Connection
-from geomech.output import netcdf
 from geomech.scene.frames import framed
-from geomech.study import cost, effort
+from geomech.study import cost, effort, fields
+from geomech.study.results import Displacements
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import driven
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
@@ -77,7 +77,7 @@ def test_work_and_cost_of_transport_of_known_motions():
     assert found["work"] * 2 * np.pi >= found["path_length"] ** 2
     study = geomech.Study(scene(Swimmer(SAND, UNEVEN)))
     table = study.study([0.5, 1.0], ["direct", "path"])
-    effort.add_effort(table)
+    table = Displacements(effort.with_effort(table.result))
     distance = np.array(table["net_distance"]["path"]) / 0.3
     assert table["cost_of_transport"]["path"] == pytest.approx(np.array(table["work"]) / distance)
     assert table["efficiency"]["path"] == pytest.approx(distance / np.array(table["path_length"]))
@@ -88,7 +88,7 @@ def test_work_and_cost_of_transport_of_known_motions():
 def test_viscous_circle_is_as_efficient_as_published():
     study = geomech.Study(scene(Swimmer(Viscous(2.0), Chain()), Circle()))
     table = study.study([1.0, 1.3], ["direct"])
-    effort.add_effort(table)
+    table = Displacements(effort.with_effort(table.result))
     assert table["path_length"][0] == pytest.approx(0.512235, abs=1e-6)
     assert table["efficiency"]["direct"] == pytest.approx([0.1001, 0.1088], abs=6e-5)
 
@@ -145,7 +145,7 @@ def test_gaits_with_a_past_cost_work_all_the_same():
 @pytest.mark.parametrize("medium", [FLUID, SAND])
 def test_the_file_has_what_a_change_of_shape_costs(medium, tmp_path):
     study = geomech.Study(scene(Swimmer(medium, UNEVEN)))
-    netcdf.save_connection(tmp_path / "made.nc", study)
+    fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
     table = Table(str(tmp_path / "made.nc"))
     own, back = study.metric, table.table("metric")
@@ -168,7 +168,7 @@ def test_a_damaged_metric_is_refused(tmp_path):
     study = geomech.Study(scene(Swimmer(FLUID, UNEVEN)))
     for what in ("symmetry", "degree"):
         path = tmp_path / f"{what}.nc"
-        netcdf.save_connection(path, study)
+        fields.save_connection(path, study)
         with netcdf_file(path, "a", mmap=False) as file:
             if what == "symmetry":
                 file.variables["metric"][0, 1] += 1.0

@@ -14,12 +14,12 @@ from geomech import scene as scenes
 from geomech.core import errors
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
-from geomech.output import display, mat, netcdf
-from geomech.output.explain import explain
+from geomech.output import display, mat
 from geomech.run import progress
 from geomech.scene import Numerics, Scene
-from geomech.study import sweep
+from geomech.study import fields, sweep
 from geomech.study.bench import Study
+from geomech.text.explain import explain
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
 TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"  # in a string of TOML, which holds none as it is
@@ -53,7 +53,7 @@ def stored(tmp_path_factory):
     """A folder with a.nc and a.mat of a small table."""
     folder = tmp_path_factory.mktemp("tables")
     bench = Study(scenes.load("three-link-viscous").with_numerics(grid=7))
-    netcdf.save_connection(folder / "a.nc", bench)
+    fields.save_connection(folder / "a.nc", bench)
     mat.save_connection(folder / "a.mat", bench)
     return folder
 

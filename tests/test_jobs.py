@@ -16,7 +16,7 @@ from test_store import HARD, same
 
 from geomech import scene as scenes
 from geomech import terminal
-from geomech.commands.asked import allow, storing
+from geomech.commands.pipeline import allow, storing
 from geomech.core.errors import SceneError
 from geomech.geometry import connection
 from geomech.optimise import checked, search
@@ -26,9 +26,11 @@ from geomech.run.digest import Undigestible
 from geomech.run.jobs import Runner, context_of, runner
 from geomech.run.store import Store
 from geomech.run.workers import using
-from geomech.scene import kinds
-from geomech.study import accuracy, cost, estimate, intrusion, walking
+from geomech.scene import inputs, kinds
+from geomech.study import accuracy, cost, estimate, tiered, walking
 from geomech.study.bench import Study
+from geomech.study.knob import Knob
+from geomech.study.motion import Trajectory
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
@@ -39,6 +41,7 @@ from rft.premise import Premise
 from rft.stepping import Stepping
 
 GLASS, VISCOUS = scenes.load("three-link-glass"), scenes.load("three-link-viscous")
+ASKED = Trajectory(VISCOUS)
 
 
 @pytest.fixture(autouse=True)
@@ -172,7 +175,7 @@ def test_no_faster_back_end_is_taken_than_at_first(tmp_path):
         there.setattr(jobs, "fastest", lambda: "numba")
         with backend.preferring("numba"), jobs.storing(tmp_path / "p", keep=True):
             assert ask() == 4 * ["numpy"]
-            allow(VISCOUS, cost.Cost(10**6, 1.0, 0.0), yes=True)
+            allow(ASKED, cost.Cost(10**6, 1.0, 0.0), yes=True)
             assert ask() == 4 * ["numpy"]
 
 
@@ -180,7 +183,7 @@ def test_a_count_of_balances_decides_on_the_back_end_and_no_clock():
     for balances, expected in ((99_999, "numpy"), (100_000, backend.fastest())):
         for seconds in (0.1, 50.0):
             with backend.preferring("numpy"):
-                allow(VISCOUS, cost.Cost(balances, seconds, 0.0), yes=True)
+                allow(ASKED, cost.Cost(balances, seconds, 0.0), yes=True)
                 assert backend.preferred() == expected
 
 
@@ -206,11 +209,11 @@ def test_what_has_no_digest_is_computed_and_not_stored(tmp_path):
 def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
     """Error studies, searches from several starts, fields with what moving costs; seconds are those of the first
     time."""
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in accuracy.KNOBS if k.tier == "direct"]
-    monkeypatch.setattr(accuracy, "KNOBS", few)
-    monkeypatch.setattr(accuracy, "TRUTH_PHASES", 64)
+    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.KNOBS if k.tier == "direct"]
+    monkeypatch.setattr(tiered, "KNOBS", few)
+    monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 100)
-    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 9)})
+    monkeypatch.setattr(walking, "KNOBS", (Knob("steps", (8, 9), 2, against="limit"),))
     monkeypatch.setattr(walking, "FINEST", {"steps": 10})
     monkeypatch.setattr(walking, "SETTLING", 1)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
@@ -223,11 +226,11 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
         return [study.compute_metric().coefficients, study.fitted.A, study.fitted.residual]
 
     numbers = lambda: [json.dumps({**search(request).numbers(), "seconds": 0.0})]
-    errors = lambda study, *of: [np.array(x["error"]) for x in study.study(*of)["lines"]]
+    errors = lambda *of: [np.array(x["error"]) for x in accuracy.study(*of)["lines"]]
     for ask, after in (
-        (lambda: errors(accuracy, scene, None, 1), 5),
-        (lambda: errors(intrusion, scenes.load("c-leg")), 2),
-        (lambda: errors(walking, walker), 2),
+        (lambda: errors(scene, None, 1), 5),
+        (lambda: errors(scenes.load("c-leg")), 2),
+        (lambda: errors(walker), 2),
         (field, 4),
         (numbers, 1),
     ):
@@ -366,7 +369,7 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
 
 def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):
     amplitudes = np.array([0.4, 0.9, 1.3])
-    monkeypatch.setattr(type(GLASS.system), "at_once", lambda self, phases: 1)
+    monkeypatch.setattr(estimate, "at_once", lambda system, phases: 1)
     ask = lambda: estimate.direct(GLASS, GLASS.gait, amplitudes, 32)
     whole = ask()
     stopped(tmp_path / "p", 2, ask)
@@ -543,7 +546,7 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
 
 def test_two_at_once_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with storing(VISCOUS, Path("f.nc"), command="test"):
+    with storing(ASKED, Path("f.nc"), []):
         for args in (FIELD, ["sweep", "three-link-viscous", "--over", "gait.amplitude=1", "-o"]):
             for name in ("f.nc", f"../{tmp_path.name}/f.nc"):
                 code, out, err = geomech(*args, name)
@@ -555,10 +558,10 @@ def test_two_at_once_are_refused(tmp_path, monkeypatch):
 
 def test_what_is_printed_is_no_obstacle_to_another(own_cache, monkeypatch):
     monkeypatch.setattr(store, "CHECKPOINT", -1.0)
-    with storing(VISCOUS, None, command="test"):
+    with storing(ASKED, None, []):
         first = calls()
         assert len(list(own_cache.glob("*.partial"))) == 1
-        with storing(VISCOUS, None, command="test"):
+        with storing(ASKED, None, []):
             assert same(calls(), first)
         assert len(list(own_cache.glob("*.partial"))) == 1
     assert list(own_cache.iterdir()) == []
@@ -577,7 +580,10 @@ def test_nothing_is_stored_over_an_input(tmp_path):
     (tmp_path / ".f.nc.partial").write_text(VISCOUS.text)
     name = str(tmp_path / ".f.nc.partial")
     scene = dataclasses.replace(VISCOUS, name=name)
-    with pytest.raises(SceneError, match="it is an input"), storing(scene, tmp_path / "f.nc", command="test"):
+    with (
+        pytest.raises(SceneError, match="it is an input"),
+        storing(Trajectory(scene), tmp_path / "f.nc", inputs(scene)),
+    ):
         pass
 
 

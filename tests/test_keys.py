@@ -46,7 +46,7 @@ def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(name):
     """In the annotation or the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
     _, variant = EVERY[name]
     fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
-    if not variant.columns:
+    if not variant.file:
         assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
     for key in keys_in(variant):
         place = (

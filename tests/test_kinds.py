@@ -20,8 +20,6 @@ from geomech.core.registry import REGISTRIES
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
-from geomech.output.explain import explain
-from geomech.output.system import notes
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
 from geomech.scene.keys import text
 from geomech.scene.kinds import load_file, register
@@ -29,6 +27,8 @@ from geomech.scene.schema import schema
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.systems import Premise, Solver, Swimmer
+from geomech.text.explain import explain
+from geomech.text.system import notes
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent

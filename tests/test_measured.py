@@ -25,20 +25,26 @@ from geomech.geometry.plane import looked_up
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Loop, Tube, series, waves
 from geomech.io import tables
+from geomech.io.results import write_netcdf
 from geomech.io.tables.mat import ERROR
-from geomech.measured import cycles, phase, regression, smooth, synthetic, unknowns
-from geomech.output import mat, netcdf
-from geomech.output import measured as told
-from geomech.output.explain import explain
+from geomech.measured import cycles, phase, regression, results, smooth, synthetic, unknowns
+from geomech.output import mat
 from geomech.scene import Scene, load
+from geomech.study import fields
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
+from geomech.text import measured as told
+from geomech.text.explain import explain
 from rft import se2
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 BODY = rft.Chain((1, 1.3, 0.8))
 NAMES = ("t", "alpha_1", "alpha_2", "x", "y", "heading")
+
+
+def save_field(path, fit):
+    write_netcdf(path, results.of_fit(fit))
 
 
 @pytest.fixture(scope="module")
@@ -373,7 +379,7 @@ def test_three_joints(tmp_path):
     found, off = f.along(np.arange(6.0))
     assert np.mean(np.abs(found - true) <= off) > 0.85
     assert (np.abs(f.displacement[0] - displacement(wave(*f.gait.cycle(128)))) <= f.displacement[1]).all()
-    told.save_field(tmp_path / "a.nc", f)
+    save_field(tmp_path / "a.nc", f)
     system = Table(tmp_path / "a.nc")
     np.testing.assert_allclose(system.run(*f.gait.cycle(128)).net, f.displacement[0], rtol=1e-12)
     study, there = Study(Scene(system, f.gait)), f.known.loop.shape(np.array(0.0))
@@ -436,12 +442,12 @@ SUM = [[1, 1]], "alpha_3 is 1 alpha_1 \\+ 1 alpha_2, but for .* leave alpha_3 ou
 def test_joints_that_follow_from_others_are_named(noise, rows, said):
     log = tied(rows, noise)
     f = measured.fit_log(log)
-    found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", told.status(f))  # noise moves the third digit
+    found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f))  # noise moves the third digit
     assert re.match("fitted along the gait alone: " + said, found)
-    assert told.status(f) in told.text(f)
+    assert results.status(f) in told.described(f)
     if noise == 1e-3 and len(rows) == 1:
         kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
-        assert told.status(measured.fit_log(kept, harmonics=2)) == "fitted"
+        assert results.status(measured.fit_log(kept, harmonics=2)) == "fitted"
 
 
 @pytest.mark.parametrize(("joints", "harmonics"), [(3, 1), (5, 1), (5, 2)])
@@ -452,8 +458,8 @@ def test_a_wave_of_few_harmonics_is_no_such_log(joints, harmonics, spread):
     f = measured.fit_log(log_of(made), harmonics=1 if spread else None)
     assert f.combined == {}
     if joints < 5:  # of which 24 cycles tell less
-        along = f"{told.ALONG}: its cycles do not vary enough to tell A across it"
-        assert told.status(f) == ("fitted" if spread else along)
+        along = f"{results.ALONG}: its cycles do not vary enough to tell A across it"
+        assert results.status(f) == ("fitted" if spread else along)
 
 
 @pytest.mark.parametrize(
@@ -530,8 +536,8 @@ def test_the_ccf_near_the_gait_is_that_of_differences(usual):
 @pytest.fixture(scope="module")
 def field(usual, tmp_path_factory):
     folder = tmp_path_factory.mktemp("measured")
-    told.save_field(folder / "field.nc", usual)
-    (folder / "mine.toml").write_text(told.scene_toml(usual, folder / "field.nc", folder / "mine.toml"))
+    save_field(folder / "field.nc", usual)
+    (folder / "mine.toml").write_text(results.scene_toml(usual, folder / "field.nc", folder / "mine.toml"))
     return folder
 
 
@@ -600,7 +606,7 @@ def test_a_field_written_before_it_had_what_is_left_is_read(field, tmp_path):
 
 def test_a_field_written_again_keeps_every_digit(field, tmp_path):
     study = Study(load(field / "mine.toml"))
-    netcdf.save_connection(tmp_path / "again.nc", study)
+    fields.save_connection(tmp_path / "again.nc", study)
     one, other = (Connection.load(x).known for x in (field / "field.nc", tmp_path / "again.nc"))
     for f in dataclasses.fields(one):
         a, b = (getattr(x, f.name) for x in (one, other))
@@ -647,14 +653,14 @@ def test_lengths_and_signs_of_a_field(usual, field, tmp_path):
     np.testing.assert_allclose(two.run(*cycle).net * [2, 2, 1], Table(field / "field.nc").run(*cycle).net, rtol=1e-9)
     np.testing.assert_allclose(two.own_error(*cycle), Table(field / "field.nc").own_error(*cycle) * [0.5, 1])
     metres = measured.fit_log(usual.log, body_length=0.3, harmonics=4)
-    told.save_field(tmp_path / "m.nc", metres)
+    save_field(tmp_path / "m.nc", metres)
     table = Table(tmp_path / "m.nc")
     assert (table.length, length_unit(table)) == (0.3, "m")
 
 
 def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, tmp_path):
     thin = measured.fit_log(usual.log, within=1e-5, harmonics=4)
-    told.save_field(tmp_path / "thin.nc", thin)
+    save_field(tmp_path / "thin.nc", thin)
     study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()
     np.testing.assert_allclose(study.displacement("direct"), thin.displacement[0], rtol=1e-9)
@@ -681,9 +687,9 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     t = np.arange(6.0)
     n = f.known.loop.normals(t)[..., 0]
     assert np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min() > 0.05  # not known
-    told.save_field(tmp_path / "a.nc", f)
+    save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
-    assert told.numbers(f)["status"].startswith("fitted along the gait alone")
+    assert told.told(f)["status"].startswith("fitted along the gait alone")
 
 
 def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous, monkeypatch):
@@ -900,7 +906,7 @@ def test_what_is_no_time_makes_no_frequency(name, short, tmp_path):
     path = written(tmp_path / "log.csv", short, (name, *NAMES[1:]), changed(0, lambda t: 400 * t))
     f = measured.fit_log(path, columns=(name, *NAMES[1:]))
     assert f.gait.frequency is None and math.isclose(f.frequency, 1 / 400, rel_tol=0.02)
-    assert "frequency" not in told.scene_toml(f, tmp_path / "a.nc", tmp_path / "a.toml")
+    assert "frequency" not in results.scene_toml(f, tmp_path / "a.nc", tmp_path / "a.toml")
 
 
 def test_a_table_as_r_writes_it(short, tmp_path):

@@ -19,8 +19,8 @@ import geomech.scene as scenes
 from figures import meshes
 from geomech.core.errors import SceneError
 from geomech.output import plots
-from geomech.output.explain import explain
 from geomech.scene import MeshScene
+from geomech.text.explain import explain
 from rft.meshes import (
     SOLIDS,
     Cylinder,

@@ -231,10 +231,11 @@ def test_no_such_frame_where_there_is_none():
 def test_its_file_and_pictures(tmp_path):
     from scipy.io import netcdf_file
 
-    from geomech.output import netcdf, plots
+    from geomech.output import plots
+    from geomech.study import fields
 
     scene = scenes.parse(SCENE.format(law="viscous", numbers=LAWS["viscous"]))
-    netcdf.save_connection(tmp_path / "c.nc", Study(scene))
+    fields.save_connection(tmp_path / "c.nc", Study(scene))
     with netcdf_file(tmp_path / "c.nc", mmap=False) as file:
         pose = file.variables["frame_pose"]
         assert np.array(pose[:]) == pytest.approx(scene.system.field.field.values)

@@ -19,12 +19,12 @@ from geomech.core.errors import SceneError, UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
-from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.single import single as single_of
 from geomech.systems import NoSlipSnake, Swimmer
+from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
 
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
@@ -366,7 +366,7 @@ def test_no_medium_of_ours_is_suspected(name):
         ("gamma0_deg = 13.8", "gamma0 = 13.8 deg", "a number has no unit: a key that ends in _deg takes degrees"),
         ("C = 1.8", "C: 1.8", "'C: 1.8', write KEY = VALUE"),
         ("C = 1.8", "C =", "give the key a value"),
-        ("C = 1.8\n", "", "[medium] Object missing required field `C`: add C = ..."),
+        ("C = 1.8\n", "", "[medium] has no `C`: add C = ..."),
         ("C = 1.8", 'C = "big"', "Expected `float`, got `str` - at `.C`: give a number in place of 'big'"),
         ('"chain"', '"chain"\nlengths = [1, "1", 1]', "give a number in place of '1'"),
         ('"chain"', '"chain"\nlengths = 3', "give a list in [ ] in place of 3"),

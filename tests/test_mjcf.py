@@ -12,7 +12,9 @@ from matplotlib import image
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
-from geomech.study import walking
+from geomech.study import accuracy, walking
+from geomech.study.knob import Knob
+from geomech.study.sweep import sweep
 from rft.meshes import Spatial
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
 
@@ -248,7 +250,7 @@ engine = "mujoco"
 
 
 def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch):
-    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 10)})
+    monkeypatch.setattr(walking, "KNOBS", (Knob("steps", (8, 10), 2, against="limit"),))
     monkeypatch.setattr(walking, "FINEST", {"steps": 12})
     (tmp_path / "small.toml").write_text(SMALL)
     code, out, _ = geomech("walk", "small.toml", "--json", "-o", "out")
@@ -260,7 +262,7 @@ def test_walk_sweep_and_accuracy_take_the_engine(geomech, tmp_path, monkeypatch)
     assert image.imread(tmp_path / "out" / "walk.png").std() > 0.05
     code, out, _ = geomech("sweep", "small.toml", "--over", "gait.frequency=2", "-o", "s.nc")
     assert code == 0 and "1 walking" in out
-    results = walking.study(scenes.load(tmp_path / "small.toml"))
+    results = accuracy.study(scenes.load(tmp_path / "small.toml"))
     assert results["speed"] == pytest.approx(found["speed"], rel=0.02) and 0 < results["lines"][0]["error"][0] < 0.2
 
 
@@ -269,7 +271,7 @@ def test_a_sweep_of_robots_that_walk_alone_tells_how_far_it_is(tmp_path, monkeyp
     monkeypatch.setattr(walking, "walked", lambda some, settling: [walking.Walked(walk, 0.0) for _ in some])
     (tmp_path / "small.toml").write_text(SMALL)
     scene, done = scenes.load(tmp_path / "small.toml"), []
-    walking.sweep(scene, {"gait.frequency": [1.0, 2.0, 3.0, 4.0]}, progress=done.append)
+    sweep(scene, {"gait.frequency": [1.0, 2.0, 3.0, 4.0]}, progress=done.append)
     assert done == [0.25, 0.5, 0.75, 1.0]
 
 

@@ -12,9 +12,9 @@ from geomech import scene as scenes
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection, curvature
 from geomech.geometry.coordinates import change_velocity
-from geomech.output import mat, netcdf
+from geomech.output import mat
 from geomech.scene import Scene
-from geomech.study import sweep
+from geomech.study import fields, sweep
 from geomech.study.bench import Study
 from geomech.study.offer import tiers
 from geomech.systems import Swimmer, Table
@@ -279,7 +279,7 @@ def test_waves_that_make_no_gait_are_refused(wrong, said):
 def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     scene = Scene(Swimmer(SAND, MODES), Circle(amplitude=0.4)).with_numerics(grid=5, extent=0.6, phases=16)
     study = Study(scene)
-    save = {"nc": netcdf.save_connection, "mat": mat.save_connection}[ending]
+    save = {"nc": fields.save_connection, "mat": mat.save_connection}[ending]
     save(tmp_path / f"modes.{ending}", study)
     again = Table(tmp_path / f"modes.{ending}")
     assert shape_labels(again) == (("m_1", "rad"), ("m_2", "rad"))

@@ -11,6 +11,7 @@ from PIL import Image
 from registry import BODIES, SYSTEMS
 
 from geomech import scene as scenes
+from geomech.commands import formats
 from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
 from geomech.geometry import reconstruct
@@ -260,7 +261,7 @@ def test_too_much_is_refused_before_it_begins(tmp_path):
         with pytest.raises(SceneError, match=cure):
             animate.check_format(tmp_path / name)
     with pytest.raises(SceneError, match="end the name of a table in .csv"):
-        trajectories.check_csv(tmp_path / "out.nc")
+        formats.csv(tmp_path / "out.nc")
 
 
 @pytest.fixture(scope="module")

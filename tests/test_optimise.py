@@ -18,11 +18,12 @@ from geomech.optimise.cycles import Phases, Runs, brought
 from geomech.optimise.keeping import Keeping
 from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
-from geomech.output import netcdf, optima
 from geomech.scene import Scene, parse
+from geomech.study import fields
 from geomech.study.bench import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
+from geomech.text import optimum as optima
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
@@ -191,7 +192,7 @@ def test_best_gaits_in_sand(sand):
     assert len(sand.active) == (4 if asked[0] == "displacement" else 2)
     assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
     assert sum(times for _, times in sand.answers + sand.others) == 9 + 4
-    told = optima.text(sand)
+    told = optima.told(sand)
     assert "9 starts, and 4 that narrower limits led to, answers that differ: " in told
     assert "by a table alone, less: " in told
     assert sand.numbers()["answers"] == [list(x) for x in sand.answers + sand.others]
@@ -342,7 +343,7 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     first, again = (loops.starts(loops.of(Circle()), 3) for _ in range(2))
     assert all(np.array_equal(p, q) for p, q in zip(first, again))
     assert all(np.abs(loops.gait(p).cycle(500)[0]).max() <= 1.4 for p in first)
-    assert "answers that differ" in optima.text(found)
+    assert "answers that differ" in optima.told(found)
 
 
 def serpenoid(body=None):
@@ -446,7 +447,7 @@ def test_requests_that_make_no_sense(name, asked, said):
 
 def test_a_table_that_never_turns_is_refused_too(tmp_path):
     drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
-    netcdf.save_connection(tmp_path / "drive.nc", Study(drive))
+    fields.save_connection(tmp_path / "drive.nc", Study(drive))
     with pytest.raises(SceneError, match="no gait turns it: the table's file tells a body whose heading"):
         checked(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
     for name in ("three-link-viscous", "three-link-floating", "no-slip-snake"):
@@ -634,12 +635,12 @@ def test_chains_without_drag_cost_what_their_metric_says():
     assert found.best.length == pytest.approx(length, rel=1e-10)
     assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
     assert found.value > 1.005 * found.start.value
-    assert "of the system's own metric" in optima.text(found)
+    assert "of the system's own metric" in optima.told(found)
 
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
 def test_a_table_is_searched_like_its_scene(name, tmp_path):
-    from geomech.output.netcdf import save_connection
+    from geomech.study.fields import save_connection
 
     scene = geomech.load(name).with_numerics(grid=21)
     save_connection(tmp_path / "field.nc", Study(scene))

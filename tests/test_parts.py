@@ -14,11 +14,11 @@ from geomech.geometry.traits import Traits
 from geomech.io import tables
 from geomech.optimise import optimise
 from geomech.output import plots
-from geomech.output.explain import explain
 from geomech.scene import Numerics, Scene, kinds, parse
 from geomech.study.bench import Study
 from geomech.study.single import single
 from geomech.systems.base import Cycle, integrated
+from geomech.text.explain import explain
 
 HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
 FILES = {

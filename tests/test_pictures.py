@@ -10,11 +10,11 @@ from geomech import scene as scenes
 from geomech.gaits import Ellipse
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
-from geomech.output import plots, sweeps
+from geomech.output import plots
 from geomech.output.plots.precision import KNOBS as PRECISION
 from geomech.output.plots.precision import PANELS
-from geomech.study.accuracy import KNOBS
 from geomech.study.bench import Study
+from geomech.study.tiered import KNOBS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS
 
@@ -242,7 +242,7 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     errors = np.ones((3, 2)), np.ones((3, 2))
     results = {"over": over, "displacement": moved, "estimate": errors[0], "estimate_heading": errors[1]}
     results["units"] = {"estimate": "m"}
-    ax = sweeps.draw(scene, results).axes[0]
+    ax = plots.sweep_figure(scene, results).axes[0]
     x, y, values = mesh(ax)
     np.testing.assert_allclose(x[0], over["gait.amplitude"])
     np.testing.assert_allclose(y[:, 0], over["body.length"])
@@ -251,22 +251,22 @@ def test_the_map_of_a_sweep_lies_as_its_parameters():
     assert (ax.get_xlabel(), ax.get_ylabel()) == (scene.gait.amplitude_label, "length (m)")
     assert (ax.get_xlim(), ax.get_ylim()) == ((0.5, 1.5), (2.0, 5.0))
     shuffled = {**results, "over": {"gait.amplitude": [1.5, 0.5, 1.0], "body.length": [5.0, 2.0]}}
-    x, y, values = mesh(sweeps.draw(scene, shuffled).axes[0])
+    x, y, values = mesh(plots.sweep_figure(scene, shuffled).axes[0])
     np.testing.assert_allclose(x[0], [0.5, 1.0, 1.5])
     np.testing.assert_allclose(y[:, 0], [2.0, 5.0])
     np.testing.assert_allclose(values, np.array([[4, 3], [6, 5], [-2, 1]]).T)
     one = {"over": {"body.length": [2.0, 5.0]}, "displacement": moved[0], "estimate": np.array([0.2, 1.0])}
     one["units"] = {"estimate": "m"}
-    ax = sweeps.draw(scene, one).axes[0]
+    ax = plots.sweep_figure(scene, one).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 1], [5, -2]])
     np.testing.assert_allclose(ax.collections[0].get_segments(), [[[2, 0.8], [2, 1.2]], [[5, -3], [5, -1]]])  # m
     timed = {**one, "frequency": np.array([3.0, 4.0]), "speed": np.array([3.0, 8.0])}
-    ax = sweeps.draw(scene, timed).axes[0]
+    ax = plots.sweep_figure(scene, timed).axes[0]
     np.testing.assert_allclose(ax.lines[0].get_xydata(), [[2, 3], [5, -8]])
     assert ax.get_ylabel() == "speed (m/s), backwards < 0"
     many = {"over": {"medium.C": np.arange(60.0)}, "displacement": np.ones((60, 3)), "estimate": np.ones(60)}
     many["units"] = {"estimate": "BL"}
-    drawn = [sweeps.draw(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
+    drawn = [plots.sweep_figure(scene, x).axes[0].lines[0].get_marker() for x in (one, many)]
     assert drawn == ["o", "None"]
 
 
@@ -322,9 +322,9 @@ def test_parameters_have_names_and_units():
     scene = scenes.load("sandfish-heavy")
     names = ["medium.C", "effects.frequency", "medium.gamma0_deg", "effects.end-caps.radius", "gait.amplitude"]
     named = ["C (-)", "frequency (Hz)", r"$\gamma_{0}$ (deg)", "radius (BL)", scene.gait.amplitude_label]
-    assert sweeps.labels(scene, names) == named
+    assert plots.sweeps.labels(scene, names) == named
     both = ["effects.end-caps.radius", "effects.disturbed-ground.radius"]
-    assert sweeps.labels(scene, both) == ["end-caps: radius (BL)", "disturbed-ground: radius (BL)"]
+    assert plots.sweeps.labels(scene, both) == ["end-caps: radius (BL)", "disturbed-ground: radius (BL)"]
 
 
 def test_panels_are_x_y_and_theta():

@@ -8,7 +8,6 @@ import pytest
 from test_cli import geomech
 
 from geomech import Numerics, Scene, Study
-from geomech.commands.asked import _held
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
 from geomech.geometry.plane import Plane, Seen, looked_up, plane
@@ -17,6 +16,7 @@ from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
 from geomech.scene.frames import framed
 from geomech.study.choose import cheapest
+from geomech.study.shape_space import through as _held
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import fits, is_too_large
@@ -345,6 +345,7 @@ def test_a_surface_says_what_its_shades_mean():
 
 def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatch):
     from geomech.output import report
+    from geomech.study.report import Report
 
     system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
     drawn, scene = {}, Scene(system, LOOP, Numerics(grid=5, extent=1.2, phases=32))
@@ -352,8 +353,11 @@ def test_a_run_of_three_joints_has_its_field_and_all_slices(tmp_path, monkeypatc
     for name in ("plane_connection_figure", "planes_figure"):
         monkeypatch.setattr(report.plots, name, lambda planes, *gait, labels: [one.pair for one in planes])
     monkeypatch.setattr(report.plots, "displacement_figure", lambda tables, *told: [*tables])
-    found = report.write(Study(scene), tmp_path, None)
+    found = Report(scene).ask()
+    report.write(found, tmp_path)
     pairs = [(0, 1), (0, 2), (1, 2)]
     assert drawn == {"connection": pairs, "ccf": pairs, "displacement": ["fourier"]}
-    assert (tmp_path / "connection.nc").exists() and {"area", "path", "direct"} <= {*found["fourier"]}
-    assert report.cost(scene).balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12
+    assert (tmp_path / "connection.nc").exists() and {"area", "path", "direct"} <= {
+        *found.subject.tables["fourier"]["tier"].values
+    }
+    assert Report(scene).cost().balances >= 5**3 // 2 * 12 + 3 * 5**2 * 12

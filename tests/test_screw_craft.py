@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
-from geomech.output import walk_sweeps
-from geomech.study.sweep import changed
+from geomech.output import plots
+from geomech.study.grid import changed
 from rft.plates import StressMap
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise
 from rft.walking.craft import PER_SQUARE
@@ -110,7 +110,8 @@ WRONG = {
     "track = 0.12 ": ("track = 0.05 ", "screws of radius 0.03 m meet: track must be more than 0.06 m"),
     'pair = "mirrored" ': ('pair = "twin" ', "pair must be one of mirrored, alike, got 'twin'"),
     "mass = 1.0 ": ("mass = 0 ", "mass must be a number"), "drop = 0.055 ": ("drop = inf ", "drop must be"),
-    "length = 0.2 ": ("lenght = 0.2 ", "did you mean 'length'"), "height = 0.04": ("", "[robot] has no height: add it"),
+    "length = 0.2 ": ("lenght = 0.2 ", "did you mean 'length'"),
+    "height = 0.04": ("", "[robot] has no `height`: add height = ..., in m"),
     "nose = 0.03 ": ('kind = "sphere"\nnose = 0.03 ', "[robot.screw] kind: 'sphere' is unknown"),
     "frequency = 1.0 ": ("frequency = 0 ", "frequency must be a number from 0.001 to 200"),
     "density = 1500 ": ("density = -1 ", "density must be"),
@@ -134,14 +135,18 @@ def test_sizes_of_screws_are_swept():
         with pytest.raises(SceneError, match="name a parameter such as"):
             changed(tables, wrong, 1.0)
     results = {"over": {"robot.screw.pitch": [0.04, 0.06]}, "speed": np.ones(2), "estimate": np.zeros(2)}
-    (ax,) = walk_sweeps.draw(SCENE, results | {"status": np.full(2, "walking")}).axes
+    (ax,) = plots.sweep_figure(SCENE, results | {"status": np.full(2, "walking")}).axes
     assert ax.get_xlabel() == "pitch (m)"
 
 
 def test_a_craft_without_screws_is_told_so():
     bare = SMALL[: SMALL.index("[robot.screw]")] + SMALL[SMALL.index("[gait]") :]
-    for text in (bare, bare.replace("mass = 1.0", "screw = 3\nmass = 1.0")):
-        with pytest.raises(SceneError, match=r"a robot without screws: add the table \[robot.screw\]"):
+    asked = {
+        bare: r"\[robot\]: the table \[robot.screw\] is missing: add it",
+        bare.replace("mass = 1.0", "screw = 3\nmass = 1.0"): r"robot.screw must be a table \[robot.screw\], got int",
+    }
+    for text, said in asked.items():
+        with pytest.raises(SceneError, match=said):
             scenes.parse(text)
 
 

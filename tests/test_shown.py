@@ -16,9 +16,10 @@ from registry import SYSTEMS
 import rft
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, curvature
-from geomech.output import netcdf, plots, sweeps
+from geomech.io.results import write_netcdf
+from geomech.output import plots
 from geomech.scene import Numerics, Scene, load
-from geomech.study import sweep
+from geomech.study import fields, sweep, tables
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
@@ -122,8 +123,8 @@ def test_notebooks_get_tables_and_pictures(study, table, swept):
     assert study.curvature.values is not None and study.curvature_error.values is not None
     assert len(pictures(study._repr_html_())) == 1
     assert "<script>" not in Study(study.scene.changed(name="<script>"))._repr_html_()
-    rows = {"amplitude": [0.1] * 50, "area": [[0, 0, 0]] * 50, "estimate": [0] * 50, "estimate_heading": [0] * 50}
-    many = Displacements(rows, study.scene, GAIT)._repr_html_()
+    none = {"area": np.zeros((50, 3))}, {"area": np.zeros((50, 2))}
+    many = Displacements(tables.result(study.scene, GAIT, [0.1] * 50, *none))._repr_html_()
     assert many.count("<tr>") == 41 and "and 10 rows more" in many
 
 
@@ -135,7 +136,7 @@ def test_results_remain_dicts(study, table, swept):
 
 
 def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
-    netcdf.save_connection(tmp_path / "a.nc", study)
+    fields.save_connection(tmp_path / "a.nc", study)
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         xarray.testing.assert_identical(study.to_xarray(), data.load())
         for mine in (study.fitted.to_xarray(), study.curvature.to_xarray().to_dataset()):
@@ -146,11 +147,11 @@ def test_data_sets_are_those_of_the_files(study, swept, tmp_path):
     moved = Study(Scene(modes, GAIT).with_numerics(grid=7, phases=16))
     for data in (moved.to_xarray(), moved.fitted.to_xarray(shapes=["m_1", "m_2"])):
         assert [data[f"alpha_{k}"].long_name for k in (1, 2)] == ["shape variable m_1", "shape variable m_2"]
-    sweeps.save(tmp_path / "b.nc", study.scene, swept)
+    write_netcdf(tmp_path / "b.nc", sweep.as_stored(swept.result))
     with xarray.open_dataset(tmp_path / "b.nc") as data:
         xarray.testing.assert_identical(swept.to_xarray(), data.load())
     bare = Study(Scene(SYSTEMS["table"], GAIT))
-    netcdf.save_connection(tmp_path / "c.nc", bare)
+    fields.save_connection(tmp_path / "c.nc", bare)
     with xarray.open_dataset(tmp_path / "c.nc") as data:
         xarray.testing.assert_identical(bare.to_xarray(), data.load())
     other = study.fitted.field.to_xarray("A")

@@ -40,7 +40,7 @@ SCENES = [
     ('[medium]\nname = "glass-0.3mm-loose"', 'medium = "coulomb"', "medium must be a table"),
     (LAW[0], LAW[1] + "gamma0 = 17", "write gamma0_deg"), (LAW[0], LAW[1] + "gamma0_deg = 0", "between 0 and 90"),
     (LAW[0], LAW[1] + "gamma0_deg = [14]", "a number"), (LAW[0], "C = 1.8", "has no 'law'"),
-    (LAW[0], LAW[0] + "\nC = 1.8", "it has no 'law'"), (LAW[0], 'law = "viscous"\nratio = "2:1"', "'2:1'"),
+    (LAW[0], LAW[0] + "\nC = 1.8", "(no 'law')"), (LAW[0], 'law = "viscous"\nratio = "2:1"', "'2:1'"),
     (EFFECT + "radius = 0.1", None, "has no 'kind'"), (EFFECT + 'kind = "endcaps"', None, "did you mean 'end-caps'"),
     (EFFECT + 'kind = "end-caps"', None, "add radius"), (EFFECT + 'kind = "end-caps"\nradius = "6 cm"', None, "'6 cm'"),
     (PLAIN + '[effects]\nkind = "end-caps"', None, "[[effects]]"), ("effects = 3\n" + PLAIN, None, "[[effects]]"),

@@ -7,7 +7,7 @@ from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
-from geomech.study import estimate, sweep
+from geomech.study import cycles, estimate, sweep
 from geomech.study.bench import Study
 from rft import CATALOGUE, Granular
 
@@ -140,7 +140,7 @@ OVER = {"body.length": [1.0, 2.0, 3.0, 4.0], "gait.amplitude": [0.5, 1.0]}
 @pytest.mark.parametrize("over", [OVER, {"gait.amplitude": [0.2, 0.4, 0.6, 0.8, 1.0]}])
 def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(over, tmp_path, monkeypatch):
     """Which stays until its caller has saved the results; a sweep of one more point takes what it can."""
-    partial, calls, rows = tmp_path / "p", [], sweep._rows
+    partial, calls, rows = tmp_path / "p", [], cycles._rows
 
     def failing(at, amplitudes):
         calls.append((at[0].system.body.length, amplitudes))
@@ -148,9 +148,9 @@ def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(over, tmp_path, 
             raise KeyboardInterrupt
         return rows(at, amplitudes)
 
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 2)
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 2)
     whole = sweep.sweep(GLASS, over)
-    monkeypatch.setattr(sweep, "_rows", failing)
+    monkeypatch.setattr(cycles, "_rows", failing)
     with pytest.raises(KeyboardInterrupt) as ended:
         sweep.sweep(GLASS, over, partial)
     assert ended.value.__notes__ == [f"1 results so far are kept in {partial}: the same command goes on from there"]

@@ -15,10 +15,8 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import crossed
 from geomech.geometry.traits import Traits
-from geomech.output import netcdf
-from geomech.output.explain import explain
 from geomech.scene import Scene
-from geomech.study import cost, estimate
+from geomech.study import cost, estimate, fields
 from geomech.study.bench import Study
 from geomech.study.single import single
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
@@ -26,6 +24,7 @@ from geomech.systems.base import kind_of, length_unit
 from geomech.systems.capabilities import stored
 from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver
+from geomech.text.explain import explain
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
 from rft.balance.newton import to_element
@@ -155,7 +154,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
 
 def test_files_and_words_say_what_is_singular(tmp_path):
     study = snake(grid=9, extent=2.0)
-    netcdf.save_connection(tmp_path / "a.nc", study)
+    fields.save_connection(tmp_path / "a.nc", study)
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         assert np.isnan(data.A.values[:, :, range(9), range(9)]).all()
         assert np.isnan(data.ccf.values[:, range(9), range(9)]).all()

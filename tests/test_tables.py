@@ -22,16 +22,17 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
-from geomech.output import mat, netcdf, plots
-from geomech.output.explain import explain
-from geomech.output.system import described
+from geomech.output import mat, plots
 from geomech.scene import Numerics, Scene
-from geomech.study import accuracy, choose, estimate
+from geomech.study import accuracy, choose, estimate, fields, tiered
 from geomech.study.bench import Study
 from geomech.study.single import single
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
+from geomech.text import accuracy as text
+from geomech.text.explain import explain
+from geomech.text.system import described
 from rft.laws import CATALOGUE
 
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
@@ -47,7 +48,7 @@ def study(medium=GLASS, body=UNEVEN, **numerics):
 def made(tmp_path_factory):
     """A folder with a.nc and a.mat of a table in a generic frame, and its study."""
     folder, s = tmp_path_factory.mktemp("tables"), study()
-    netcdf.save_connection(folder / "a.nc", s)
+    fields.save_connection(folder / "a.nc", s)
     mat.save_connection(folder / "a.mat", s)
     return folder, s
 
@@ -72,11 +73,11 @@ def test_netcdf_gives_back_every_digit(made):
 def test_netcdf_of_three_joints_and_of_singular_shapes(tmp_path):
     wave = Fourier(cos=((0.2,), (0.1,), (0.0,)), sin=((0.0,), (0.3,), (0.4,)))
     five = Study(Scene(Swimmer(GLASS, rft.Chain((1, 2, 1.5, 1))), wave, Numerics(grid=5, extent=1.1, interpolation=2)))
-    netcdf.save_connection(tmp_path / "a.nc", five)
+    fields.save_connection(tmp_path / "a.nc", five)
     same(Connection.load(tmp_path / "a.nc"), five.fitted)
     assert Study(Scene(Table(tmp_path / "a.nc"), wave)).tiers == ("area", "adapted", "path", "direct")
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
-    netcdf.save_connection(tmp_path / "b.nc", snake)
+    fields.save_connection(tmp_path / "b.nc", snake)
     same(Connection.load(tmp_path / "b.nc"), snake.fitted)
     mat.save_connection(tmp_path / "b.mat", snake)
     again = Connection.load(tmp_path / "b.mat")
@@ -158,7 +159,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
         np.testing.assert_allclose(halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1))
     table = Study(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(table.to_xarray().A_error, error)
-    netcdf.save_connection(tmp_path / "b.nc", table)
+    fields.save_connection(tmp_path / "b.nc", table)
     mat.save_connection(tmp_path / "b.mat", table, "-", "meshgrid")
     for again in (tables.load(tmp_path / "b.nc"), tables.load(tmp_path / "b.mat")):
         np.testing.assert_array_equal(again.A_error, error)
@@ -272,7 +273,7 @@ GAITS = (
 )  # fmt: skip
 def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium, ending, tmp_path):
     source = study(medium, BODIES[body], grid=21, extent=2.3, harmonics=9)
-    (netcdf if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    (fields if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
     table = Study(Scene(Table(tmp_path / f"a{ending}"), GAIT))
     ratios, length = [], source.scene.system.length  # of the body, m in one of them
     for gait in GAITS:
@@ -320,7 +321,7 @@ def test_errors_of_tables_of_random_scenes_cover(tmp_path):
         source = Study(random_scene(np.random.default_rng(seed)))
         gait, length = source.scene.gait, source.scene.system.length
         amplitudes = gait.amplitude * np.array([0.3, 0.7, 1.0])
-        for ending, module in ((".nc", netcdf), (".mat", mat)):
+        for ending, module in ((".nc", fields), (".mat", mat)):
             module.save_connection(tmp_path / f"a{ending}", source)
             poses, errors = estimate.direct(Scene(Table(tmp_path / f"a{ending}"), gait), gait, amplitudes, 256)
             off = estimate.apart(poses, source.displacement("direct", None, amplitudes), length)
@@ -341,7 +342,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
     both = swimmer.velocity(alpha, unit) + swimmer.velocity(alpha, -unit)
     np.testing.assert_allclose(source.even_part[:, 3, 10], np.sqrt((both**2).mean(0)), rtol=1e-6)
     assert study().even_part is None
-    (netcdf if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
+    (fields if ending == ".nc" else mat).save_connection(tmp_path / f"a{ending}", source)
     table = Scene(Table(tmp_path / f"a{ending}"), GAIT)
     assert ("xi is not odd in alphadot" in explain(table)) == (ending == ".nc")
     for gait in (GAIT, Circle(amplitude=1.2), Butterfly(amplitude=0.8)):
@@ -350,7 +351,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
         off = estimate.apart(poses, source.displacement("direct", gait, amplitudes), 0.3)
         assert (off <= errors).all()
     if ending == ".nc":
-        netcdf.save_connection(tmp_path / "b.nc", Study(table))
+        fields.save_connection(tmp_path / "b.nc", Study(table))
         np.testing.assert_array_equal(tables.load(tmp_path / "b.nc").even, source.even_part)
 
 
@@ -358,7 +359,7 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
     plain_mat(tmp_path / "a.mat", made[1].fitted)
     bare = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
     assert single(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
-    netcdf.save_connection(tmp_path / "a.nc", bare)
+    fields.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
     assert not held.told and "fit residual unknown" in repr(held.connection)
@@ -412,7 +413,7 @@ def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypa
     assert (tmp_path / "t" / "a.nc").read_bytes() == before
     told = explain(scenes.load("t/t.toml"))
     assert "fit leaves x" in told and "odd harmonics" in told and "frame link-1" in told
-    assert [k.label for k in accuracy._knobs(scenes.load("t/t.toml"))] == ["direct: phases", "adapted: curves"]
+    assert [k.label for k in tiered.Settings(scenes.load("t/t.toml")).knobs()] == ["direct: phases", "adapted: curves"]
     written = scenes.toml(Scene(Table("t/a.nc"), Circle()))
     assert scenes.parse(written).system == Table("t/a.nc")
     again = pickle.loads(pickle.dumps(Table("t/a.nc")))
@@ -555,7 +556,7 @@ def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
 
 
 def test_a_metric_of_a_file_is_a_quadratic_form(tmp_path):
-    netcdf.save_connection(tmp_path / "a.nc", study(rft.Viscous(), grid=5))
+    fields.save_connection(tmp_path / "a.nc", study(rft.Viscous(), grid=5))
     raw = (tmp_path / "a.nc").read_bytes()
     assert tables.load(tmp_path / "a.nc").metric is not None
     (tmp_path / "a.nc").write_bytes(altered(raw, metric=put((0, 1, 2, 3), 9.0)))
@@ -670,14 +671,14 @@ def test_a_scene_that_is_written_elsewhere_finds_its_file(tmp_path):
 
 def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     scene = Scene(Table(made[0] / "a.nc"), GAIT).with_numerics(phases=64)
-    monkeypatch.setattr(accuracy, "KNOBS", [k for k in accuracy.KNOBS if k.label == "direct: phases"])
+    monkeypatch.setattr(tiered, "KNOBS", [k for k in tiered.KNOBS if k.label == "direct: phases"])
     found = accuracy.study(scene, runs=1)
     amplitudes = np.array(found["amplitudes"])
     own = scene.system.own_error(*GAIT.cycle(64, amplitudes))[:, 0].max()
     assert found["own_error"] == own and 1e-4 < own < 0.1
     assert {c["tier"] is None for c in found["cheapest"] if c["tolerance"] < own} == {True}
     assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
-    assert f"the table's own, {own:.1e} BL" in accuracy.table(found)
+    assert f"the table's own, {own:.1e} BL" in text.table(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
     with pytest.raises(SceneError, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
         choose.cheapest(scene, [0.5], 1e-6)

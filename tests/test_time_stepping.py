@@ -10,7 +10,7 @@ from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.geometry.reconstruct import displacement
 from geomech.scene import Scene
-from geomech.study import accuracy, estimate, undulation
+from geomech.study import estimate, tiered, undulation
 from geomech.study.batch import beside
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
@@ -399,13 +399,14 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
 
 def test_a_knob_for_pieces():
     depth = scenes.load("three-link-glass").changed(effects=(DepthProfile(along=(0.5, 2, 1)),))
-    knob = next(k for k in accuracy.KNOBS if k.name == "pieces")
-    assert knob.applies(depth)
-    assert not knob.applies(depth.changed(effects=()))
+    knob = next(k for k in tiered.KNOBS if k.name == "pieces")
+    assert tiered.applies(knob, depth)
+    assert not tiered.applies(knob, depth.changed(effects=()))
     a = np.linspace(0.5, 1.5, 8)
     far = Study(depth.with_numerics(pieces=320, phases=64)).displacement("direct", Circle(), a)
     coarse = [
-        Study(knob.turned(depth.with_numerics(phases=64), n)).displacement("direct", Circle(), a) for n in knob.values
+        Study(tiered.Settings(depth.with_numerics(phases=64)).at(knob, n)).displacement("direct", Circle(), a)
+        for n in knob.values
     ]
     errors = [np.sqrt(np.mean(estimate.distance(x, far) ** 2)) for x in coarse]
     assert -np.polyfit(np.log(knob.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)

@@ -24,10 +24,10 @@ COMMAND = """
 import sys
 from geomech import cli, connection
 from geomech.run import jobs, store
-from geomech.study import sweep
+from geomech.study import cycles
 store.CHECKPOINT = jobs.CHECKPOINT = 0.05
 jobs.WORTH = 0.2
-connection.SAMPLES_TOGETHER, sweep.SAMPLES_TOGETHER = 400, 8
+connection.SAMPLES_TOGETHER, cycles.SAMPLES_TOGETHER = 400, 8
 print("begun", flush=True)
 cli.main()
 """

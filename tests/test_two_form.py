@@ -10,7 +10,7 @@ from geomech.gaits import Circle, Fourier
 from geomech.geometry import connection, curvature
 from geomech.geometry.connection import Connection
 from geomech.geometry.two_form import spanned, two_form
-from geomech.output import netcdf
+from geomech.study import fields
 from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -104,7 +104,7 @@ def test_pairs_are_drawn(form):
 
 def test_the_file_has_all_pairs(form, tmp_path):
     study = geomech.Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=7, extent=1.2)))
-    netcdf.save_connection(tmp_path / "made.nc", study)
+    fields.save_connection(tmp_path / "made.nc", study)
     assert np.array_equal(Connection.load(tmp_path / "made.nc").A, study.fitted.A)
     saved = study.to_xarray()["ccf_pairs"]
     assert saved.dims[:2] == ("pair", "component") and "1 2, 1 3, 2 3" in saved.long_name
@@ -126,7 +126,7 @@ def test_the_file_has_all_pairs(form, tmp_path):
 )
 def test_a_file_with_pairs_that_are_none_is_refused(name, spoilt, said, tmp_path):
     study = geomech.Study(geomech.Scene(SYSTEM, GAIT, geomech.Numerics(grid=5, extent=1.2)))
-    netcdf.save_connection(tmp_path / "a.nc", study)
+    fields.save_connection(tmp_path / "a.nc", study)
     assert Table(tmp_path / "a.nc").joints == 3
     with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as file:
         rest = file.drop_vars(["ccf_pairs", "ccf_pairs_error", "pair_joints"]).assign({name: spoilt(file[name])})

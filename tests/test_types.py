@@ -14,13 +14,13 @@ from geomech.core.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
-from geomech.output.explain import explain
 from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.single import single
 from geomech.systems import Solver, Swimmer
+from geomech.text.explain import explain
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -164,12 +164,12 @@ def geometries(value):
     yield "xi", lambda: reconstruct.turning(value)
     yield "pose", lambda: se2.exp(value)
     yield "a scene", lambda: explain(value)
-    for of in (scenes.toml, scenes.tables, scenes.inputs, accuracy.cost, undulation.activation):
+    for of in (scenes.toml, scenes.tables, scenes.inputs, accuracy.study, undulation.activation):
         yield "a scene", lambda of=of: of(value)
     yield "a scene", lambda: cheapest(value, [1.0], 0.1)
     yield "a scene", lambda: sweep.sweep(value, {"gait.amplitude": [1.0]})
     yield "over", lambda: sweep.sweep(plain, value)
-    yield "a list", lambda: sweep.cost(plain, {"gait.amplitude": value})
+    yield "a list", lambda: sweep.sweep(plain, {"gait.amplitude": value})
     yield "a list", lambda: cheapest(plain, value, 0.1)
     yield "gait of the scene", lambda: cheapest(plain, [1.0], 0.1, value)
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)

@@ -11,13 +11,15 @@ from test_cli import geomech
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Ellipse
-from geomech.output import report, sweeps
+from geomech.io.results import write_netcdf
+from geomech.output import plots
 from geomech.scene import Scene
 from geomech.study import sweep, uncertainty
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
+from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))  # moves along, sideways and turns
@@ -126,7 +128,7 @@ def test_wide_media_shift_the_mean_and_it_is_told(monkeypatch):
         tables[share] = Study(sand).study([1.2], ["direct"])
         errors[share] = told["shift"]["net_distance"][0] / told["net_distance"][0]
     assert errors[1.0] < -0.3 and -uncertainty.SHIFTED < errors[0.1] < 0
-    wide, narrow = (report.text_table("sand", tables[share], sand) for share in (1.0, 0.1))
+    wide, narrow = (displacement.text(tables[share].result, "sand") for share in (1.0, 0.1))
     row = next(x for x in wide.splitlines() if x.startswith("      1.2"))
     assert row.endswith(f"  mean {tables[1.0]['medium_shift_of']['net_distance'][0]:+.1e}")
     assert "\nmean: how far the mean over the media" in wide and "mean" not in narrow
@@ -167,7 +169,7 @@ def test_every_tier_has_it_beside_its_own_error():
     assert not [key for key in plain if key.startswith("medium")]
     answer = cheapest(sand, [0.5, 1.0], 1e-2)
     np.testing.assert_allclose(answer["medium_error"][answer["tier"]], told["position"])
-    text = report.text_table("sand", table, sand).splitlines()
+    text = displacement.text(table.result, "sand").splitlines()
     row = text[text.index(next(x for x in text if x.endswith(": y"))) + 3].split()
     assert row[0] == "1" and row[-1] == f"+-{told['y'][1]:.1e}"
     assert (
@@ -240,16 +242,19 @@ def test_sweeps_have_it(tmp_path):
     np.testing.assert_allclose(again["medium_error"][1], told, rtol=1e-6)
     many = sweep.sweep(sand, {"gait.amplitude": np.linspace(0.1, 1.0, 70).tolist()})  # more than go together
     np.testing.assert_allclose(many["medium_error"][-1], found["medium_error"][0, 1], rtol=1e-6)
-    sweeps.save(tmp_path / "s.nc", sand, found)
+    write_netcdf(tmp_path / "s.nc", sweep.as_stored(found.result))
     with xarray.open_dataset(tmp_path / "s.nc") as data:
         np.testing.assert_allclose(data.medium_error, found["medium_error"])
         assert data.medium_error.attrs["units"] == "m"
     one = sweep.sweep(sand, {"gait.frequency": [1.0, 3.0]})
-    (_, band) = sweeps.draw(sand, one).axes[0].collections
-    net, _, medium, _ = sweeps.drawn(sand, one)
+    (_, band) = plots.sweep_figure(sand, one).axes[0].collections
+    net, _, medium, _ = plots.sweeps.drawn(sand, one)
     np.testing.assert_allclose(medium, one["frequency"] * one["medium_error"])
     box = band.get_datalim(band.axes.transData)
     assert (box.y0, box.y1) == (pytest.approx((net - medium).min()), pytest.approx((net + medium).max()))
     assert "medium_error" not in sweep.sweep(sand.changed(medium=Viscous()), {"gait.amplitude": [0.5]})
-    more = sweep.cost(sand, over).balances - sweep.cost(sand.changed(medium=Granular(1.49, 0.22)), over).balances
+    more = (
+        sweep.Sweep(sand, over).cost().balances
+        - sweep.Sweep(sand.changed(medium=Granular(1.49, 0.22)), over).cost().balances
+    )
     assert more == 6 * 4 * uncertainty.PHASES

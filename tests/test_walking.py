@@ -14,9 +14,10 @@ from figures.walking_sensitivity import Sheet
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.output import walks
-from geomech.output.explain import explain
 from geomech.scene import WalkerScene
 from geomech.study import walking
+from geomech.text import walk as walk_text
+from geomech.text.explain import explain
 from rft.balance.backend import preferring
 from rft.ground import Aeration, GrainInertia, Slope
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
@@ -244,13 +245,19 @@ def test_a_walk_tells_when_it_is_near_its_limit_cycle():
     assert 4.0 < seen == long.settling_time < 6.0 and abs(brief.settling_time - seen) < 1.5 / 3.25
 
 
+def told_of(scene, found):
+    """What is printed of a walk, and what JSON has of it."""
+    result = walking.of_walk(scene, found)
+    return walk_text.text(result), json.loads(json.dumps(walk_text.numbers(result)))
+
+
 def test_what_is_told_of_a_walk():
     """An energy over weight times way, when the robot is near its limit cycle, how it turns; nothing of the solver's cycles."""
     t = np.linspace(0.0, 4.0, 33)
     zero, pose = np.zeros_like(t), np.stack([0.25 * t, 0.03 + 0 * t, 0 * t], -1)
     fields = t, pose, np.zeros_like(pose), 0.6 * t, 0.5 * t, zero, 0.25, "walking", 14.0, True, 0.0, None
     one = walking.Walked(Walk(*fields, settling_time=1.5), 0.01)
-    said, found = walks.told(XPLORER, one), json.loads(walks.as_json(one))
+    said, found = told_of(XPLORER, one)
     assert said.startswith(
         "xplorer: walking at 0.25 +- 0.01 m/s at 2 Hz (limit cycle; from rest within 5 % of it after 1.5 s)"
     )
@@ -263,15 +270,15 @@ def test_what_is_told_of_a_walk():
         (np.nan, "cycle)"),
     ):
         other = one._replace(walk=one.walk._replace(settling_time=settled))
-        assert words in walks.told(XPLORER, other)
-        assert json.loads(walks.as_json(other))["settled"] == (0.0 if settled == 0.0 else None)
+        said, found = told_of(XPLORER, other)
+        assert words in said and found["settled"] == (0.0 if settled == 0.0 else None)
     y = 0.25 * (1 - np.cos(0.1 * t)) / 0.1
     arc = np.stack([0.25 * np.sin(0.1 * t) / 0.1, pose[:, 1], 0 * t], -1)
     more = {"y": y, "roll": zero, "yaw": 0.1 * t}
     turns = one._replace(
         walk=one.walk._replace(pose=arc, spatial=more, yaw_rate=0.1, lateral_speed=-0.02), turning=0.01, aside=0.003
     )
-    said, found = walks.told(XPLORER, turns), json.loads(walks.as_json(turns))
+    said, found = told_of(XPLORER, turns)
     assert "\nturning at 5.7 +- 0.6 degrees/s, drifting aside at -0.02 +- 0.003 m/s (positive: to the left" in said
     assert f"cost of transport {cost:.3g} " in said  # along the arc
     names = "turning", "estimate_turning", "aside", "estimate_aside"
@@ -382,7 +389,7 @@ def test_a_walk_may_be_over_before_its_first_step():
         dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, duration=1e-3)),
         walking.Walked(found, 0.01),
     )
-    assert "cost of transport" not in walks.told(scene, one) and walks.draw(scene, one).axes[0].get_xlim() == (
+    assert "cost of transport" not in told_of(scene, one)[0] and walks.draw(scene, one).axes[0].get_xlim() == (
         0.0,
         1e-3,
     )
@@ -505,7 +512,9 @@ def test_sweep_and_accuracy_of_a_walk(geomech, tmp_path, monkeypatch):
         speed = file.variables["speed"][:]
         assert file.variables["gait_frequency"][:].tolist() == [2, 3] and speed.shape == (1, 2)
         assert (np.diff(speed, axis=1) > 0).all() and (file.variables["status"][:] == 0).all()
-    monkeypatch.setattr(walking, "KNOBS", {"steps": (8, 16), "elements": (4, 6), "rounding": (8e-3, 4e-3)})
+    few = {"steps": (8, 16), "elements": (4, 6), "rounding": (8e-3, 4e-3)}
+    knobs = tuple(dataclasses.replace(knob, values=few[knob.name]) for knob in walking.KNOBS)
+    monkeypatch.setattr(walking, "KNOBS", knobs)
     monkeypatch.setattr(walking, "FINEST", {"steps": 24, "elements": 12, "rounding": 2e-3})
     code, out, err = geomech("accuracy", "small.toml", "-o", "acc", "--json")
     assert (code, err) == (0, "")
@@ -545,7 +554,7 @@ def test_other_refusals(geomech, tmp_path):
     weightless = SMALL[: SMALL.index("[robot]")] + '[robot]\nkind = "wheel"\n' + SMALL[SMALL.index("[robot.legs]") :]
     (tmp_path / "wheel.toml").write_text(weightless)
     for args, said in (
-        (("walk", "wheel.toml"), "missing required field `mass`: add mass = ..., in kg"),
+        (("walk", "wheel.toml"), "[robot] has no `mass`: add mass = ..., in kg"),
         (("walk", "bad.toml"), "the table [robot.legs] is missing: add it"),
         (("walk", "small.toml", "--engine", "fast"), "engine must be one of planar, mujoco"),
         (("walk", "three-link-glass"), "does not walk"),
@@ -660,7 +669,7 @@ def test_steps_that_are_not_solved_are_told(monkeypatch):
         assert 1e-4 < abs(found.speed - right.speed) < found.unsolved_error < right.speed / 5
     one = walking.walked([scene], settling=True)[0]
     assert one.estimate > one.walk.unsolved_error > 0
-    said = walks.told(scene, one)
+    said = told_of(scene, one)[0]
     assert f"{one.walk.unsolved} steps were taken unsolved, off by up to" in said
 
 
@@ -682,13 +691,13 @@ def test_explain_tells_the_robot_its_engine_and_effects():
 
 
 def test_axes_of_a_sweep_have_units():
-    from geomech.output import walk_sweeps
+    from geomech.output import plots
 
     many = {"speed": np.ones((2, 3)), "estimate": np.zeros((2, 3)), "status": np.full((2, 3), "walking")}
     over = {"gait.frequency": [1.0, 2.0], "robot.mass": [0.1, 0.2, 0.3]}
-    (ax,) = walk_sweeps.draw(scenes.load("xplorer"), {"over": over, **many}).axes
+    (ax,) = plots.sweep_figure(scenes.load("xplorer"), {"over": over, **many}).axes
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("frequency (Hz)", "mean speed (m/s)")
     assert [t.get_text() for t in ax.get_legend().get_texts()] == ["mass (kg): 0.1", "mass (kg): 0.2", "mass (kg): 0.3"]
     one = {"over": {"robot.legs.relative_curvature": [0.0, 1.0]}, **{k: v[:, 0] for k, v in many.items()}}
-    (ax,) = walk_sweeps.draw(scenes.load("xplorer"), one).axes
+    (ax,) = plots.sweep_figure(scenes.load("xplorer"), one).axes
     assert ax.get_xlabel() == "relative_curvature (-)" and ax.get_legend() is None

@@ -26,7 +26,7 @@ from geomech.run import executors, jobs
 from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
 from geomech.scene import kinds
-from geomech.study import accuracy, sweep
+from geomech.study import accuracy, cycles, sweep, tiered
 from geomech.study.bench import Study
 from rft import threads as threaded
 from rft.balance import backend
@@ -163,7 +163,7 @@ OVER = {"body.length": [1.0, 2.0, 3.0], "medium.C": [1.5, 2.5], "gait.amplitude"
 
 @pytest.mark.parametrize("at_once", [2, 5, 64])
 def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, monkeypatch):
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", at_once)
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
     here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
     for key in ("displacement", "estimate", "estimate_heading"):
         np.testing.assert_array_equal(shared[key], here[key])
@@ -203,9 +203,9 @@ def test_fields_have_the_same_digits_whoever_computes(two, given_away, monkeypat
 
 
 def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, monkeypatch):
-    few = [dataclasses.replace(k, values=k.values[:2]) for k in accuracy.KNOBS if k.tier in ("direct", "path")]
-    monkeypatch.setattr(accuracy, "KNOBS", few)
-    monkeypatch.setattr(accuracy, "TRUTH_PHASES", 64)
+    few = [dataclasses.replace(k, values=k.values[:2]) for k in tiered.KNOBS if k.tier in ("direct", "path")]
+    monkeypatch.setattr(tiered, "KNOBS", few)
+    monkeypatch.setattr(tiered, "TRUTH_PHASES", 64)
     scene, told = GLASS.with_numerics(grid=7), []
     here, shared = both(two, lambda: accuracy.study(scene, told.append, runs=1))
     assert [x["error"] for x in shared["lines"]] == [x["error"] for x in here["lines"]]
@@ -256,7 +256,7 @@ def power(tmp_path, monkeypatch):
 
 def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
     """By their text, which need not be a file where they are."""
-    monkeypatch.setattr(sweep, "SAMPLES_TOGETHER", 1)
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 1)
     scene, over = GLASS.changed(medium=power(1.0)), {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]}
     here, shared = both(two, lambda: sweep.sweep(scene, over))
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])

@@ -7,9 +7,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech import terminal
-from geomech.commands.asked import allow, loaded, storing
-from geomech.commands.options import SceneArgument, YesOption, check_outputs
+from geomech.commands.asked import loaded
+from geomech.commands.options import SceneArgument, YesOption
+from geomech.commands.pipeline import Output, execute
 
 
 def animate(
@@ -22,26 +22,6 @@ def animate(
 ):
     """The body moving over its own track beside its shape on the CCF map: a film, or a strip of pictures for a page."""
     from geomech.output import animate as film
-    from geomech.study import motion
-    from geomech.study.bench import Study
-    from geomech.study.cost import connection, price
 
-    film.check_format(out)
-    scene = loaded(name)
-    count = (3 if film.is_film(out) else 1) if cycles is None else cycles
-    check_outputs(scene, out, None)
-    study = Study(scene)
-    mapped = scene.system.joints == 2 and study.has_connection
-    costs = [motion.cost(scene, count), *([price(connection(scene))] if mapped else [])]
-    if film.is_film(out):
-        costs.append(film.cost(scene.numerics.phases, count))
-    balances, seconds, memory, besides = zip(*costs)
-    takes = type(costs[0])(sum(balances), sum(seconds), max(memory), sum(besides))
-    allow(scene, takes, yes)
-    kept = storing(scene, out, command="animate", cycles=count)
-    with kept, terminal.progress(f"motion of {scene.name}") as bar:
-        found = motion.motion(scene, count)
-        if mapped:
-            study.compute_field()
-        maps = (study.curvature, study.curvature_error) if mapped else ()
-        film.save(out, found, *maps, progress=bar)
+    question = film.picture(loaded(name), out, cycles)
+    execute(question, Output(out, film.write, film.check_format), yes=yes, silent=True)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, check_files
-from geomech.core.errors import SceneError, choose
-from geomech.io.files import whole_file
+from geomech.commands.options import JsonOption, PlotOption, caps
+from geomech.commands.pipeline import Output, execute
 
 Size = Optional[float]
 
@@ -40,34 +38,11 @@ def calibrate(
     """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, of
     the vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to
     a plate pushed straight down, columns depth_m, force_N."""
-    from geomech.io.files import note
-    from geomech.output import plots
-    from geomech.study.calibration import CALIBRATIONS
-    from geomech.study.stress_calibration import law_of
+    from geomech.output import parts, pictures
+    from geomech.study.calibration import Calibration
 
-    law = choose("--law", law_of(drag) if law is None else law, CALIBRATIONS)
-    if out and out == plot:
-        raise SceneError(f"cannot write {out} twice: give --plot another name")
-    check_files([Path(drag)], out, plot)
     sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
-    found = CALIBRATIONS[law](law, drag, {k: x for k, x in sizes.items() if x is not None}, caps(end_caps))
-    if out:
-        with whole_file(out) as part:
-            part.write_text(found.toml(), encoding="utf-8")
-    if plot:
-        plots.save(getattr(plots, found.picture)(found.curves()), plot)
-    for told in found.notes():
-        note(told)
-    print(json.dumps(found.numbers()) if as_json else found.text())
-    if out and not as_json:
-        print(f'medium in {out}: in {found.scene}, [medium] file = "{out.name}"')
-
-
-def caps(text: str) -> float | str:
-    """e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
-    if text in ("left-out", "fitted"):
-        return 0.0 if text == "left-out" else text
-    try:
-        return float(text)
-    except ValueError:
-        raise SceneError(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None
+    known = tuple((key, x) for key, x in sizes.items() if x is not None)
+    file = Output(out, parts.write_medium, said=parts.about_medium)
+    figure = Output(plot, pictures.calibration, pictures.check)
+    execute(Calibration(drag, law, known, caps(end_caps)), file, figure, as_json=as_json)

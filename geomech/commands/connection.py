@@ -7,7 +7,8 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import beside_field, field, loaded, planes, storing
+from geomech.commands import formats
+from geomech.commands.asked import loaded
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -17,11 +18,10 @@ from geomech.commands.options import (
     SceneArgument,
     SliceOption,
     YesOption,
-    check_netcdf,
-    check_outputs,
+    angles,
     with_workers,
 )
-from geomech.core.errors import SceneError, choose
+from geomech.commands.pipeline import Output, execute
 
 
 @with_workers
@@ -40,45 +40,12 @@ def connection(
     yes: YesOption = False,
 ):
     """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
-    from geomech.io.files import note
-    from geomech.io.tables import ORDERS, SIGNS
-    from geomech.output import mat, netcdf, plots
-    from geomech.study.bench import Study
-    from geomech.systems.base import shape_labels
+    from geomech.output import parts, pictures
+    from geomech.study.shape_space import connection
 
-    check_netcdf(out, matlab=True)
-    for option, word, known in (("--sign", sign, SIGNS), ("--order", order, ORDERS)):
-        if word is not None:
-            choose(option, word, known)
-            if out.suffix == ".nc":
-                raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
-    if plot is None and not (style, pair, slice_, beside) == (None,) * 4:
-        raise SceneError("--style, --pair, --slice and --beside are those of a figure: say --plot FILE")
-    if style is not None:
-        choose("--style", style, plots.CONNECTION_STYLES)
+    file = parts.Connection(out.suffix, sign, order)
+    drawn = pictures.Connection(style, plot, pair, slice_, beside)
     scene = loaded(name, grid, extent)
-    if out.suffix == ".mat":
-        mat.check_joints(scene)
-    sliced = plot and (scene.system.joints > 2 or pair is not None or slice_ is not None)
-    if sliced and beside is not None:
-        raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
-    check_outputs(scene, out, plot)
-    asked = {"file": out.suffix, "plot": plot is not None, "pair": pair, "slice": slice_, "beside": beside}
-    with storing(scene, out, command="connection", **asked):
-        if sliced:
-            found = planes(Study(scene), pair, slice_, yes)
-        study = field(scene, grid, extent, out, plot, bool(plot) and not sliced, yes, harmonics=out.suffix == ".nc")
-        if out.suffix == ".nc":
-            netcdf.save_connection(out, study)
-        else:
-            mat.save_connection(out, study, sign or "+", order or "ndgrid")
-            if not sign:
-                note(f"{out} has {SIGNS['+']}; --sign - gives the other")
-        if plot:
-            told = {"labels": shape_labels(study.scene.system), "style": style or "quiver"}
-            if sliced:
-                plots.save(plots.plane_connection_figure(found, **told), plot)
-                return
-            if beside is not None:
-                told |= {"beside": beside_field(study, beside, yes).fitted, "names": [study.scene.frame, beside]}
-            plots.save(plots.connection_figure(study.fitted, **told), plot)
+    question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), beside)
+    outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
+    execute(question, *outputs, yes=yes, silent=True)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, an_angle, check_files, check_netcdf
-from geomech.core.errors import SceneError
-from geomech.io.files import whole_file
+from geomech.commands import formats
+from geomech.commands.options import JsonOption, PlotOption, an_angle
+from geomech.commands.pipeline import Output, execute
 
 
 def fit(
@@ -48,25 +47,10 @@ def fit(
 ):
     """The connection near a measured gait: phase, mean gait, A by regression with intervals, and the displacement that it
     predicts beside the log's."""
-    from geomech.measured import fit_log
-    from geomech.output import measured, plots
+    from geomech.measured.results import Fit
+    from geomech.output import parts, pictures
 
-    if out:
-        check_netcdf(out)
-    if scene and scene.suffix != ".toml":
-        raise SceneError(f"cannot write {scene}: end the name of a scene in .toml")
-    if scene and not out:
-        raise SceneError("--scene names the field's file: say -o FIELD.nc, too")
-    check_files([log], out, plot, *filter(None, [scene]))
-    names = columns.split(",") if columns is not None else ()
-    found = fit_log(
-        log, columns=names, degrees=degrees, level=level, harmonics=harmonics, within=within, body_length=body_length
-    )
-    if out:
-        measured.save_field(out, found)
-    if scene:
-        with whole_file(scene) as part:
-            part.write_text(measured.scene_toml(found, out, scene), encoding="utf-8")
-    if plot:
-        plots.save(plots.measured_figure(found), plot)
-    print(json.dumps(measured.numbers(found)) if as_json else measured.text(found))
+    names = tuple(columns.split(",")) if columns is not None else ()
+    question = Fit(log, names, degrees, level, harmonics, within, body_length)
+    field, figure = Output(out, parts.write_tube, formats.netcdf), Output(plot, pictures.measured, pictures.check)
+    execute(question, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

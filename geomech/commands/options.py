@@ -1,21 +1,19 @@
-"""What commands share: options, and what they must be; `geomech.commands.asked` has the scenes they are asked for."""
+"""What commands share: options, and what they must be."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import inspect
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
 from geomech.commands.names import intruder_names, scene_names, walker_names
-from geomech.core.errors import SceneError
-from geomech.io.files import refuse_inputs, whole_file
+from geomech.core.errors import SceneError, named
 
 
 def _scene(names: Callable[[], list[str]]):
@@ -127,39 +125,6 @@ def with_workers(command: Callable) -> Callable:
     return run
 
 
-def check_netcdf(path: Path, matlab: bool = False) -> None:
-    """SceneError for a name that does not end in .nc, or in .mat where that will do."""
-    if path.suffix not in (".nc", ".mat") if matlab else path.suffix != ".nc":
-        also = ", or that of a MATLAB file in .mat" if matlab else ""
-        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc{also}")
-
-
-def check_outputs(scene, output: Path | None, plot: Path | None, *more: Path) -> None:
-    """SceneError unless the output and the plot can be written and are, like ``more``, no input of the scene."""
-    from geomech.scene import inputs
-
-    check_files(inputs(scene), output, plot, *more)
-
-
-def check_files(inputs: Iterable[Path], output: Path | None, plot: Path | None, *more: Path) -> None:
-    """SceneError unless the output and the plot can be written and are, like ``more``, none of the inputs."""
-    from geomech.output import plots
-
-    if plot:
-        plots.check_format(plot)
-    outputs = list(filter(None, {output, plot}))
-    refuse_inputs([*outputs, *more], inputs)
-    if len(outputs) == 2:
-        refuse_inputs(outputs[:1], outputs[1:])
-    for path in outputs:
-        with contextlib.suppress(_Unused), whole_file(path):
-            raise _Unused
-
-
-class _Unused(Exception):
-    """Leaves `whole_file` without writing."""
-
-
 NO_ANGLE = "this is no angle"
 
 
@@ -198,6 +163,12 @@ def an_angle(text: str | float) -> float:
         return _number(str(text), None)
     except ValueError:
         raise typer.BadParameter(f"{text!r} is no angle: give one such as 2.5 (rad) or 120deg") from None
+
+
+def angles(scene, option: str, text: str | None) -> tuple[float, ...] | None:
+    """Return 0.3,-20deg in rad; None for an option that is left out."""
+    with named(scene.name):
+        return None if text is None else tuple(numbers(option, text, angle=None))
 
 
 def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] | None:
@@ -263,3 +234,26 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
     if not all(map(math.isfinite, values)):
         raise SceneError(f"{option}: {text!r} must be finite")
     return values
+
+
+def parameters(over: Sequence[str], scene, most: int | None = None) -> dict[str, list[float]]:
+    """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. most: parameters that a figure takes."""
+    axes = {}
+    for text in over:
+        parameter, equals, values = text.partition("=")
+        if not equals or parameter in axes:
+            raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
+        axes[parameter] = values
+    if most is not None and len(axes) > most:
+        raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
+    return {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
+
+
+def caps(text: str) -> float | str:
+    """e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
+    if text in ("left-out", "fitted"):
+        return 0.0 if text == "left-out" else text
+    try:
+        return float(text)
+    except ValueError:
+        raise SceneError(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None

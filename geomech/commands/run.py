@@ -7,11 +7,10 @@ from typing import Annotated
 
 import typer
 
-from geomech import terminal
-from geomech.commands.asked import allow, loaded, storing
+from geomech.commands.asked import loaded
 from geomech.commands.names import scene_names
 from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
-from geomech.io.files import whole_folder
+from geomech.commands.pipeline import Output, execute
 
 DEFAULT_SCENE = "three-link-glass"
 SceneOrOurs = Annotated[
@@ -29,16 +28,8 @@ def run(
 ):
     """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech.output import report
-    from geomech.scene import inputs
-    from geomech.study.bench import Study
+    from geomech.study.report import Report
 
-    scene = loaded(name, medium=medium)
-    report.refuse_folder(scene, out, inputs(scene))
-    takes, told = report.cost(scene), terminal.progress(f"field of {scene.name}")
-    allow(scene, takes, yes)
-    kept = storing(scene, out, command="run")
-    with kept, whole_folder(out, inputs(scene)) as folder, told as bar:
-        tables = report.write(Study(scene), folder, bar)
-    for title, table in tables.items():
-        print(report.text_table(title, table, scene))
-    print(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir() if not p.name.startswith('.')))}")
+    question = Report(loaded(name, medium=medium))
+    folder = Output(out, report.write, lambda path: report.refuse_folder(question.scene, path), report.files, True)
+    execute(question, folder, yes=yes)

@@ -8,7 +8,7 @@ import typer
 
 from geomech.commands.asked import loaded
 from geomech.commands.options import SceneArgument
-from geomech.core.errors import named
+from geomech.commands.pipeline import show
 
 
 def symbolic(
@@ -17,11 +17,6 @@ def symbolic(
     ccf: Annotated[bool, typer.Option(help="the CCF of every two joints, too")] = True,
 ):
     """The connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
-    from geomech.output.formulas import formulas
-    from geomech.systems.framed import formula
+    from geomech.text.formulas import formulas
 
-    scene = loaded(name)
-    with named(scene.name):
-        A, alpha = formula(scene.system)
-    for line in formulas(A, alpha, ccf, latex):
-        print(line, flush=True)
+    show(formulas(loaded(name), ccf, latex))

@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from geomech import terminal
-from geomech.commands.asked import allow, loaded, storing
-from geomech.commands.options import CyclesOption, SceneArgument, YesOption, check_outputs
+from geomech.commands import formats
+from geomech.commands.asked import loaded
+from geomech.commands.options import CyclesOption, SceneArgument, YesOption
+from geomech.commands.pipeline import Output, behind, execute
 
 
 def trajectory(
@@ -20,18 +21,6 @@ def trajectory(
 ):
     """Where the body is at every phase of the scene's gait: pose, joint angles and ends of all links, as CSV."""
     from geomech.output import trajectories
-    from geomech.study import motion
-    from geomech.systems.base import length_unit
+    from geomech.study.motion import Trajectory
 
-    trajectories.check_csv(out)
-    scene = loaded(name)
-    check_outputs(scene, out, None)
-    with terminal.progress(f"motion of {scene.name}") as bar:
-        takes = motion.cost(scene, cycles)
-        allow(scene, takes, yes)
-        with storing(scene, out, command="trajectory", cycles=cycles):
-            found = motion.motion(scene, cycles)
-            trajectories.save(out, found, bar)
-    (x, y, theta), unit = found.pose[-1], length_unit(scene.system)
-    ends = f"after {cycles} cycle{'s' * (cycles > 1)} x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad"
-    print(f"{ends}; {len(found.phase)} rows of {len(found.columns)} columns in {out}")
+    execute(Trajectory(loaded(name), cycles), Output(out, trajectories.write, formats.csv, behind("table in")), yes=yes)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import warnings
 from typing import Annotated
 
 import typer
 
 from geomech.commands.asked import scene_with_gait
-from geomech.commands.options import JsonOption, SceneArgument, numbers
-from geomech.core.errors import Note, named
+from geomech.commands.options import JsonOption, SceneArgument, angles
+from geomech.commands.pipeline import execute
 
 
 def velocity(
@@ -20,21 +18,8 @@ def velocity(
     as_json: JsonOption = False,
 ):
     """Body velocity for one shape and its rate of change, with its residual and status."""
-    from geomech.output.system import notes
-    from geomech.study.single import single
-    from geomech.systems.base import length_unit
+    from geomech.study.velocity import Velocity
 
-    scene, asked = scene_with_gait(name), (("--alpha", alpha), ("--alphadot", alphadot))
-    for line in notes(scene.system):
-        warnings.warn(f"{scene.name}: {line}", Note, stacklevel=2)
-    with named(scene.name):
-        out = single(scene.system, *(numbers(*x, angle=None) for x in asked))
-    unit = length_unit(scene.system)
-    if as_json:
-        told = {k: v for k, v in out.items() if k != "iterations"}
-        print(json.dumps({**told, "units": {"xi": [unit, unit, "rad"]}}))
-        return
-    print("xi = ({:.9g}, {:.9g}, {:.9g})".format(*out["xi"]), f"{unit}, {unit}, rad per unit time")
-    steps = f", {out['iterations']} iterations" if "iterations" in out else ""
-    residual = "unknown" if out["residual"] is None else f"{out['residual']:.1e}"
-    print(f"{out['status']}, residual {residual}{steps}")
+    scene = scene_with_gait(name)
+    question = Velocity(scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot))
+    execute(question, as_json=as_json)

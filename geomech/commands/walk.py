@@ -8,10 +8,9 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech import terminal
-from geomech.commands.asked import allow, loaded_walker, storing
-from geomech.commands.options import JsonOption, WalkerArgument, YesOption, check_outputs, folder
-from geomech.io.files import whole_folder
+from geomech.commands.asked import loaded_walker
+from geomech.commands.options import JsonOption, WalkerArgument, YesOption, folder
+from geomech.commands.pipeline import Output, execute
 
 
 def walk(
@@ -32,21 +31,8 @@ def walk(
     from geomech.output import animate as film
     from geomech.output import walks
     from geomech.run.cost import LONGEST
-    from geomech.scene import inputs
-    from geomech.study import walking
+    from geomech.study.walking import Walking
 
-    scene = loaded_walker(name)
-    walking.refuse_engine(scene, engine)
-    if animate:
-        film.check_format(animate)
-    check_outputs(scene, animate, None)
-    allow(scene, walking.price(scene, by=engine), yes)
-    with storing(scene, out or animate, command="walk", engine=engine):
-        with terminal.progress(f"walk of {scene.name}") as bar:
-            found = walking.run(scene, engine, bar, math.inf if yes else LONGEST)
-        if animate:
-            walks.film(animate, scene, found)
-        if out:
-            with whole_folder(out, inputs(scene)) as place:
-                walks.save(place, scene, found)
-    print(walks.as_json(found) if as_json else walks.told(scene, found))
+    question = Walking(loaded_walker(name), engine, math.inf if yes else LONGEST)
+    results, picture = Output(out, walks.write, folder=True), Output(animate, walks.film, film.check_format)
+    execute(question, results, picture, as_json=as_json, yes=yes)

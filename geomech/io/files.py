@@ -108,6 +108,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             raise _unwritten(shown, error) from None
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write text in UTF-8, what is none of it escaped; the file appears whole or not at all."""
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
 @contextlib.contextmanager
 def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.

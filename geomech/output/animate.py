@@ -10,12 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from geomech.core.errors import SceneError
+from geomech.core.variables import Result
 from geomech.io.files import whole_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
 from geomech.run.cost import Cost
+from geomech.run.progress import progress as shown
 from geomech.run.progress import told
-from geomech.study.motion import Motion
+from geomech.scene.model import Scene
+from geomech.study.motion import Motion, Picture
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
 FRAMES = 48  # of a cycle, at most
@@ -50,13 +53,25 @@ def cost(phases: int, cycles: int) -> Cost:
     return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
 
+def picture(scene: Scene, path: Path, cycles: int | None) -> Picture:
+    """Return the question of a film or a strip of so many cycles, by default 3 or 1."""
+    count = (3 if is_film(path) else 1) if cycles is None else cycles
+    return Picture(scene, count, cost(scene.numerics.phases, count) if is_film(path) else None)
+
+
+def write(result: Result, path: Path) -> None:
+    """Write the film or strip of a motion."""
+    with shown(f"film of {result.subject[0].scene.name}") as bar:
+        save(path, *result.subject, progress=bar)
+
+
 def save(path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None) -> None:
     """The film or strip of a motion, beside its shapes on a map of the CCF if there is one; whole or not at all."""
     if not is_film(path):
         plots.save(plots.filmstrip(motion, field, error), path)
         return
-    shown = rows(motion.scene.numerics.phases, motion.cycles)
-    film = told(_frames(motion, shown, field, error), len(shown), progress)
+    some = rows(motion.scene.numerics.phases, motion.cycles)
+    film = told(_frames(motion, some, field, error), len(some), progress)
     with whole_file(path) as part:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
 

@@ -12,11 +12,12 @@ import numpy as np
 from geomech.core.errors import plain
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
-from geomech.output import plots, sweeps
-from geomech.output.system import described
+from geomech.output import plots
 from geomech.study.bench import Study
-from geomech.study.results import Displacements, Swept
-from geomech.systems.base import length_unit
+from geomech.study.results import Displacements
+from geomech.study.sweep import Swept
+from geomech.study.tables import position_spread
+from geomech.text.system import described
 
 MOST_ROWS = 40
 DPI = 90
@@ -75,25 +76,26 @@ def study(bench: Study) -> str:
 
 
 def displacements(table: Displacements) -> str:
-    """A row an amplitude and tier."""
-    unit, rows = length_unit(table.scene.system), []
-    told = {
-        "estimate": f"error ({unit})",
-        "estimate_heading": "error of heading (rad)",
-        "medium_error": f"medium ({unit})",
-    }
-    told |= {"medium_error_heading": "medium, heading (rad)", "speed": f"speed ({unit}/s)"}
-    there = {key: name for key, name in told.items() if key in table}
-    each = [(table.errors(key), ".4g" if key == "speed" else ".1e") for key in there]
-    for k, amplitude in enumerate(table["amplitude"]):
-        for name in table.tiers:
-            errors = (f"{values[name][k]:{style}}" for values, style in each)
-            rows.append((amplitude, name, *(float(x) + 0.0 for x in np.round(table[name][k], 12)), *errors))
-    head = ("amplitude", "tier", f"x ({unit})", f"y ({unit})", "heading (rad)", *there.values())
+    """Return a row an amplitude and tier."""
+    result = table.result
+    net, heading = result["net_distance"], result["heading"]
+    columns = {f"error ({net.unit})": net.error, "error of heading (rad)": heading.error}
+    if net.spread is not None:
+        columns |= {f"medium ({net.unit})": position_spread(result), "medium, heading (rad)": heading.spread}
+    styles = dict.fromkeys(columns, ".1e")
+    if "speed" in result:
+        columns[f"speed ({result['speed'].unit})"] = result["speed"].values
+    rows = []
+    for k, amplitude in enumerate(result["amplitude"].values.tolist()):
+        for j, tier in enumerate(result["tier"].values.tolist()):
+            pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in ("x", "y", "heading"))
+            rows.append((amplitude, tier, *pose, *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items())))
+    head = ("amplitude", "tier", f"x ({net.unit})", f"y ({net.unit})", "heading (rad)", *columns)
     said = f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
     return page(f"Net displacement per cycle of {table.scene.name}{said}", head, rows)
 
 
 def swept(results: Swept) -> str:
-    """Against one parameter, or as a map over two; its line for more."""
-    return page(repr(results), picture=sweeps.draw(results.scene, results) if len(results["over"]) <= 2 else None)
+    """Return a picture against one parameter, or a map over two; a line for more."""
+    drawn = len(results["over"]) <= 2
+    return page(repr(results), picture=plots.sweep_figure(results.scene, results) if drawn else None)

@@ -7,21 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.io.files import whole_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
-from geomech.output.netcdf import recorded
-from geomech.scene.model import Scene
 from geomech.study.bench import Study
+from geomech.study.fields import recorded
+from geomech.study.shape_space import check_two_joints
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import stored
-
-
-def check_joints(scene: Scene) -> None:
-    """SceneError for other than the two joints that sysplotter's layout has arrays for."""
-    if (joints := scene.system.joints) != 2:
-        why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
-        raise SceneError(f"{scene.name}: {why}: write a .nc file, which takes any number of joints")
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
@@ -32,7 +24,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     from scipy.io import savemat
 
     scene = study.scene
-    check_joints(scene)
+    check_two_joints(scene)
     fitted = study.fitted
     run = (lambda x: x) if order == "ndgrid" else (lambda x: x.swapaxes(-1, -2))
     even = study.even_part  # counts at half of all directions

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from geomech.core.errors import SceneError
+from geomech.core.variables import Result
 from geomech.io.files import whole_file
+from geomech.run.progress import progress as shown
 from geomech.study.motion import Motion
 from geomech.systems.base import length_unit, shape_labels
 
 
-def check_csv(path: Path) -> None:
-    """SceneError for a name that does not end in .csv."""
-    if path.suffix.lower() != ".csv":
-        raise SceneError(f"cannot write {path}: end the name of a table in .csv")
+def write(result: Result, path: Path) -> None:
+    """Write the table of a motion, and show how much of it is written."""
+    with shown(f"table of {result.subject.scene.name}") as bar:
+        save(path, result.subject, bar)
 
 
 def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:
-    """Names of the columns, what they mean and in which units behind '#', then a row a phase, with every digit."""
+    """Write names of the columns, what they mean and in which units behind '#', then a row a phase, with every digit."""
     done = 0
     with whole_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n".join([",".join(motion.columns), *(f"# {line}" for line in about(motion))]) + "\n")

@@ -1,4 +1,4 @@
-"""How a robot walks as text, a table, JSON, a picture and a film."""
+"""How a robot walks, in pictures and films."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgba
 
-from geomech.io.files import whole_file
+from geomech import text
+from geomech.core.variables import Result
+from geomech.io.files import whole_file, write_text
+from geomech.io.results import write_csv
 from geomech.output import animate, plots
 from geomech.scene.walker import WalkerScene
 from geomech.study import walking
@@ -17,99 +20,14 @@ from geomech.study.walking import Walked
 
 TRIPODS = ("0.2", "C0")  # colours of the legs in step
 FRAMES, STRIP = 100, 6  # pictures of a film, at most, and of a strip
-COLUMNS = ("t", "x", "z", "pitch", "v_x", "v_z", "rate", "work", "loss", "energy")
 
 
-def columns(found: Walked) -> dict[str, np.ndarray]:
-    """Of the table: SI units, radians, a positive pitch nose down; y, roll and yaw too of three dimensions."""
-    w = found.walk
-    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
-    return dict(zip(COLUMNS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
-
-
-def as_json(found: Walked) -> str:
-    """SI units and rad. settled: null where it is not known, or never."""
-    w = found.walk
-    series = {name: values.tolist() for name, values in columns(found).items() if name in ("t", "x", "z", "pitch")}
-    numbers = {"cycles": w.cycles, "estimate": found.estimate, "periodic": w.periodic, "unsolved": w.unsolved}
-    numbers |= {"residual": w.residual, "unaccounted": w.unaccounted}
-    numbers |= {
-        "settled": w.settling_time if np.isfinite(w.settling_time) else None,
-        "aside": w.lateral_speed,
-        "turning": w.yaw_rate,
-    }
-    numbers |= {"estimate_aside": found.aside, "estimate_turning": found.turning, "estimate_elements": found.elements}
-    return json.dumps({"speed": w.speed, "status": w.status, **series, **numbers})
-
-
-def told(scene: WalkerScene, found: Walked) -> str:
-    """Speed, status, energy."""
-    w, f, cost = found.walk, scene.gait.frequency, walking.cost_of_transport(scene, found.walk)
-    known = w.status == "walking" and np.isfinite(cost)
-    share = f", cost of transport {cost:.3g} (work over weight times way, from rest)" if known else ""
-    return "\n".join([
-        f"{scene.name}: {w.status} at {w.speed:.4g} +- {found.estimate:.1g} m/s at {f:g} Hz ({_regular(w)}{_settled(w)})",
-        f"of the error {found.elements:.1g} m/s are of the elements, from twice as many",
-        *_turning(found),
-        f"t = 0 to {w.t[-1]:.4g} s: x to {w.pose[-1, 0]:.4g} m, z {w.pose[:, 1].min():.4g} to {w.pose[:, 1].max():.4g} m, "
-        f"pitch {np.degrees(w.pose[:, 2].min()):.3g} to {np.degrees(w.pose[:, 2].max()):.3g} degrees (positive: nose down)",
-        *_aside(w),
-        f"work of the motors {w.work[-1]:.4g} J{share}; into the ground {w.loss[-1]:.4g} J; "
-        f"{100 * w.unaccounted:.1g} % of the work is not accounted for, an error of the time steps",
-        *([_unsolved(w)] if w.unsolved else []),
-    ])  # fmt: skip
-
-
-def _regular(walk) -> str:
-    return "limit cycle" if walk.periodic else "no limit cycle found: mean of what there is"
-
-
-def _settled(walk) -> str:
-    """When a robot that starts from rest goes on as the limit cycle does."""
-    if np.isnan(walk.settling_time):
-        return ""
-    within = f"within {100 * walking.NEAR:g} % of it"
-    if np.isinf(walk.settling_time):
-        return f"; from rest it does not come {within}"
-    return (
-        f"; from rest {within} after {walk.settling_time:.2g} s" if walk.settling_time else f"; {within} from the start"
-    )
-
-
-def _turning(found: Walked) -> list[str]:
-    """How a robot of three dimensions leaves its heading."""
-    w = found.walk
-    if not w.spatial:
-        return []
-    turning, error = np.degrees([w.yaw_rate, found.turning])
-    aside = f"drifting aside at {w.lateral_speed:.2g} +- {found.aside:.1g} m/s"
-    return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {aside} (positive: to the left of its heading)"]
-
-
-def _unsolved(walk) -> str:
-    off = f"off by up to {walk.residual:.1g} m/s, which moves the speed by {walk.unsolved_error:.1g} m/s"
-    return f"{walk.unsolved} steps were taken unsolved, {off}: raise [numerics] steps or rounding"
-
-
-def _aside(walk) -> list[str]:
-    """What a walk of three dimensions does besides."""
-    if not walk.spatial:
-        return []
-    y, roll, yaw = (walk.spatial[name] for name in ("y", "roll", "yaw"))
-    angles = ", ".join(
-        f"{name} {np.degrees(a.min()):.2g} to {np.degrees(a.max()):.2g}" for name, a in (("roll", roll), ("yaw", yaw))
-    )
-    return [f"aside to y {y[-1]:.2g} m, {angles} degrees (positive: left side up, turning left)"]
-
-
-def save(folder: Path, scene: WalkerScene, found: Walked) -> None:
-    """walk.json, walk.csv, walk.txt and walk.png."""
-    table = columns(found)
-    rows = [",".join(table), *(",".join(map(repr, row)) for row in np.stack(list(table.values()), -1).tolist())]
-    (folder / "walk.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    (folder / "walk.json").write_text(as_json(found) + "\n", encoding="utf-8")
-    (folder / "walk.txt").write_text(told(scene, found) + "\n", encoding="utf-8", errors="backslashreplace")
-    plots.save(draw(scene, found), folder / "walk.png")
+def write(result: Result, folder: Path) -> None:
+    """Write walk.json, walk.csv, walk.txt and walk.png."""
+    write_csv(folder / "walk.csv", result)
+    write_text(folder / "walk.json", json.dumps(text.numbers(result)) + "\n")
+    write_text(folder / "walk.txt", text.text(result) + "\n")
+    plots.save(draw(*result.subject), folder / "walk.png")
 
 
 @plots.styled
@@ -131,8 +49,9 @@ def draw(scene: WalkerScene, found: Walked):
     return fig
 
 
-def film(path: Path, scene: WalkerScene, found: Walked) -> None:
-    """A film (.gif, .mp4) of the walk, or a strip of its last cycle (.png, .pdf, .svg); whole or not at all."""
+def film(result: Result, path: Path) -> None:
+    """Write a film (.gif, .mp4) of a walk, or a strip of its last cycle (.png, .pdf, .svg); whole or not at all."""
+    scene, found = result.subject
     if not animate.is_film(path):
         plots.save(strip(scene, found), path)
         return
@@ -249,21 +168,3 @@ class _Solid:
 
 def _turned(points: np.ndarray, angle: float) -> np.ndarray:
     return points @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-@plots.styled
-def accuracy_figure(results: dict):
-    """Error of the speed against each knob (`geomech.study.walking.study`)."""
-    fig, axes = plots.figure(8.4, 2.9, len(results["lines"]))
-    labels = {"steps": "steps of a cycle", "elements": "elements of an outline", "rounding": "rounding (m/s)"}
-    for ax, line in zip(axes[0], results["lines"]):
-        value, error = np.array(line["value"], float), np.maximum(line["error"], 1e-12)
-        ax.loglog(value, error, "o-", color="black", lw=1.0)
-        sign = 1 if line["label"] == "rounding" else -1
-        slope = error.max() * (value / value[error.argmax()]) ** (sign * line["order"])
-        ax.loglog(value, slope, color="0.6", ls="--", lw=0.8, label=f"order {line['order']}")
-        ax.set(xlabel=labels[line["label"]], ylabel="error of the speed (m/s)")
-        ax.set_xticks(value, [f"{v:g}" for v in value], rotation=45)
-        ax.minorticks_off()
-        ax.legend(loc="best")
-    return fig

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,3 +36,13 @@ def columns(place: str, path, wanted: tuple, optional: tuple[str, ...] = ()) -> 
         raise SceneError(f"{place}: {error}") from None
     found = {w[0]: next(values[n] for n in w if n in values) for w in wanted}
     return found | {n: values[n] for n in optional if n in values}
+
+
+def series(wanted: tuple[str, ...], optional: tuple[str, ...] = ()) -> Callable[[str, str], dict[str, list]]:
+    """Return a function (place, file) that reads a column of a CSV file for each key."""
+    return lambda place, file: {key: x.tolist() for key, x in columns(place, file, wanted, optional).items()}
+
+
+def rows_of(key: str, wanted: tuple[str, ...]) -> Callable[[str, str], dict[str, list]]:
+    """Return a function (place, file) that reads columns of a CSV file as the rows of one key."""
+    return lambda place, file: {key: np.stack([*columns(place, file, wanted).values()], -1).tolist()}

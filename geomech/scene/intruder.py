@@ -9,8 +9,9 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.errors import named
+from geomech.scene.columns import rows_of, series
 from geomech.scene.intruding import Intruding
-from geomech.scene.sections import Columns, Each, Keys, OneOf, Within
+from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import StressKeys
 from rft.checks import Number
 from rft.ground import KINDS as EFFECTS
@@ -18,14 +19,13 @@ from rft.ground import GroundEffect
 from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Shape, loads
 from rft.plates.loads import ORDER
 
-POINTS = Columns(("x", "z"), "CSV with the header x,z (m), in place of points", rows="points")
-COURSE = Columns(
-    ("t", "x", "z"),
+POINTS = FromFile(rows_of("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
+COURSE = FromFile(
+    series(("t", "x", "z"), ("angle",)),
     "CSV with the header t,x,z or t,x,z,angle (s, m, rad); velocities are differences of order 2 in the spacing of t",
-    optional=("angle",),
 )
 ELEMENTS = "of the outline, about, 1 to 5000; the error is of order 2 in their number, 1 with tension cut"
-OUTLINES = OneOf(SHAPES, columns={"polygon": POINTS, "spline": POINTS})
+OUTLINES = OneOf(SHAPES, files={"polygon": POINTS, "spline": POINTS})
 
 
 class Intrusion(NamedTuple):
@@ -53,7 +53,7 @@ class IntruderScene(Intruding):
 
     medium: Annotated[PlateStress, Keys(StressKeys, owner="an intruder scene")]
     intruder: Annotated[Shape, OUTLINES]
-    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE})]
+    motion: Annotated[Motion, OneOf(MOTIONS, files={"csv": COURSE})]
     elements: Annotated[
         int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
     ] = 100

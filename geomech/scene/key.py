@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 
 import msgspec
 
-from rft.checks import numbers_of
+from rft.checks import number_fields
 
 MARK = re.compile(r"(?<![\w`.])((?:[A-Za-z_]\w*, )*[A-Za-z_]\w*) \(([^()]*)\):\s+")
 
@@ -62,7 +62,7 @@ def text_key(name: str, meaning: str, required: bool = False) -> Key:
 
 def keys_of(kind: type) -> list[Key]:
     """Return the keys of a section that a class is read from."""
-    schemas, shown, words, numbers = _schemas(kind), aliases(kind), words_of(kind), numbers_of(kind)
+    schemas, shown, words, numbers = _schemas(kind), aliases(kind), words_of(kind), number_fields(kind)
     keys = []
     for field in dataclasses.fields(kind):
         if field.init and field.name != "solver":
@@ -103,10 +103,11 @@ def spellings(kind: type) -> dict[str, tuple[str, bool]]:
 
 @functools.cache
 def words_of(kind: type) -> dict[str, Word]:
-    """Return the annotations `Word` of a form of keys by field."""
-    if not hasattr(kind, "to_part"):  # the names of a user's annotations need not be known
+    """Return the annotations `Word` of a class by field."""
+    try:
+        hints = get_type_hints(kind, include_extras=True)
+    except (NameError, TypeError):  # of a class of a user's, whose annotations name what is not there
         return {}
-    hints = get_type_hints(kind, include_extras=True)
     marked = {name: [x for x in get_args(hint) if isinstance(x, Word)] for name, hint in hints.items()}
     return {name: found[0] for name, found in marked.items() if found}
 
@@ -144,7 +145,7 @@ def meanings(kind: type) -> dict[str, tuple[str, str]]:
             for mark, after in zip(marks, [*marks[1:], None]):
                 meaning = " ".join(paragraph[mark.end() : after.start() if after else None].split())
                 found |= dict.fromkeys(mark[1].split(", "), (mark[2], meaning.rstrip(" .;").replace("`", "")))
-    return found | {name: (number.unit, number.meaning) for name, number in numbers_of(kind).items()}
+    return found | {name: (number.unit, number.meaning) for name, number in number_fields(kind).items()}
 
 
 def first_sentence(kind: type) -> str:

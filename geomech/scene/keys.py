@@ -73,7 +73,7 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
     if variant.implied:
         about.append(f"It need not say its {section.key}.")
     owner = f" of {section.owner}" if section.owner else ""
-    return Part(f"{head} {variant.label}".strip() + owner, " ".join(about).strip(), keys_in(variant))
+    return Part(f"{head} {variant.label}".strip() + owner, "\n".join(about).strip(), keys_in(variant))
 
 
 def _of_packages(section: Section) -> Iterator[Part]:
@@ -108,7 +108,9 @@ def _lines(part: Part) -> str:
     """Return the keys of a part as lines."""
     rows = [(key.name, worded(key.schema), key.unit, key.value) for key in part.keys]
     widths = [max(map(len, column)) for column in zip(*rows)]  # none without keys
-    lines = [part.title, *textwrap.wrap(part.about, WIDTH)]
+    lines = [part.title]
+    for about in part.about.split("\n"):
+        lines += textwrap.wrap(about, WIDTH)
     for key, row in zip(part.keys, rows):
         start = "  " + "".join(f"{x:{width}}  " for x, width in zip(row, widths))
         meaning = key.meaning + f"; in degrees as {key.name}_deg" * key.degrees

@@ -14,7 +14,7 @@ from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scene.frames import reframed
 from geomech.scene.key import text_key
-from geomech.scene.medium import MediumFile, NamedMedium
+from geomech.scene.medium import MEDIUM
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
@@ -29,7 +29,7 @@ FRAME = (
 )
 SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
 SWIMMER = {
-    "medium": OneOf(PARTS["medium"], "law", otherwise=(NamedMedium, MediumFile)),
+    "medium": MEDIUM,
     "body": OneOf(PARTS["body"], sized=True),
     "effects": Each(PARTS["effects"], sized=True),
 }

@@ -5,14 +5,15 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geomech.core.errors import SceneError, choose, short
 from geomech.io.files import note, read_text
 from geomech.scene import reader, slips, swimming
-from geomech.scene.medium import with_files
-from geomech.scene.model import SWIMMER, Scene, checked_scene
+from geomech.scene.medium import MEDIUM
+from geomech.scene.model import Scene, checked_scene
 from geomech.systems.base import kind_of
 from geomech.systems.swimmer import Swimmer
 
@@ -22,42 +23,36 @@ if TYPE_CHECKING:
 
 LARGEST = 10_000_000  # bytes of a scene file
 PIPE = "pipe"  # name of a scene that comes through one, as from /dev/stdin or <(...)
-INTRUDERS = "intruders"  # folder, beside the scenes with a gait, of those without
-WALKERS = "walkers"  # and of robots that walk
 
 
 def builtin_names() -> list[str]:
-    """Names of the scenes with a gait that ship with the package."""
-    return _names(_folder())
+    """Return the names of the scenes with a gait that ship with the package."""
+    return _names("")
 
 
 def intruder_names() -> list[str]:
-    """Names of the intruder scenes that ship with the package."""
-    return _names(_folder() / INTRUDERS)
+    """Return the names of the intruder scenes that ship with the package."""
+    return _names("intruders")
 
 
 def walker_names() -> list[str]:
-    """Names of the scenes of walking robots that ship with the package."""
-    return _names(_folder() / WALKERS)
+    """Return the names of the scenes of walking robots that ship with the package."""
+    return _names("walkers")
 
 
-def _names(folder) -> list[str]:
-    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
+def _folder(name: str) -> Traversable:
+    return resources.files("geomech.scene") / "builtin" / name
 
 
-def _folder():
-    return resources.files("geomech.scene") / "builtin"
+def _names(folder: str) -> list[str]:
+    return sorted(p.name.removesuffix(".toml") for p in _folder(folder).iterdir() if p.name.endswith(".toml"))
 
 
 def builtin_text(name: str) -> str | None:
-    """The TOML of a built-in scene; None if there is none of that name."""
-    for folder, names in (
-        (_folder(), builtin_names()),
-        (_folder() / INTRUDERS, intruder_names()),
-        (_folder() / WALKERS, walker_names()),
-    ):
-        if name in names:
-            return (folder / f"{name}.toml").read_text(encoding="utf-8")
+    """Return the TOML of a built-in scene; None if there is none of that name."""
+    for folder in ("", "intruders", "walkers"):
+        if name in _names(folder):
+            return (_folder(folder) / f"{name}.toml").read_text(encoding="utf-8")
     return None
 
 
@@ -95,11 +90,8 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
-    tables, files = with_files({"medium": table}, scene.name)
-    medium = reader.read_section(
-        reader.Source(scene.name, scene.example), "medium", tables["medium"], SWIMMER["medium"]
-    )
-    return scene.changed(medium=medium, files=files)
+    source = reader.Source(scene.name)
+    return scene.changed(medium=reader.read_section(source, "medium", table, MEDIUM), files=tuple(source.files))
 
 
 def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:

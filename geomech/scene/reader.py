@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
-import numpy as np
 
-from geomech.core.errors import SceneError, UnitWarning, choose, named
+from geomech.core.errors import SceneError, UnitWarning, choose, named, short
 from geomech.core.registry import Registry
 from geomech.scene import slips
-from geomech.scene.columns import columns
 from geomech.scene.key import Key, spellings, words_of
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
@@ -28,12 +26,13 @@ Built = TypeVar("Built")
 @dataclass
 class Source:
     """A scene file as it is read. name: its own. example: a built-in scene that has all that is needed. files: those that it
-    names, which reading adds. sizes: given once for all its parts."""
+    names, which reading adds. sizes: given once for all its parts. folder: in which files are looked for, its own if none."""
 
     name: str
-    example: str
+    example: str = "NAME"
     files: list[str] = dataclasses.field(default_factory=list)
     sizes: Sizes | None = None
+    folder: Path | None = None
 
     @property
     def cure(self) -> str:
@@ -44,7 +43,7 @@ class Source:
         table = dict(table)
         for key in FILES:
             if isinstance(table.get(key), str):
-                table[key] = str(Path(self.name).absolute().parent / table[key])
+                table[key] = str((self.folder or Path(self.name).absolute().parent) / table[key])
                 self.files.append(table[key])
         return table
 
@@ -84,7 +83,7 @@ def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any
     for name, (section, *_) in sections_of(scene).items():
         if name in tables:
             part = read_section(source, name, tables[name], section)
-            parts |= part if isinstance(section, Keys) and section.spread else {name: part}
+            parts |= part if isinstance(part, dict) else {name: part}
     return parts
 
 
@@ -110,9 +109,9 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
             raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
-    if variant.columns:
-        table = _from_columns(place, table, variant)
-    return build(place, table, variant.kind, inner, label)
+    if variant.file:
+        table = _from_file(place, table, variant)
+    return build(source, place, table, variant.kind, inner, label)
 
 
 def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
@@ -138,23 +137,27 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
     raise SceneError(f"{place} has no {section.key!r}: add {section.key} = one of {', '.join(section.kinds)}{instead}")
 
 
-def _from_columns(place: str, table: dict, variant: Variant) -> dict:
-    """Return the keys of a section with columns of its file in place of the file."""
-    wanted, meaning, optional, rows = variant.columns
-    if not rows and {*table} != {"file"}:
-        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {meaning}")
+def _from_file(place: str, table: dict, variant: Variant) -> dict:
+    """Return the keys of a section with what its file has in place of the file."""
+    if not variant.file.keys and {*table} != {"file"}:
+        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {variant.file.meaning}")
     if "file" not in table:
         return table
-    if rows in table:
-        raise SceneError(f"{place}: {rows} are given twice: keep one of {rows} and file")
-    numbers = columns(place, table.pop("file"), wanted, optional)
-    if rows:
-        return table | {rows: np.stack([*numbers.values()], -1).tolist()}
-    return {key: values.tolist() for key, values in numbers.items()}
+    if variant.file.keys:
+        variant.alternatives.check(place, [spellings(variant.kind).get(key, (key,))[0] for key in table])
+    file = table.pop("file")
+    if not isinstance(file, str):
+        raise SceneError(f"{place} file must be the name of a file, got {short(file)}")
+    return table | variant.file.read(place, file)
 
 
 def build(
-    place: str, table: Mapping, kind: type[Built], inner: Mapping[str, Any] | None = None, label: str = ""
+    source: Source,
+    place: str,
+    table: Mapping,
+    kind: type[Built],
+    inner: Mapping[str, Any] | None = None,
+    label: str = "",
 ) -> Built:
     """Return a part of a class, or what a form of its keys makes, from a table of keys; else SceneError.
 
@@ -169,21 +172,22 @@ def build(
         values[field] = _radians(value) if in_degrees else value
         if key == "gamma0_deg":
             _check_degrees(f"{place} {key}", value)
+    if alternatives := getattr(kind, "alternatives", None):
+        alternatives.check(place, values)
     for field, word in words_of(kind).items():
         if field in values:
             choose(f"{place} {field}", values[field], word.known)
-    if alternatives := getattr(kind, "alternatives", None):
-        alternatives.check(place, values)
     if inner and {f.name for f in dataclasses.fields(kind) if f.default is f.default_factory} <= {*inner}:
         return kind(**inner | values)  # a swimmer, of types that msgspec does not know
     try:
         part = msgspec.convert({**values, **(inner or {})}, kind)
-        return part.to_part(place, {*values}) if hasattr(kind, "to_part") else part
+        return part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
     except SceneError:
         raise
     except (ValueError, OverflowError) as error:
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
-        raise SceneError(f"{place} {reason}{slips.cure_of_value(reason, table, kind)}") from None
+        told = reason.replace("Object missing required field", "has no")  # msgspec's words
+        raise SceneError(f"{place} {told}{slips.cure_of_value(reason, table, kind)}") from None
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
@@ -192,7 +196,7 @@ def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
     except SceneError as error:
-        raise SceneError(f"{error}; it has {label}" if label else str(error)) from None
+        raise SceneError(f"{error} ({label})" if label else str(error)) from None
 
 
 def _check_degrees(place: str, value) -> None:

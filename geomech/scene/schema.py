@@ -73,7 +73,9 @@ def _section(section: Section | Key) -> dict[str, Any]:
 def _variant(variant: Variant, elsewhere: Collection[str] = (), short: str = "") -> dict[str, Any]:
     """Return the schema of a section of one class. elsewhere: keys that may be given in another section. short: the kind
     whose inner sections may be, too."""
-    keys, alternatives = keys_in(variant), getattr(variant.kind, "alternatives", None)
+    alternatives = variant.alternatives
+    either = alternatives.keys if alternatives else ()
+    keys = [key._replace(required=key.required and key.name not in either) for key in keys_in(variant)]
     named = {key: {"const": name} for key, name in variant.named.items()}
     inner = {field: _section(section) for field, section in variant.inner.items()}
     needed = [*(named if not variant.implied else ())]
@@ -81,9 +83,6 @@ def _variant(variant: Variant, elsewhere: Collection[str] = (), short: str = "")
     if short not in variant.named.values():
         needed += [field for field, section in variant.inner.items() if not isinstance(section, Each)]
     rules = [_spelled(key) for key in keys if len(key.spellings) > 1]
-    if variant.columns and variant.columns.rows:
-        needed.remove(variant.columns.rows)
-        rules.append({"oneOf": [{"required": [key]} for key in (variant.columns.rows, "file")]})
     if alternatives:
         rules.append(_alternatives(alternatives, {key.alias or key.name: key for key in keys}))
     table = _table(first_sentence(variant.kind), {**named, **_properties(keys), **inner}, needed)

@@ -11,14 +11,15 @@ A scene is a dataclass whose fields say so in their annotations:
 
 `reader`, `write`, `keys` and `schema` walk over these declarations. The keys of a section are the fields of a class, whose
 units, bounds and meanings stand there (`geomech.scene.key`). A class that is not itself the part, but a form of its keys,
-has a method ``to_part(place, given)`` that returns the part; given: the fields that the file gives.
+has a method ``to_part(source, place, given)`` that returns the part, or a dict of several fields of the scene; given: the
+fields that the file gives. makes: the class that it can be written from.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, get_args, get_type_hints
 
@@ -26,28 +27,24 @@ from geomech.core.errors import SceneError
 from geomech.scene.key import Key, keys_of, text_key
 
 
-class Columns(NamedTuple):
-    """Columns of a CSV file, ``key file``, that stand in place of the keys of a class, or as rows of numbers in place of one
-    key. wanted: names of the columns; optional: of those that may be left out. meaning: for lists of keys."""
+class FromFile(NamedTuple):
+    """A file, ``key file``, that stands in place of keys of a class: of some, or of all, which a scene can then not give.
 
-    wanted: tuple[str, ...]
+    read: function (place, file) that returns values by key. meaning: for lists of keys.
+    """
+
+    read: Callable[[str, str], dict[str, Any]]
     meaning: str
-    optional: tuple[str, ...] = ()
-    rows: str = ""
+    keys: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Keys:
-    """A section whose keys are the fields of a class.
-
-    owner: whose section it is, for lists of keys, where scenes of several kinds have one. spread: it makes a mapping of
-    several fields of the scene. within: its keys are fields of the scene itself.
-    """
+    """A section whose keys are the fields of a class. owner: whose section it is, for lists of keys, where scenes of several
+    kinds have one."""
 
     kind: type
     owner: str = ""
-    spread: bool = False
-    within: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ class OneOf:
 
     kinds: the classes by name; in place of a class another `OneOf` takes the section's other keys. key: that has the name.
     otherwise: classes of sections without that key, each known by its first field. inner: sections within those of a kind,
-    by kind and field. columns: files that take the place of keys, by kind. sized: keys that the scene gives once for all its
+    by kind and field. files: that stand in place of keys, by kind. sized: keys that the scene gives once for all its
     parts are put in. short: the kind whose inner sections may stand alone, in place of the section. implied: names that a
     file may leave out. owner: as `Keys.owner`. meaning: of the key, where other sections' lists of keys have the rest.
     """
@@ -65,7 +62,7 @@ class OneOf:
     key: str = "kind"
     otherwise: tuple[type, ...] = ()
     inner: Mapping[str, Mapping[str, Section]] = field(default_factory=dict)
-    columns: Mapping[str, Columns] = field(default_factory=dict)
+    files: Mapping[str, FromFile] = field(default_factory=dict)
     sized: bool = False
     short: str = ""
     implied: tuple[str, ...] = ()
@@ -118,8 +115,16 @@ class Variant(NamedTuple):
     named: Mapping[str, str]
     kind: type
     inner: Mapping[str, Section] = {}
-    columns: Columns | None = None
+    file: FromFile | None = None
     implied: bool = False
+
+    @property
+    def alternatives(self) -> Alternatives | None:
+        """Groups of its keys of which one is given, if it has such."""
+        if self.file and self.file.keys:
+            cure = f"give either 'file' or {', '.join(map(repr, self.file.keys))}"
+            return Alternatives((({*self.file.keys}, set()), ({"file"}, set())), cure)
+        return getattr(self.kind, "alternatives", None)
 
     @property
     def label(self) -> str:
@@ -152,17 +157,17 @@ def variants(section: Keys | OneOf) -> Iterator[Variant]:
 
 def variant_of(section: OneOf, name: str) -> Variant:
     """Return the variant of a section that a name stands for."""
-    more = section.inner.get(name, {}), section.columns.get(name), name in section.implied
+    more = section.inner.get(name, {}), section.files.get(name), name in section.implied
     return Variant({section.key: name}, section.kinds[name], *more)
 
 
 def keys_in(variant: Variant) -> list[Key]:
     """Return the keys of a section, but for those that name it and those of sections within it."""
     keys = [key for key in keys_of(variant.kind) if key.name not in variant.inner]
-    if not variant.columns:
+    if not variant.file:
         return keys
-    file = text_key("file", variant.columns.meaning, required=not variant.columns.rows)
-    return [file, *keys] if variant.columns.rows else [file]
+    file = text_key("file", variant.file.meaning, required=not variant.file.keys)
+    return [file, *keys] if variant.file.keys else [file]
 
 
 @functools.cache
@@ -180,10 +185,10 @@ def sections_of(scene: type) -> dict[str, Declared]:
             elif isinstance(mark, Within):
                 within.setdefault(mark, []).append((part.name, hints[part.name], part.default))
     for (name, owner), keys in within.items():
-        methods = {"to_part": lambda self, place, given: vars(self)}
-        kind = dataclasses.make_dataclass(name.title(), keys, namespace=methods)
+        form = {"makes": scene, "to_part": lambda self, source, place, given: vars(self)}
+        kind = dataclasses.make_dataclass(name.title(), keys, namespace=form)
         kind.__doc__ = ""  # in place of a signature
-        declared[name] = Declared(Keys(kind, owner, spread=True, within=True))
+        declared[name] = Declared(Keys(kind, owner))
     return declared
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.errors import named
+from geomech.scene.columns import series
 from geomech.scene.intruding import Intruding
-from geomech.scene.sections import Columns, Each, Keys, OneOf, Within
+from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import MatchedKeys
 from rft.checks import Number
 from rft.ground import KINDS as EFFECTS
@@ -36,11 +37,10 @@ KINDS = {
     "extruded-c-leg": SOLIDS["c-leg"],
     "mesh": OneOf(SOLIDS, "shape", otherwise=(MeshFile,)),
 }
-COURSE = Columns(
-    ("t", "x", "y", "z"),
+COURSE = FromFile(
+    series(("t", "x", "y", "z"), ("rx", "ry", "rz")),
     "CSV with the header t,x,y,z or t,x,y,z,rx,ry,rz (rotation vector) (s, m, rad); velocities are differences of order 2 in "
     "the spacing of t",
-    optional=("rx", "ry", "rz"),
 )
 TRIANGLES = "of the mesh, about, 1 to 2,000,000; a mesh from a file has at least its own"
 
@@ -70,9 +70,9 @@ class MeshScene(Intruding):
     """A medium of three dimensions, a solid body and its motion, and effects. triangles: of its mesh, about. matched: what
     the medium's strength was taken from, where it was told by a name of the vertical plane."""
 
-    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh", spread=True)]
+    medium: Annotated[Spatial, Keys(MatchedKeys, owner="an intruder scene of a mesh")]
     intruder: Annotated[Solid, OneOf(KINDS)]
-    motion: Annotated[Motion, OneOf(MOTIONS, columns={"csv": COURSE}, owner="a mesh")]
+    motion: Annotated[Motion, OneOf(MOTIONS, files={"csv": COURSE}, owner="a mesh")]
     triangles: Annotated[
         int,
         Within("numerics", owner="an intruder scene of a mesh"),

@@ -16,7 +16,7 @@ from geomech.core.errors import SceneError, choose, named
 from geomech.io.files import read_text
 from geomech.scene.columns import columns
 from geomech.scene.key import Word
-from geomech.scene.reader import build
+from geomech.scene.reader import Source, build
 from geomech.scene.sections import Alternatives
 from rft.checks import Number
 from rft.meshes import Spatial
@@ -64,11 +64,11 @@ class StressKeys(_Coefficients):
         COEFFICIENTS, (), cure="keep one of 'name', 'file' and the nine coefficients, in N/cm^3; or give zeta alone"
     )
 
-    def to_part(self, place: str, given: Collection[str]) -> PlateStress:
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> PlateStress:
         """Return the stress map. What is given beside its name, file or coefficients takes the place of its own."""
         base = StressMap(**{key: getattr(self, key) for key in COEFFICIENTS if key in given})
         if {"name", "file"} & {*given}:
-            base = VERTICAL[self.name].stress if self.name else _of_file(place, self.file)
+            base = VERTICAL[self.name].stress if self.name else _of_file(source, place, self.file)
         changed = {key: getattr(self, key) for key in ("grazing", "tension") if key in given}
         return dataclasses.replace(base, zeta=base.zeta * self.zeta, **changed)
 
@@ -104,13 +104,13 @@ class SpatialKeys(Spatial):
         cure="give 'xi_n' (N/m^3), or 'density' and 'internal_friction', or 'name' or 'file' and, if wanted, 'zeta'",
     )
 
-    def to_part(self, place: str, given: Collection[str]) -> Spatial:
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> Spatial:
         """Return the medium, as strong as the grains, or as a map of the vertical plane on a plate pushed down."""
         more = {key: getattr(self, key) for key in ("surface_friction", "tension", "grazing")}
         if self.density is not None:
             return Spatial.from_grains(self.density, self.internal_friction, **more)
         if strength := {*given} & {"name", "file", "zeta"}:
-            vertical = build(place, {key: getattr(self, key) for key in strength}, StressKeys)
+            vertical = build(source, place, {key: getattr(self, key) for key in strength}, StressKeys)
             return Spatial(matched_strength(vertical), **more)
         return Spatial(self.xi_n, **more)
 
@@ -118,9 +118,9 @@ class SpatialKeys(Spatial):
 class MatchedKeys(SpatialKeys):
     __doc__ = SpatialKeys.__doc__
 
-    def to_part(self, place: str, given: Collection[str]) -> dict:
+    def to_part(self, source: Source, place: str, given: Collection[str]) -> dict:
         """Return the medium, and what its strength was matched to, if to a map of the vertical plane."""
-        medium = super().to_part(place, given)
+        medium = super().to_part(source, place, given)
         of = self.name or Path(self.file or "").name
         times = f"{self.zeta:g} times " if self.zeta != 1.0 else ""
         match = (
@@ -162,10 +162,10 @@ def load_medium(medium: str) -> PlateStress:
         return VERTICAL[medium].stress
     if Path(medium).suffix not in (".toml", ".csv") and not Path(medium).exists():
         choose("medium", medium, VERTICAL)
-    return _of_file("medium", medium)
+    return _of_file(Source("medium"), "medium", medium)
 
 
-def _of_file(place: str, file: str) -> PlateStress:
+def _of_file(source: Source, place: str, file: str) -> PlateStress:
     """Return the stress map of a TOML file, if its name does not end in .csv, or of a CSV file of plate drags."""
     path = Path(file)
     if path.suffix == ".csv":
@@ -185,4 +185,4 @@ def _of_file(place: str, file: str) -> PlateStress:
             raise SceneError(
                 f"{place}: {path.name} names another file, {Path(table['file']).name}: copy the coefficients"
             )
-    return build(f"{place}: {path.name}:", table, StressKeys)
+    return build(source, f"{place}: {path.name}:", table, StressKeys)

@@ -9,13 +9,14 @@ from geomech.core.errors import SceneError, choose, named
 from geomech.scene import reader
 from geomech.scene.frames import framed
 from geomech.scene.key import spellings
-from geomech.scene.medium import with_files
 from geomech.scene.model import SHORT, SWIMMER, Scene
+from geomech.scene.sections import sections_of
 from geomech.scene.sizes import Sizes
 from geomech.systems import KINDS as SYSTEMS
 from geomech.systems.base import System
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import NAME as FITTED
+from geomech.systems.swimmer import Swimmer
 from geomech.tiers.base import Numerics
 
 
@@ -29,15 +30,15 @@ def from_tables(tables: Mapping, name: str, text: str) -> Scene:
     source = reader.Source(name, Scene.example)
     reader.check(Scene, tables, source)
     tables, fitted = _without_fitted(tables, name)
-    tables, files = with_files(tables, name)
     source.sizes = Sizes(name, tables)
-    given = tables.get("numerics", {})
     with named(name):
-        parts = reader.read_sections(Scene, {"gait": tables["gait"], "system": _system(tables, name)}, source)
+        section = sections_of(Scene)["gait"].section
+        gait = reader.read_section(dataclasses.replace(source, files=[]), "gait", tables["gait"], section)
+        system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)["system"]
         source.sizes.all_used()
-        system, numerics = _with_numerics(parts["system"], given, f"{name}: [numerics]")
-        system = framed(system, numerics) if fitted else system
-        return Scene(system, parts["gait"], numerics, name, text, files)
+        system, numerics = _with_numerics(system, tables.get("numerics", {}), source)
+        files = tuple(source.files) if isinstance(system, Swimmer) else ()  # others know their own, as gaits do
+        return Scene(framed(system, numerics) if fitted else system, gait, numerics, name, text, files)
 
 
 def _system(tables: Mapping, name: str) -> dict:
@@ -50,8 +51,9 @@ def _system(tables: Mapping, name: str) -> dict:
     return short | dict(table)
 
 
-def _with_numerics(system: System, given: Mapping, place: str) -> tuple[System, Numerics]:
+def _with_numerics(system: System, given: Mapping, source: reader.Source) -> tuple[System, Numerics]:
     """Return a system with its part of [numerics], and the rest, which is the tiers'."""
+    place = f"{source.name}: [numerics]"
     own = NoSolver if (solver := solver_of(system)) is None else type(solver)
     names = [field.name for kind in (Numerics, own) for field in dataclasses.fields(kind)]
     of = {True: {}, False: {}}
@@ -60,8 +62,8 @@ def _with_numerics(system: System, given: Mapping, place: str) -> tuple[System, 
             choose(f"{place} key", key, names)
         of[key in spellings(own)][key] = value
     if of[True]:
-        system = system.with_solver(reader.build(place, of[True], own))
-    return system, reader.build(place, of[False], Numerics)
+        system = system.with_solver(reader.build(source, place, of[True], own))
+    return system, reader.build(source, place, of[False], Numerics)
 
 
 def solvers() -> list[type]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from geomech.core.errors import named
 from geomech.gaits import Gait
 from geomech.scene.key import angles_of
-from geomech.scene.medium import with_files
+from geomech.scene.medium import MEDIUM
 from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.scene.sections import Each, Keys, Section, sections_of, variants
@@ -69,7 +69,7 @@ def medium_toml(name: str, entry) -> str:
         f"{x} = {math.degrees(getattr(entry.medium, x)):.6g} degrees" for x in sorted(angles_of(type(entry.medium)))
     ]
     head = "".join(f"# {line}\n" for line in [*lines, *angles])
-    return head + table("medium", _section(entry.medium, SWIMMER["medium"]))
+    return head + table("medium", _section(entry.medium, MEDIUM))
 
 
 def vertical_toml(name: str, entry) -> str:
@@ -86,17 +86,16 @@ def tables(scene: Scene | Intruding | WalkerScene) -> dict:
     """Return the tables of a scene's text, with the numerics of now, where these make the scene; else those written anew."""
     read = tomllib.loads(_checked(scene).text)
     if isinstance(scene, Scene):
-        read = {**with_files(read, scene.name)[0], "numerics": _numerics(scene)}
-    if scene.text and from_tables(read, scene.name, scene.text) == scene:
-        return read
-    return _anew(scene)
+        read["numerics"] = _numerics(scene)
+    alone = not (isinstance(scene, Scene) and scene.files)  # whose medium can be swept only where it stands
+    return read if scene.text and alone and from_tables(read, scene.name, scene.text) == scene else _anew(scene)
 
 
 def spelled_out(tables: dict, scene: Scene) -> dict:
     """The scene's tables with the law and its parameters in place of the name of its medium."""
     if "name" not in tables.get("medium", {}):
         return tables
-    return {**tables, "medium": _section(scene.system.medium, SWIMMER["medium"])}
+    return {**tables, "medium": _section(scene.system.medium, MEDIUM)}
 
 
 def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
@@ -121,12 +120,11 @@ def section_tables(part: Any, section: Section) -> dict | list[dict]:
 
 def _section(part: Any, section: Section) -> dict:
     for variant in variants(section):
-        kind = getattr(variant.kind, "makes", variant.kind)
-        of_file = variant.columns and not variant.columns.rows
-        if (type(part) is kind and not of_file) or (isinstance(section, Keys) and section.within):
+        is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
+        if is_one and not (variant.file and not variant.file.keys):
             inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
-            return {**variant.named, **_fields(part, kind, inner), **inner}
-        if type(part) is kind or isinstance(section, Keys):
+            return {**variant.named, **_fields(part, variant.kind, inner), **inner}
+        if is_one or isinstance(section, Keys):
             raise ValueError(
                 f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
             )
@@ -168,7 +166,7 @@ def _numerics(scene: Scene) -> dict:
 def _fields(part: Any, kind: type, but: Collection[str] = ()) -> dict:
     """Return the fields of a class, as a file has them, that are told at construction and have a value."""
     names = [f.name for f in dataclasses.fields(kind) if f.init and f.name not in {*but, "solver"}]
-    return {name: _plain(getattr(part, name)) for name in names if getattr(part, name) is not None}
+    return {name: _plain(value) for name in names if (value := getattr(part, name, None)) is not None}
 
 
 def _plain(value):

@@ -7,13 +7,17 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
+from geomech.core.errors import SceneError, choose, named
+from geomech.core.variables import Result, Variable
 from geomech.scene import drag
 from geomech.scene.write import table
-from geomech.study.stress_calibration import OfPenetration, OfPlates, of_penetration, of_plates
+from geomech.study.question import Allow, Progress, Question
+from geomech.study.stress_calibration import OfPenetration, OfPlates, law_of, of_penetration, of_plates
 from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
 
@@ -82,14 +86,14 @@ class OfDrag:
         """A file that a scene takes as ``[medium] file``."""
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
-        of += f", widened for {f.free} degrees of freedom (Student)" if own else ""
-        about = f"# Fitted to {json.dumps(self.name)}: {f.data.angles} angles, rms residual {f.rms:.3g} N{of}.\n"
+        of += f", widened for {f.degrees_of_freedom} degrees of freedom (Student)" if own else ""
+        about = f"# Fitted to {json.dumps(self.name)}: {f.data.n_angles} angles, rms residual {f.rms:.3g} N{of}.\n"
         return about + table("medium", self._medium())
 
     def text(self) -> str:
         """All of it in words and a table of residuals."""
         f = self.fit
-        lines = [f"{f.law} law fitted to {self.name}: {f.data.count} forces at {f.data.angles} angles"]
+        lines = [f"{f.law} law fitted to {self.name}: {f.data.n_forces} forces at {f.data.n_angles} angles"]
         for name, x, (low, high) in zip(f.names, _shown(f, f.values), _shown(f, f.intervals)):
             unit = f" {UNITS[name]}" if UNITS.get(name) else ""
             lines.append(f"{name:13}{x:12.5g}, {low:.4g} to {high:.4g}{unit} with 95 %")
@@ -101,7 +105,7 @@ class OfDrag:
         known = [f"{name} {getattr(f.rod, name):g} {unit}" for name, unit in SIZES.items() if getattr(f.rod, name)]
         lines.append(f"end caps: {caps}; rod and bed: {', '.join(known) or 'sizes not known'}")
         unknown = [name for name in SIZES if not getattr(f.rod, name)]
-        if unknown and FITS[f.law].grains:
+        if unknown and FITS[f.law].granular:
             lines.append(f"k is not known without {', '.join(unknown)}: in the header lines, or as --{unknown[0]}")
         repeated = repeats(f.data.psi, f.data.forces)
         lines.append(
@@ -165,3 +169,33 @@ CALIBRATIONS: dict[str, Callable[..., OfDrag | OfPlates | OfPenetration]] = {
     "stress-map": of_plates,
     "zeta": of_penetration,
 }
+
+
+@dataclass(frozen=True)
+class Calibration(Question):
+    """A law fitted to measurements. law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod or
+    plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
+
+    source: str
+    law: str | None = None
+    sizes: tuple[tuple[str, float], ...] = ()
+    end_caps: float | str = 0.0
+
+    def inputs(self) -> list[Path]:
+        return [Path(self.source)]
+
+    @cached_property
+    def chosen(self) -> str:
+        return choose("--law", law_of(self.source) if self.law is None else self.law, CALIBRATIONS)
+
+    def check(self) -> None:
+        _ = self.chosen
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        found = CALIBRATIONS[self.chosen](self.chosen, self.source, dict(self.sizes), self.end_caps)
+        told = found.numbers()
+        names = told["parameters"]
+        deviations = np.sqrt(np.diag(np.reshape(told["covariance"], (len(names), len(names)))))
+        over = ("parameter",)
+        variables = Variable("parameter", over, np.array(names)), Variable("standard_error", over, deviations)
+        return Result("calibration", variables, {"notes": found.notes()}, found)

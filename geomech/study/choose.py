@@ -47,8 +47,7 @@ def cheapest(
 
     def answer(method: str, poses, error, settings: dict) -> dict:
         more = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
-        table = tables.table(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more)
-        return Displacements(table, scene, gait)
+        return Displacements(tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more))
 
     some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)

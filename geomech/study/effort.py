@@ -8,7 +8,7 @@ straight and along itself, as far in the same time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import SceneError, number, real_array
+from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
 from geomech.geometry import connection, metric
 from geomech.geometry.gait import checked_gait
@@ -24,7 +25,6 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.scene.model import Scene
 from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES
-from geomech.study.results import Displacements
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Dissipative, OwnMetric, at_once, capability, driven, pieces_of, power, stored
 from geomech.systems.premises import because, listed
@@ -204,42 +204,28 @@ def _rates(system: System, alpha, alphadot) -> np.ndarray:
     return np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
 
 
-def add_effort(table: Displacements) -> None:
-    """Put what `transport` tells into a table of displacements."""
-    scene, gait = table.scene, table.gait
-    found = effort(scene, gait, table["amplitude"])
-    table.update(transport(scene, found, {m: np.array(table[m], float).reshape(-1, 3) for m in table.tiers}))
-    table["units"] |= units(scene.system)
-
-
-def transport(scene: Scene, found: Mapping, poses: Mapping) -> dict:
-    """Of what `effort` found and the net poses (B, 3) by tier: JSON's {"path_length", "work", "path_length_error",
-    "work_error": [...], "efficiency", "cost_of_transport": {tier: [...]}}, None where there is none. efficiency: net
-    distance, in body lengths, over path length."""
-    degree, length = scene.system.traits.power_degree, scene.system.length
-    distance = {m: tables.of_pose(p)["net_distance"] / length for m, p in poses.items()}
+def with_effort(result: Result) -> Result:
+    """Return net displacements with path length and work of a cycle, their errors, and by tier the efficiency, net distance
+    in body lengths over path length, and the cost of transport, work over that of towing the body as far; nan where there
+    is none."""
+    scene, gait = result.subject
+    found, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
+    degree, distance = scene.system.traits.power_degree, result["net_distance"].values / scene.system.length
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = {m: d / found["path_length"] for m, d in distance.items()}
-        towed = {
-            m: np.nan * d if degree is None else d * (d / (2 * np.pi)) ** (degree - 1) for m, d in distance.items()
-        }
-        cost = {m: found["work"] / t for m, t in towed.items()}
-    by_tier = {"efficiency": ratio, "cost_of_transport": cost}
-    return {
-        **{key: _listed(x) for key, x in found.items()},
-        **{key: {m: _listed(x) for m, x in each.items()} for key, each in by_tier.items()},
-    }
+        towed = np.nan * distance if degree is None else distance * (distance / (2 * np.pi)) ** (degree - 1)
+        ratios = {"efficiency": distance / found["path_length"], "cost_of_transport": found["work"] / towed}
+    more = [
+        Variable(key, ("amplitude",), found[key], unit.get(key, ""), "", found[f"{key}_error"])
+        for key in ("path_length", "work")
+    ]
+    more += [Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()]
+    return replace(result, variables=(*result.variables, *more))
 
 
 def units(system: System) -> dict[str, str]:
-    """Of the keys of `transport`."""
+    """Return the units of what `with_effort` adds."""
     if capability(system, OwnMetric) is not None:
-        return {"path_length": METRIC, "path_length_error": METRIC, "efficiency": f"BL / {METRIC}"}
+        return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
     length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
     work = "axial drag x BL" if system.traits.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"
-    each = {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}
-    return {**each, "path_length_error": length, "work_error": work}
-
-
-def _listed(values) -> list:
-    return [float(x) if np.isfinite(x) else None for x in values]
+    return {"path_length": length, "work": work, "efficiency": "BL per unit of path_length", "cost_of_transport": "1"}

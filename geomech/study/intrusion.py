@@ -1,43 +1,46 @@
-"""What accuracy costs in an intruder scene: error of force and moment against the number of elements or triangles, and
-time."""
+"""Forces and moments on a body that is moved through grains, with their errors, and what accuracy costs there: error against
+the number of elements or triangles, and time."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
-from geomech.run.jobs import runner
 from geomech.scene.intruding import Intruding
+from geomech.study.knob import ROUNDING, Knob
+from geomech.study.question import Allow, Progress, Question
 
-TOLERANCES = 10.0 ** -np.arange(1, 7)
-ROUNDING = 1e-13  # errors below say nothing
+UNITS = {
+    "t": "s",
+    "angle": "rad",
+    "x": "m",
+    "y": "m",
+    "z": "m",
+    "force": "N",
+    "moment": "N m",
+}  # by what names begin with
 MARGIN = 1.125  # of the estimate over what its order says: covers the error of 95 of 100 motions of outlines, measured
 
 
-def study(scene: Intruding, progress: Callable | None = None, runs: int = 3) -> dict:
-    """{"scene", "parts", "poses", "finest", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest":
-    [{"tolerance", "elements", "error", "seconds"}]}, a line for the force and one for the moment; of a mesh "triangles"
-    stands for "elements". Errors are rms over the motion against the finest of the scene's ladder, over the largest of it;
-    each setting is timed ``runs`` times, and the quickest counts. Seconds are of one thread's computing. Who computes:
-    `geomech.run.workers`."""
-    *counts, finest = scene.ladder
-    asked = [(finest, 1), *((count, runs) for count in counts)]
-    answers = runner().map(_answer, scene, asked, len(asked), progress=progress)
-    (truth, _), *found = ((Answer(*loads), seconds) for *loads, seconds in answers)
-    used = [scene.used(n) for n in counts]  # a shape may take more than it is asked for
-    lines = [_line(what, used, found, truth, scene.size, scene.order) for what in ("force", "moment")]
-    return {
-        "scene": scene.name,
-        "parts": scene.parts,
-        "poses": len(truth.force),
-        "finest": scene.used(finest),
-        "lines": lines,
-        "cheapest": [_cheapest(lines, tolerance, scene.parts) for tolerance in TOLERANCES],
-    }
+@dataclass(frozen=True)
+class Intrusion(Question):
+    """Force and moment along a scene's motion, with errors from finer parts."""
+
+    scene: Intruding
+
+    def cost(self) -> Elements:
+        return price(self.scene, sum((1, *self.scene.finer)) * self.scene.count)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        scene = self.scene
+        found = scene.run()
+        error, columns = estimate(scene, found), scene.table(found)
+        table = [Variable(name, ("t",), values, UNITS[name.partition("_")[0]]) for name, values in columns.items()]
+        return Result("intrusion", tuple(table), {"name": scene.name, "error": error}, (scene, found))
 
 
 class Estimate(NamedTuple):
@@ -69,46 +72,62 @@ def _loads(found) -> tuple[np.ndarray, np.ndarray]:
     return found.force, found.moment
 
 
-class Answer(NamedTuple):
-    """Force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
+@dataclass(frozen=True)
+class Settings:
+    """Force and moment along a motion by so many parts, rms over the motion and over the largest of it, against the finest of
+    the scene's ladder."""
 
-    force: np.ndarray
-    moment: np.ndarray
+    scene: Intruding
+    runs: int = 3
 
+    measures: ClassVar[tuple[str, ...]] = ("force", "moment")
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
+    picture: ClassVar[str] = "elements_figure"
 
-def _answer(scene: Intruding, asked: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, float]:
-    """(force, moment, seconds) of so many parts; the quickest of so many runs counts."""
-    (count, runs), times = asked, []
-    for _ in range(runs):
-        start = time.thread_time()
-        found = scene.run(count)
-        times.append(time.thread_time() - start)
-    return found.force, found.moment, min(times)
+    def check(self) -> None: ...
 
+    def cost(self) -> Elements:
+        *counts, finest = self.scene.ladder
+        return price(self.scene, finest + self.runs * sum(counts))
 
-def _line(what: str, used, found, truth: Answer, size: float, order: int) -> dict:
-    """A moment that is nothing but rounding is compared to the force times the body's size. found: (answer, seconds) of the
-    settings."""
-    exact, arm = getattr(truth, what), size if what == "moment" else 1.0
-    largest, bound = np.abs(exact).max(), arm * np.abs(truth.force).max()
-    largest = largest if largest > ROUNDING * bound else bound or 1.0
-    errors = [float(np.sqrt(np.mean((getattr(run, what) - exact) ** 2)) / largest) for run, _ in found]
-    seconds = [took for _, took in found]
-    seen = np.array(errors) > ROUNDING
-    slope = -np.polyfit(np.log(np.array(used)[seen]), np.log(np.array(errors)[seen]), 1)[0] if seen.sum() > 2 else None
-    slope = None if slope is None else float(slope)
-    return {"label": what, "order": order, "value": used, "error": errors, "seconds": seconds, "slope": slope}
+    def prepared(self) -> Settings:
+        return self
 
+    def knobs(self) -> list[Knob]:
+        """Return the number of parts; a shape may have more than it is asked for."""
+        values = tuple(self.scene.used(n) for n in self.scene.ladder[:-1])
+        return [Knob(self.scene.parts, values, self.scene.order, against="limit")]
 
-def _cheapest(lines, tolerance: float, parts: str) -> dict:
-    """The fewest parts tried that meet a tolerance in force and moment."""
-    for k, count in enumerate(lines[0]["value"]):
-        error = max(line["error"][k] for line in lines)
-        if error <= tolerance:
-            return {
-                "tolerance": float(tolerance), parts: count, "error": error, "seconds": lines[0]["seconds"][k],
-            }  # fmt: skip
-    return {"tolerance": float(tolerance), parts: None}
+    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+        """Return force (T, 2 or 3), N, and moment (T,) or (T, 3), N m, along the motion."""
+        *counts, finest = self.scene.ladder
+        found = self.scene.run(finest if value is None else counts[self.knobs()[0].values.index(value)])
+        return [found.force, found.moment]
+
+    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        """A moment that is nothing but rounding is compared to the force times the body's size."""
+        told, most = {}, np.abs(truth[0]).max()
+        for what, arm, one, exact in zip(self.measures, (1.0, self.scene.size), found, truth):
+            largest, bound = np.abs(exact).max(), arm * most
+            largest = largest if largest > ROUNDING * bound else bound or 1.0
+            told[what] = float(np.sqrt(np.mean((one - exact) ** 2)) / largest)
+        return told
+
+    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+        return {"label": measure, "order": knob.order}
+
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        """Return the fewest parts tried that meet a tolerance in force and moment."""
+        parts = self.scene.parts
+        for k, count in enumerate(lines[0]["value"]):
+            if (error := max(line["error"][k] for line in lines)) <= tolerance:
+                return {"tolerance": tolerance, parts: count, "error": error, "seconds": lines[0]["seconds"][k]}
+        return {"tolerance": tolerance, parts: None}
+
+    def facts(self) -> dict[str, Any]:
+        scene = self.scene
+        finest = scene.used(scene.ladder[-1])
+        return {"scene": scene.name, "parts": scene.parts, "poses": scene.motion.samples, "finest": finest}
 
 
 class Elements(Cost):
@@ -131,40 +150,9 @@ class Triangles(Elements):
     parts = "triangles"
 
 
-def cost(scene: Intruding, runs: int = 3) -> Elements:
-    """Of `study`."""
-    *counts, finest = scene.ladder
-    return price(scene, finest + runs * sum(counts))
-
-
 def price(scene: Intruding, count: int | None = None) -> Elements:
     """Of runs with so many parts in all, or of one with the scene's own."""
     parts = scene.motion.samples * (count or scene.count)
     kind = next(kind for kind in (Elements, Triangles) if kind.parts == scene.parts)
     seconds = parts * scene.per_part
     return kind(parts, seconds, BASE, seconds)
-
-
-def sentences(results: dict) -> list[str]:
-    """One sentence each for force and moment: from the fewest parts to the most, and the measured order."""
-    out = []
-    for line in results["lines"]:
-        e, t, v = line["error"], line["seconds"], line["value"]
-        slope = "no slope, all rounding" if line["slope"] is None else f"measured order {line['slope']:.1f}"
-        out.append(
-            f"{line['label']}, {v[0]} to {v[-1]} {results['parts']}: error {e[0]:.1e} to {e[-1]:.1e} of its largest for "
-            f"{t[-1] / t[0]:.1f} times the time ({slope}; declared: {line['order']})."
-        )
-    return out
-
-
-def table(results: dict) -> str:
-    """The fewest parts by tolerance, as plain text."""
-    parts = results["parts"]
-    rows = [f"error / largest  {parts:>9}     error   seconds"]
-    for c in results["cheapest"]:
-        if c[parts] is None:
-            rows.append(f"{c['tolerance']:15.0e}   none of those tried")
-        else:
-            rows.append(f"{c['tolerance']:15.0e}  {c[parts]:9} {c['error']:9.1e} {c['seconds']:9.4f}")
-    return "\n".join(rows)

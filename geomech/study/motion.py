@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from geomech.core.errors import SceneError, is_whole, named, short
+from geomech.core.variables import Result, Variable
 from geomech.geometry.reconstruct import poses, repeated
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
-from geomech.study.cost import cycles_of, direct, price
+from geomech.study.bench import Study
+from geomech.study.cost import connection, cycles_of, direct, price
+from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
 from rft.premise import Premise
@@ -67,6 +71,67 @@ class Motion:
             timed = [] if self.time is None else [self.time[rows, None]]
             parts, ends = [self.phase[rows, None], *timed, self.pose[rows], self.alpha[rows]], self.points(rows)
             yield np.concatenate(parts + ([] if ends is None else [ends.reshape(len(ends), -1)]), 1)
+
+
+@dataclass(frozen=True)
+class Trajectory(Question):
+    """Where the body is at every phase of the scene's gait."""
+
+    scene: Scene
+    cycles: int = 1
+
+    @property
+    def title(self) -> str:
+        return f"motion of {self.scene.name}"
+
+    def cost(self) -> Cost:
+        return cost(self.scene, self.cycles)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        return of_motion(motion(self.scene, self.cycles))
+
+
+def of_motion(found: Motion) -> Result:
+    """Return pose and shape by phase; the ends of the links, which are many, are with the subject."""
+    columns, dims = found.columns, ("phase",)
+    times = {} if found.time is None else {"time": found.time}
+    arrays = {"phase": found.phase, **times, **dict(zip(("x", "y", "theta"), found.pose.T))}
+    arrays |= {f"alpha_{k + 1}": x for k, x in enumerate(found.alpha.T)}
+    return Result("motion", tuple(Variable(n, dims, x, columns[n]) for n, x in arrays.items()), {}, found)
+
+
+@dataclass(frozen=True)
+class Picture(Question):
+    """A motion beside the CCF of its scene, where that has a map: a strip of pictures, or a film of so many frames a cycle.
+
+    drawing: what drawing the film costs."""
+
+    scene: Scene
+    cycles: int
+    drawing: Cost | None = None
+
+    title = Trajectory.title
+
+    @cached_property
+    def study(self) -> Study:
+        return Study(self.scene)
+
+    @property
+    def _mapped(self) -> bool:
+        return self.scene.system.joints == 2 and self.study.has_connection
+
+    def cost(self) -> Cost:
+        costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
+        costs += [self.drawing] if self.drawing else []
+        balances, seconds, memory, besides = zip(*costs)
+        return Cost(sum(balances), sum(seconds), max(memory), sum(besides))
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        found = of_motion(motion(self.scene, self.cycles))
+        if self._mapped:
+            self.study.compute_field()
+        maps = (self.study.curvature, self.study.curvature_error) if self._mapped else ()
+        return replace(found, kind="film", subject=(found.subject, *maps))
 
 
 def motion(scene: Scene, cycles: int = 1) -> Motion:

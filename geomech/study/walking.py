@@ -1,5 +1,5 @@
-"""Questions to scenes of walking robots: how they walk, with the error of the speed; grids of parameters; what accuracy
-costs."""
+"""Questions to scenes of walking robots: how they walk, with the error of the speed, and what a sweep and an accuracy study
+ask of them."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.core.summary import span
+from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
 from geomech.run.cost import BASE, Cost
 from geomech.scene import write as written
-from geomech.scene.read import from_tables
 from geomech.scene.walker import WalkerScene
-from geomech.study.sweep import LARGEST, Points, changed, listed, stored_in
+from geomech.study.grid import Grid
+from geomech.study.knob import Knob
+from geomech.study.question import Allow, Progress, Question
 from rft.laws.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
@@ -40,15 +43,17 @@ PUSHED = 0.2  # of gravity, by which legs that are much faster than the body spe
 IN_VAIN = 40  # cycles that a search for a limit cycle and its errors take where there is none, many at once
 TO_COME = 1.5  # times what twice the elements change: all that more would; up to 1.49 measured, 4/3 of order 2
 WALKING = 0.7  # of the time, before the errors are asked for
+UNITS = {  # of a walk's table; a positive pitch is nose down
+    "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
+    "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
+}  # fmt: skip
 LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
-KNOBS = {
-    "steps": (12, 16, 24, 32, 48, 64, 96),
-    "elements": (6, 8, 12, 16, 24, 32),
-    "rounding": (8e-3, 4e-3, 2e-3, 1e-3, 5e-4),
-}
+KNOBS = (
+    Knob("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
+    Knob("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
+    Knob("rounding", (8e-3, 4e-3, 2e-3, 1e-3, 5e-4), 1, against="limit"),
+)
 FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
-ORDERS = {"steps": 2, "elements": 2, "rounding": 1}
-TOLERANCES = 10.0 ** -np.arange(1, 5)
 
 
 class Walked(NamedTuple):
@@ -121,6 +126,42 @@ def run(
         return walked([scene], by, progress=told)[0]
 
 
+@dataclass(frozen=True)
+class Walking(Question):
+    """How a robot walks. engine: what computes it, in place of the scene's. longest: s, as of `run`."""
+
+    scene: WalkerScene
+    engine: str | None = None
+    longest: float = field(default=math.inf, compare=False)
+
+    @property
+    def title(self) -> str:
+        return f"walk of {self.scene.name}"
+
+    def check(self) -> None:
+        refuse_engine(self.scene, self.engine)
+
+    def cost(self) -> Steps:
+        return price(self.scene, by=self.engine)
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        return of_walk(self.scene, run(self.scene, self.engine, progress, self.longest))
+
+
+def of_walk(scene: WalkerScene, found: Walked) -> Result:
+    """Return the table of a walk, and its speed, drift and turning with their errors."""
+    w, over = found.walk, ("t",)
+    more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
+    columns = dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
+    table = [Variable(name, over, values, UNITS.get(name, "")) for name, values in columns.items()]
+    table += [
+        Variable("speed", (), w.speed, "m/s", "mean speed", found.estimate),
+        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", found.aside),
+        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", found.turning),
+    ]
+    return Result("walk", tuple(table), {"name": scene.name}, (scene, found))
+
+
 class Steps(Cost):
     """What walking costs; balances counts the time steps."""
 
@@ -163,143 +204,117 @@ def _speeding_up(scene: WalkerScene) -> float:
     return float(2 * np.pi * reach * f**2 / (PUSHED * 9.81))
 
 
-def sweep(
-    scene: WalkerScene,
-    over: Mapping,
-    partial: Path | None = None,
-    progress: Callable | None = None,
-    seconds: float | None = None,
-) -> dict:
-    """{"over": {parameter: values}, "speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}: as
-    `geomech.study.sweep.sweep`, which stores what is done."""
-    tables, values, points = _grid(scene, over)
-    shape, at = tuple(map(len, values.values())), _At(tables, scene, tuple(values))
-    together = TOGETHER if scene.engine == "planar" else 1  # others walk one after the other: each tells how far it is
-    parts = -(-points.total // together)
-    some = ([points[i] for i in range(k, min(k + together, points.total))] for k in range(0, points.total, together))
-    with stored_in(partial, scene):
-        rows = [row for found in jobs.runner().map(_part, at, some, parts, seconds, progress) for row in found]
-    speed, estimate, kinds, cycles = np.moveaxis(np.reshape(rows, (*shape, 4)), -1, 0)
-    status = np.array(STATUSES)[kinds.astype(int)]
-    return {"over": values, "speed": speed, "estimate": estimate, "status": status, "cycles": cycles}
+@dataclass(frozen=True)
+class Walks:
+    """How fast robots walk, side by side: what a sweep over scenes of robots asks."""
+
+    def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
+        """Return the grid; SceneError if one of some 200 of its points makes no scene, or one that nothing here computes."""
+        grid = Grid(scene, over, written.tables(scene))
+        last = grid.total - 1
+        for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
+            there = grid.at(grid.points[k])
+            if k in (0, last):
+                refuse_engine(there)
+        return grid
+
+    def together(self, scene: WalkerScene) -> int:
+        # Engines other than the planar one walk one robot after the other: each tells how far it is.
+        return TOGETHER if scene.engine == "planar" else 1
+
+    def rows(self, scenes: list[WalkerScene], beside: None) -> np.ndarray:
+        """Return speed, its error, status and cycles."""
+        alike = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
+        found = [one for _, some in alike for one in walked(list(some), settling=True)]
+        return np.array([[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in found])
+
+    def cost(self, grid: Grid) -> Steps:
+        some = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
+        return max((price(s, grid.total, settling=True) for s in some), key=lambda c: c.seconds)
+
+    def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
+        speed, estimate, kinds, cycles = np.moveaxis(rows, -1, 0)
+        found = [
+            Variable("speed", dims, speed, "m/s", "mean speed", estimate),
+            Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
+            Variable("cycles", dims, cycles, "1"),
+        ]
+        title = f"Mean speed of the walking robot {grid.scene.name}"
+        return found, {"title": title, "scene": written.toml(grid.scene)}
+
+    def as_stored(self, result: Result) -> Result:
+        """Return a sweep as its file has it: the error as estimate, the status as a number that its label tells."""
+        speed, status = result["speed"], result["status"]
+        told = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
+        index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(float)
+        found = [v for v in result.variables if v.is_coordinate]
+        found += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
+        found += [result["cycles"], Variable("status", speed.dims, index, "1", told)]
+        return dataclasses.replace(result, variables=tuple(found))
+
+    def table(self, result: Result) -> dict:
+        """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
+        told = {name: result[name].values for name in ("speed", "status", "cycles")}
+        return {"speed": told["speed"], "estimate": result["speed"].error, **told}
+
+    def summary(self, table: Mapping) -> str:
+        worst = np.max(table["estimate"], initial=0.0)
+        return f"speed {span(table['speed'])} m/s; estimated error up to {worst:.1e} m/s"
 
 
-class _At(NamedTuple):
-    """The scene at a point of a grid."""
+@dataclass(frozen=True)
+class Settings:
+    """The speed of a robot, m/s, near a walk of its scene, for every knob against one as far refined as `FINEST`."""
 
-    tables: dict
     scene: WalkerScene
-    names: tuple[str, ...]
+    runs: int = 1
+    near: Walk | None = field(default=None, repr=False)
 
-    def __call__(self, point) -> WalkerScene:
-        tables = self.tables
-        for name, value in zip(self.names, point):
-            tables = changed(tables, name, value)
-        return from_tables(tables, self.scene.name, self.scene.text)
+    measures: ClassVar[tuple[str, ...]] = ("error",)
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 5)
+    picture: ClassVar[str] = "walk_accuracy_figure"
 
+    def check(self) -> None:
+        refuse_engine(self.scene)
 
-def _part(at: _At, points: list) -> list[list[float]]:
-    """Rows of some points: speed, its error, status, cycles."""
-    alike = itertools.groupby(map(at, points), key=lambda s: (s.numerics, s.engine))
-    found = [one for _, some in alike for one in walked(list(some), settling=True)]
-    return [[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in found]
+    def cost(self) -> Steps:
+        finest = {knob.name: (*knob.values, FINEST[knob.name]) for knob in KNOBS}
+        shares = sum(v / self.scene.numerics.steps for v in finest["steps"])
+        shares += sum(0.5 + v / 32 for v in finest["elements"]) + 2 * (len(finest["rounding"]) - 1)
+        one = price(self.scene, settling=True)
+        seconds = one.seconds * shares / 2
+        return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
 
+    def prepared(self) -> Settings:
+        (walk,) = engine(self.scene.engine).walk([self.scene.walker], self.scene.numerics, SETTLING)
+        return dataclasses.replace(self, near=walk)
 
-def cost_of_sweep(scene: WalkerScene, over: Mapping) -> Steps:
-    """Of `sweep`; SceneError if a point of the grid makes no scene."""
-    tables, values, points = _grid(scene, over)
-    at = _At(tables, scene, tuple(values))
-    some = [at(points[0]), at(points[points.total - 1])]
-    for one in some:
-        refuse_engine(one)
-    return max((price(s, points.total, settling=True) for s in some), key=lambda c: c.seconds)
+    def knobs(self) -> list[Knob]:
+        return list(KNOBS)
 
+    def numbers(self, knob: Knob, value: Any) -> list[np.ndarray]:
+        """Return the speed with one knob at another value."""
+        value = FINEST[knob.name] if value is None else value
+        numerics = dataclasses.replace(self.scene.numerics, **{knob.name: value})
+        (found,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
+        return [np.array(found.speed)]
 
-def _grid(scene: WalkerScene, over: Mapping):
-    """(tables of the scene, values by parameter, points); SceneError if a point of the grid makes no scene."""
-    values = {k: listed(k, v) for k, v in over.items()}
-    total = math.prod(map(len, values.values()))
-    if not 0 < total <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
-    tables = written.tables(scene)
-    points, at = Points(list(values.values())), _At(tables, scene, tuple(values))
-    for k in {*range(0, points.total, max(1, points.total // 200)), points.total - 1}:
-        at(points[k])
-    return tables, values, points
+    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        return {"error": float(abs(found[0] - truth[0]))}
 
+    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+        return {"label": knob.name, "order": knob.order}
 
-def study(scene: WalkerScene, progress: Callable | None = None) -> dict:
-    """{"scene", "speed", "lines": [{"label", "order", "value", "error", "seconds", "slope"}], "cheapest"}: error of the speed,
-    m/s, against one as far refined as `FINEST`, for every knob. Seconds are of one thread's computing. Who computes:
-    `geomech.run.workers`."""
-    (walk,) = engine(scene.engine).walk([scene.walker], scene.numerics, SETTLING)
-    asked = [(name, value) for name, settings in KNOBS.items() for value in (FINEST[name], *settings)]
-    common = scene.engine, scene.walker, scene.numerics, walk
-    found = jobs.runner().map(_answer, common, asked, len(asked), progress=progress)
-    lines = []
-    for name, settings in KNOBS.items():
-        truth, _ = next(found)
-        speeds, seconds = zip(*(next(found) for _ in settings))
-        errors = [abs(speed - truth) for speed in speeds]
-        slope = np.polyfit(np.log(settings), np.log(np.maximum(errors, 1e-15)), 1)[0] * (
-            1 if name == "rounding" else -1
-        )
-        line = {"label": name, "order": ORDERS[name], "value": list(settings), "error": errors}
-        lines.append({**line, "seconds": list(seconds), "slope": float(slope)})
-    return {
-        "scene": scene.name,
-        "speed": walk.speed,
-        "lines": lines,
-        "cheapest": [_cheapest(lines, t) for t in TOLERANCES],
-    }
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        """Return for each knob the coarsest setting from which on the error is within the tolerance; None if there is none."""
+        found: dict[str, Any] = {"tolerance": tolerance}
+        for line in lines:
+            good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
+            found[line["label"]] = good[0] if good else None
+        return found
 
-
-def _answer(common: tuple, setting: tuple[str, float]) -> tuple[float, float]:
-    """(speed, seconds) of (engine, walker, numerics, its walk) with one knob at another value."""
-    (by, walker, numerics, walk), (name, value) = common, setting
-    start = time.thread_time()
-    (found,) = engine(by).rerun([walker], dataclasses.replace(numerics, **{name: value}), [walk], SETTLING)
-    return found.speed, time.thread_time() - start
-
-
-def _cheapest(lines, tolerance: float) -> dict:
-    """For each knob the coarsest setting from which on the error is within the tolerance, m/s; None if there is none."""
-    found = {}
-    for line in lines:
-        good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
-        found[line["label"]] = good[0] if good else None
-    return {"tolerance": float(tolerance), **found}
-
-
-def cost(scene: WalkerScene) -> Steps:
-    """Of `study`."""
-    refuse_engine(scene)
-    shares = sum(v / scene.numerics.steps for v in (*KNOBS["steps"], FINEST["steps"]))
-    shares += sum(0.5 + v / 32 for v in (*KNOBS["elements"], FINEST["elements"])) + 2 * len(KNOBS["rounding"])
-    one = price(scene, settling=True)
-    seconds = one.seconds * shares / 2
-    return Steps(round(one.balances * shares / 2), seconds, BASE, seconds)
-
-
-def table(results: dict) -> str:
-    """The coarsest settings by tolerance, as plain text."""
-    names = [line["label"] for line in results["lines"]]
-    rows = [f"speed {results['speed']:.6g} m/s", "error (m/s) " + " ".join(f"{n:>10}" for n in names)]
-    for c in results["cheapest"]:
-        rows.append(f"{c['tolerance']:11.0e} " + " ".join(f"{'-' if c[n] is None else c[n]:>10}" for n in names))
-    return "\n".join(rows)
-
-
-def sentences(results: dict) -> list[str]:
-    """One sentence a knob: from its coarsest setting to the finest, and the measured order."""
-    out = []
-    for line in results["lines"]:
-        e, v = line["error"], line["value"]
-        sizes = f"error of the speed {e[0]:.1e} to {e[-1]:.1e} m/s"
-        out.append(
-            f"{line['label']} {v[0]:g} to {v[-1]:g}: {sizes} (measured order {line['slope']:.1f}; declared: {line['order']})."
-        )
-    return out
+    def facts(self) -> dict[str, Any]:
+        return {"scene": self.scene.name, "speed": self.near.speed}
 
 
 def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:

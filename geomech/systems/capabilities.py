@@ -17,9 +17,9 @@ from geomech.systems.base import System, kind_of
 from rft.premise import Premise
 
 T = TypeVar("T")
-# Of gaits run side by side, angles and velocities, a batch of which takes some 30 MB with what is made of them: more take
+# Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
 # no less time each, and the first of a long request is soon done, which tells how long the others take.
-VALUES_TOGETHER = 1 << 18
+VALUES_TOGETHER = 1 << 20
 STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its time however few gaits take it
 
 
@@ -224,7 +224,7 @@ def at_once(system: System, phases: int) -> int:
     if cost.batched:
         return sys.maxsize
     if not system.traits.steps:
-        return max(1, VALUES_TOGETHER // (phases * (system.joints + 6)))
+        return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * cost.elements)))
     # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
     return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.held // 8))
 

@@ -53,7 +53,7 @@ def loads(problem: Problem, v, rounding) -> list:
     return [(sides.elements, load), (points.elements, on_points)]
 
 
-def net_of(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
+def frame_net(problem: Problem, v, rounding, x, y, theta, mass=None) -> Net:
     """Return the sum of loads, and of the rate of change of momentum, on the frame; entries (B,).
 
     v, (x, y, theta): velocities of elements and of the frame, over the scale of speed. mass: `rft.momentum.frame_inertia`,
@@ -72,7 +72,7 @@ def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) 
     """Return the entries of `Net` (5, 3, B) at velocities v (3, n, B) of elements, those of points last, and xi (3, B)
     of the frame."""
     n = len(problem.sides.station)
-    return np.array(net_of(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi))
+    return np.array(frame_net(problem, (tuple(v[:, :n]), tuple(v[:, n:])), rounding, *xi))
 
 
 def sum_elements(net: Net) -> Net:
@@ -106,10 +106,10 @@ def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray 
         step = iterate.dx, iterate.dy, iterate.dtheta
         v_next = with_frame_velocity(problem, v, *step)
         xi_next = plus((iterate.x, iterate.y, iterate.theta), step)
-        net = net_of(problem, v_next, iterate.rounding_next, *xi_next, mass)
-        iterate, accepted, done = newton_step(iterate, net, slowest2(v_next), row(problem.frame), descent, limits)
+        net = frame_net(problem, v_next, iterate.rounding_next, *xi_next, mass)
+        iterate, accepted, finished = newton_step(iterate, net, slowest2(v_next), row(problem.frame), descent, limits)
         v = v_next if accepted.all() else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
-        ended = done & active
+        ended = finished & active
         if ended.any():
             i = index[ended]
             xi[:, i] = np.stack([iterate.x, iterate.y, iterate.theta])[:, ended]

@@ -153,12 +153,12 @@ def kernel(Law: type):
             if additions.momentum:
                 x, y, theta = iterate.x + iterate.dx, iterate.y + iterate.dy, iterate.theta + iterate.dtheta
                 net = with_momentum(net, x, y, theta, read_mass(samples, MASS), speed)
-            after, accepted, done = newton_step(iterate, net, slowest2, read_frame(samples, FRAME), descent, limits)
+            after, accepted, finished = newton_step(iterate, net, slowest2, read_frame(samples, FRAME), descent, limits)
             write_iterate(samples, ITERATE, after)
             for e in range(n + m):
                 for j in range(3):
                     store(v[e], j, where(accepted, load(v_next[e], j), load(v[e], j)))
-            store(ended, 0, where(done, 1.0, 0.0))
+            store(ended, 0, where(finished, 1.0, 0.0))
             for lane in range(WIDTH):
                 i = sample_of_lane[lane]
                 if i >= 0 and ended[0, lane] > 0.0:
@@ -219,7 +219,7 @@ def stacked(applies: bool, record) -> np.ndarray:
     return np.array(np.broadcast_arrays(*record), float) if applies else NO_ROWS
 
 
-def number_of_law(x) -> np.ndarray | float:
+def kernel_number(x) -> np.ndarray | float:
     """Return a number of a law as a float, an array as two-dimensional, the nodes of a rule as a column."""
     if np.ndim(x) == 0:
         return float(x)
@@ -235,7 +235,7 @@ def load_arguments(problem: Problem) -> tuple:
     ground = stacked(additions.quadratic or additions.memory, (p.quadratic_drag, *p.memory))
     inclines = tuple(stacked(additions.incline, c.incline) for c in (p.sides, p.points))
     frame = plain_arrays(*p.frame, p.law_speed_scale)
-    return tuple(map(number_of_law, p.law)), sides, points, terms, ground, inclines, frame
+    return tuple(map(kernel_number, p.law)), sides, points, terms, ground, inclines, frame
 
 
 def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) -> np.ndarray:

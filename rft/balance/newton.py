@@ -200,7 +200,7 @@ def with_momentum(net, x, y, theta, inertia, speed):
 
 
 @formula
-def residual_of(force, frame):
+def residual_norm(force, frame):
     """Return the larger of force and moment about the body's mean place, over the scale of force."""
     f_x, f_y, moment = force
     moment = moment - frame.x * f_y + frame.y * f_x
@@ -217,7 +217,7 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
     slowest2: square of the slowest element's speed after that step.
     """
     last = limits.rounding
-    residual, slowest = residual_of(net.force, frame), sqrt(slowest2)
+    residual, slowest = residual_norm(net.force, frame), sqrt(slowest2)
     fresh = iterate.fresh > 0.0
     rounding = iterate.rounding_next
     helps = (rounding < iterate.rounding) | (residual < iterate.residual) | (iterate.damping <= limits.least_damping)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.arrays import row, velocities
-from rft.balance.newton import VISCOUS, Limits, residual_of, solve3, to_element, to_frame
+from rft.balance.newton import VISCOUS, Limits, residual_norm, solve3, to_element, to_frame
 from rft.contact import Problem
 
 WIDEST = 10.0  # rounding to start from, over the scale of speed: no element is that fast
@@ -73,9 +73,9 @@ def _with_slope(nets: Callable, problem: Problem, xi, v, rounding) -> tuple[np.n
 def solve4(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return x (4, k, B) with matrix (4, 4, B) x = right; nan where the matrix is singular or no number."""
     matrix, right = np.moveaxis(matrix, -1, 0), np.moveaxis(right, -1, 0)
-    sound = np.abs(np.linalg.det(matrix)) > 0
-    x = np.linalg.solve(np.where(sound[:, None, None], matrix, np.eye(4)), right)
-    return np.moveaxis(np.where(sound[:, None, None], x, np.nan), 0, -1)
+    is_regular = np.abs(np.linalg.det(matrix)) > 0
+    x = np.linalg.solve(np.where(is_regular[:, None, None], matrix, np.eye(4)), right)
+    return np.moveaxis(np.where(is_regular[:, None, None], x, np.nan), 0, -1)
 
 
 class _Point(NamedTuple):
@@ -150,7 +150,7 @@ def follow(problem: Problem, limits: Limits, nets: Callable, correction: float, 
         new = new._replace(rounding=np.where(walk.last, limits.rounding, new.rounding))
         net, slope, evaluations = _with_slope(nets, walk.problem, *new)
         walk.evaluations = walk.evaluations + evaluations
-        residual = residual_of(net[:, 0], row(walk.problem.frame))
+        residual = residual_norm(net[:, 0], row(walk.problem.frame))
         solved = walk.last & (residual <= limits.residual)
         _correct(walk, new, net, slope, correction, limits.rounding)
         ended = solved | (walk.evaluations >= budget)

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import Number, require, shown
+from rft.checks import Number, formatted, require
 from rft.laws.base import cached_if_immutable
 
 Length = Annotated[
@@ -19,9 +19,9 @@ class Elements(NamedTuple):
     """Straight elements of a body in its frame, arrays (n, B) for n elements and B samples, lengths in body lengths.
 
     c, s: cosine and sine of the heading. r_t, r_n: velocity of the centre along and across the element at a unit
-    turning rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
+    rotation rate of the frame. half: (n, 1), half length, 0 for a point. weight: (n, 1), factor of the drag per length,
     which is the length of a piece of body. v_t, v_n, v_w: velocity with the frame held, along and across at the centre,
-    and turning rate times half length."""
+    and rotation rate times half length."""
 
     c: np.ndarray
     s: np.ndarray
@@ -80,7 +80,7 @@ class Body(Protocol):
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
     is_body = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
-    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
+    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {formatted(body)}")
     return body
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.vectors import formula, sqrt, where
 
 
@@ -17,9 +17,9 @@ class Medium(Protocol):
 
     ``dry`` holds rate-independent terms (q, k_t, k_n), each of which adds
 
-        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + eps^2),
+        f_t = k_t v_t / R,   f_n = k_n v_n / R,   R = sqrt(q^2 v_t^2 + v_n^2 + rounding^2),
 
-    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n; eps is the rounding. Together they give
+    and ``viscous`` the coefficients (c_t, c_n) of f_t = c_t v_t, f_n = c_n v_n. Together they give
     the exact averages of `rft.link`. A law of another form has neither (or None) and is averaged by quadrature.
 
     Only `traction` is required. Optional members:
@@ -75,12 +75,12 @@ class TermLaw:
     def traction(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the drag per unit length (f_t, f_n) opposing (v_t, v_n), in units of the axial drag; zero at rest."""
         v_t, v_n = np.asarray(v_t, float), np.asarray(v_n, float)
-        return terms_traction(numbers_of_terms(self), v_t, v_n, rounding)
+        return terms_traction(term_numbers(self), v_t, v_n, rounding)
 
     def slopes(self, v_t, v_n, rounding=0.0) -> tuple[np.ndarray, ...]:
         """Return (df_t/dv_t, df_t/dv_n, df_n/dv_t, df_n/dv_n); infinite slopes at rest are returned as 0."""
         v_t, v_n = np.broadcast_arrays(np.asarray(v_t, float), np.asarray(v_n, float))
-        return terms_slopes(numbers_of_terms(self), v_t, v_n, rounding)
+        return terms_slopes(term_numbers(self), v_t, v_n, rounding)
 
 
 class TermNumbers(NamedTuple):
@@ -90,7 +90,7 @@ class TermNumbers(NamedTuple):
     dry: np.ndarray
 
 
-def numbers_of_terms(medium) -> TermNumbers:
+def term_numbers(medium) -> TermNumbers:
     """Return the terms of a medium in closed form as arrays, those that act along the element first."""
     terms = sorted(medium.dry, key=lambda term: term[1] == 0.0)
     return TermNumbers(np.array([medium.viscous], float), np.array(terms, float).reshape(-1, 3))
@@ -162,7 +162,7 @@ def is_odd(medium: Medium) -> bool:
 def require_law(medium: Medium) -> None:
     """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
-    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {formatted(medium)}")
     if is_closed(medium):
         return
     name = f"{type(medium).__name__}.traction"

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft.checks import is_number
-from rft.laws.base import cached_if_immutable, is_closed, numbers_of_terms, require_law, terms_slopes, terms_traction
+from rft.laws.base import cached_if_immutable, is_closed, require_law, term_numbers, terms_slopes, terms_traction
 from rft.link import dry, sum_loads, viscous
-from rft.quadrature import QUADRATURE, by_nodes, nodes_of, parse, slopes_by_differences
+from rft.quadrature import QUADRATURE, by_nodes, nodes_and_weights, parse, slopes_by_differences
 from rft.vectors import formula, is_formula
 
 
@@ -54,22 +54,22 @@ def record(law, rule: str = "exact") -> Any:
     require_law(law)
     kind, count = rule_for(law, rule)
     if is_closed(law):
-        numbers = numbers_of_terms(law)._asdict()
+        numbers = term_numbers(law)._asdict()
         if kind == "exact":
             return Terms(**numbers)
         formulas = {"traction": terms_traction, "slopes": terms_slopes, "average": by_nodes}
-    nodes, weights = (x.reshape(1, 1, -1, 1, 1) for x in nodes_of((kind, count)))
+    nodes, weights = (x.reshape(1, 1, -1, 1, 1) for x in nodes_and_weights((kind, count)))
     if not is_closed(law):
         if not is_formula(type(law).traction):
             return Uncompiled(law, nodes, weights)
-        numbers = numbers_of(law)
+        numbers = law_numbers(law)
         slopes = getattr(type(law), "slopes", slopes_by_differences)
         formulas = {"traction": type(law).traction, "slopes": slopes, "average": by_nodes}
     cls = record_class(type(law).__name__, (*numbers, "nodes", "weights"), tuple(formulas.items()))
     return cls(*numbers.values(), nodes, weights)
 
 
-def numbers_of(law) -> dict[str, np.ndarray | float]:
+def law_numbers(law) -> dict[str, np.ndarray | float]:
     """Return the numbers that the formulas of a law read: its ``numbers``, or the numbers among its fields."""
     if hasattr(law, "numbers"):
         return law.numbers

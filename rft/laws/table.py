@@ -9,7 +9,7 @@ import numpy as np
 from rft.checks import real_array, require
 from rft.drag import rod_drag
 from rft.laws.base import require_drag
-from rft.vectors import absolute, at, copysign, floor, formula, minimum, sqrt, where
+from rft.vectors import absolute, copysign, floor, formula, gather, minimum, sqrt, where
 
 MOST_ROWS = 10_000
 MOST_CELLS = 4096  # of a curve on [0, 1]
@@ -98,11 +98,12 @@ def curve(x, pieces, cells, knots, steps):
     left end of each of N equal cells of [0, 1]. knots: (K + 1, 1), the last one beyond 1. steps: (S, 1), S the most
     knots in a cell."""
     a = minimum(absolute(x), 1.0)
-    piece = at(cells, floor(a * (1.0 * (len(cells) - 1))), 0)
+    piece = gather(cells, floor(a * (1.0 * (len(cells) - 1))), 0)
     for _ in range(len(steps)):
-        piece = piece + where(a >= at(knots, piece + 1.0, 0), 1.0, 0.0)
-    d = a - at(knots, piece, 0)
-    c3, c2, c1, c0 = at(pieces, piece, 0), at(pieces, piece, 1), at(pieces, piece, 2), at(pieces, piece, 3)
+        piece = piece + where(a >= gather(knots, piece + 1.0, 0), 1.0, 0.0)
+    d = a - gather(knots, piece, 0)
+    c3, c2 = gather(pieces, piece, 0), gather(pieces, piece, 1)
+    c1, c0 = gather(pieces, piece, 2), gather(pieces, piece, 3)
     return copysign(c0 + d * (c1 + d * (c2 + d * c3)), x), c1 + d * (2.0 * c2 + d * (3.0 * c3))
 
 

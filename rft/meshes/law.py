@@ -24,7 +24,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range, require, shown
+from rft.checks import Number, check_numbers, formatted, in_range, require
 from rft.ground.lead import jump, smoothstep
 
 TENSION = ("cut", "keep", "push")
@@ -115,7 +115,7 @@ class Spatial:
 
     def __post_init__(self):
         check_numbers(self)
-        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {shown(self.tension)}")
+        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {formatted(self.tension)}")
 
     @classmethod
     def from_grains(cls, density: float, friction: float, **more) -> Spatial:
@@ -142,6 +142,7 @@ class Spatial:
         return _by_rows(self._stress, n, v)
 
     def _stress(self, n: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Return `stress` (3, N) for n and v (3, N)."""
         speed = np.sqrt(np.einsum("iN,iN->N", v, v))
         v = v / np.where(speed > 0, speed, 1.0)
         return self.traction(n, v) * (self.lead(np.einsum("iN,iN->N", n, v), self.grazing_sine) * (speed > 0))

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.checks import real_array, require, shown
+from rft.checks import formatted, real_array, require
 from rft.metres import LARGEST
 
-MOST = 2_000_000  # triangles
+MOST_TRIANGLES = 2_000_000  # triangles
 LARGEST_FILE = 500_000_000  # bytes
 
 
@@ -38,10 +38,10 @@ class Mesh:
         require(vertices.ndim == 2 and vertices.shape[1:] == (3,), f"vertices must be (V, 3), got {vertices.shape}")
         valid = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
         require(valid, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
-        require(0 < len(faces) <= MOST, f"a mesh has 1 to {MOST:,} triangles, got {len(faces):,}")
+        require(0 < len(faces) <= MOST_TRIANGLES, f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}")
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         _require_known(faces, len(vertices))
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
+        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
         normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
         valid = normals is None or (normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all()))
         require(valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)")
@@ -73,6 +73,7 @@ class Mesh:
 
     @cached_property
     def _cross(self) -> np.ndarray:
+        """Normals (F, 3) times twice the areas, m^2."""
         a, b, c = self.vertices[self.faces.T]
         return np.cross(b - a, c - a)
 
@@ -250,4 +251,4 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         mesh = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
         return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
     except Exception as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise ValueError(f"{path} is no {kind.upper()} mesh: {shown(str(error))}") from None
+        raise ValueError(f"{path} is no {kind.upper()} mesh: {formatted(str(error))}") from None

@@ -9,16 +9,16 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range, require, shown
+from rft.checks import Number, check_numbers, formatted, in_range, require
 from rft.meshes import shapes
 from rft.meshes.blade import blade
-from rft.meshes.mesh import MOST, Mesh, mirrored, quartered, read
+from rft.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered, read
 from rft.meshes.smooth import smooth
 from rft.metres import metres
 
 FINEST = 327_680  # triangles of the mesh that stands for the truth in studies of accuracy
 HANDS = ("right", "left")
-MOST_TURNS = 100  # of a thread: more turns need more than `MOST` triangles
+MOST_TURNS = 100  # of a thread: more turns need more than `MOST_TRIANGLES` triangles
 
 
 class Solid:
@@ -29,7 +29,7 @@ class Solid:
 
     def mesh(self, triangles: int = 5000) -> Mesh:
         """Return the mesh of about ``triangles`` triangles, at least as many as the body needs, with smooth normals."""
-        in_range("triangles", triangles, 1, MOST, whole=True)
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         mesh = self.build(int(triangles))
         return smooth(mesh) if mesh.smooth_normals is None else mesh
 
@@ -50,7 +50,7 @@ class Sphere(Solid):
     radius: Annotated[float, metres("radius of the sphere")]
 
     def mesh(self, triangles: int = 5000) -> Mesh:
-        in_range("triangles", triangles, 1, MOST, whole=True)
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         flat = self.build(int(triangles))
         return dataclasses.replace(flat, smooth_normals=flat.vertices[flat.faces] / self.radius)
 
@@ -96,7 +96,7 @@ class Screw(Solid):
         message = "thickness must be 0, or from a thousandth of the pitch to less than that"
         within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
         require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
-        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {shown(self.handed)}")
+        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {formatted(self.handed)}")
         require(self.turns <= MOST_TURNS, f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}: length / pitch")
 
     @property
@@ -119,6 +119,7 @@ class Screw(Solid):
         return right if self.handed == "right" else mirrored(right)
 
     def _smooth(self, triangles: int) -> Mesh:
+        """Return the right-handed screw with a thread of a smooth profile."""
         size = math.sqrt(4 * math.pi * self.core * (self.length + 2 * self.core) / triangles)
         counts = _divisions(
             size, (2 * math.pi * self.core, 12), (self.length, 4), (math.hypot(self.core, self.nose), 1)
@@ -126,6 +127,7 @@ class Screw(Solid):
         return shapes.screw(self.radius, self.core, self.pitch, self.length, *counts, self.nose)
 
     def _bladed(self, triangles: int) -> Mesh:
+        """Return the right-handed screw whose thread is a blade."""
         high, slope = self.radius - self.core, 2 * math.pi * self.radius / self.pitch
         edge, slant = self.length * math.hypot(1.0, slope), math.hypot(self.core, self.nose)
         sides = edge * (2 * math.pi * self.core + 2 * high + self.thickness) + 2 * math.pi * self.core * slant
@@ -180,16 +182,16 @@ class MeshFile(Solid):
     smooth: bool = False
 
     def __post_init__(self):
-        require(isinstance(self.file, str), f"file must be the name of a mesh, got {shown(self.file)}")
+        require(isinstance(self.file, str), f"file must be the name of a mesh, got {formatted(self.file)}")
         check_numbers(self)
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
-        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {shown(self.smooth)}")
+        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
+        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {formatted(self.smooth)}")
         mesh = read(self.file, self.closed, self.scale)
         mesh = smooth(mesh) if self.smooth else mesh
         object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)
 
     def mesh(self, triangles: int = 5000) -> Mesh:
-        in_range("triangles", triangles, 1, MOST, whole=True)
+        in_range("triangles", triangles, 1, MOST_TRIANGLES, whole=True)
         mesh = self._mesh
         while 4 * len(mesh.faces) <= triangles:
             mesh = quartered(mesh)

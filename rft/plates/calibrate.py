@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.calibrate import widening
+from rft.calibrate import student_factor
 from rft.checks import in_range, real_array, require
 from rft.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
 
@@ -20,7 +20,7 @@ GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
 SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times the most that named media with own coefficients differ by
 DETERMINED = 0.9  # share of a coefficient that must come from the data, assumed
 FEWEST_DRAGS, FEWEST_DEPTHS = 6, 3
-MOST = 100_000
+MOST_ROWS = 100_000
 LARGEST = 1e12  # of any number; numbers below 1 / LARGEST count as 0
 STRENGTHS = (0.01, 100.0)  # bounds of zeta, more than a factor of 20 beyond all named media: else units are wrong
 EXACT = 1e-6  # least noise, over zeta
@@ -57,7 +57,7 @@ class StressFit:
     @property
     def intervals(self) -> np.ndarray:
         """Intervals (9, 2) of 95 %, N/cm^3."""
-        return self.values[:, None] + widening(self.free) * self.errors[:, None] * [-1.0, 1.0]
+        return self.values[:, None] + student_factor(self.free) * self.errors[:, None] * [-1.0, 1.0]
 
     @property
     def undetermined(self) -> list[str]:
@@ -98,7 +98,7 @@ class ZetaFit:
     @property
     def interval(self) -> np.ndarray:
         """Interval (2,) of 95 % of zeta."""
-        return self.zeta + widening(self.free) * self.error * np.array([-1.0, 1.0])
+        return self.zeta + student_factor(self.free) * self.error * np.array([-1.0, 1.0])
 
 
 def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
@@ -136,8 +136,9 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     require(bool((area >= 1 / LARGEST).all()), "the area of the plate must be above 0")
     order = np.argsort(depth, kind="stable")
     order = order[depth[order] > 1 / LARGEST]
-    require(FEWEST_DEPTHS <= order.size <= MOST, f"{FEWEST_DEPTHS} to {MOST} depths below the surface are needed, got "
-            f"{order.size}: depth is positive downwards")  # fmt: skip
+    needed = f"{FEWEST_DEPTHS} to {MOST_ROWS} depths below the surface are needed"
+    within = FEWEST_DEPTHS <= order.size <= MOST_ROWS
+    require(within, f"{needed}, got {order.size}: depth is positive downwards")
     d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
     per_zeta = float(StressMap()(0.0, math.pi / 2)[1]) * PER_CUBIC_METRE * a * d
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
@@ -164,7 +165,7 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     require(same, "beta, gamma, alpha_x and alpha_z must be equally many numbers")
     rows = np.stack(rows)
     require(bool((np.abs(rows) <= LARGEST).all()), f"plate drags must be finite numbers of at most {LARGEST:g}")
-    in_range("number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST, whole=True)
+    in_range("number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST_ROWS, whole=True)
     require(bool((np.abs(rows[2:]) > 1 / LARGEST).any()), "the plate drags are all 0: measure some force")
     return rows
 

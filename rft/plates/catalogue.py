@@ -18,6 +18,7 @@ class VerticalEntry:
 
 
 def _scaled(zeta: float, grains: str) -> VerticalEntry:
+    """Return the generic set times zeta, fitted to some grains."""
     return VerticalEntry(StressMap(zeta=zeta), f"generic set M0 times zeta = {zeta:g}, fitted to {grains}; {LI}")
 
 

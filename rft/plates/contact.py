@@ -12,7 +12,7 @@ import numpy as np
 
 from rft.ground.base import inverse_speed, strength_at
 from rft.ground.lead import mean_ramp, rounded
-from rft.laws.records import numbers_of, record_class
+from rft.laws.records import law_numbers, record_class
 from rft.plates.outline import Outline
 from rft.plates.stress import PER_CUBIC_METRE, PlateStress, alpha
 from rft.vectors import absolute, formula, is_formula, maximum, minimum, sqrt, where
@@ -148,7 +148,7 @@ def record(law: PlateStress):
     """Return the record of a stress map for both drivers: its numbers and its formulas; a map without formulas itself."""
     if not is_formula(type(law).alpha_ahead):
         return law
-    numbers = numbers_of(law) | {"cut": law.cut}
+    numbers = law_numbers(law) | {"cut": law.cut}
     formulas = (("alpha_ahead", type(law).alpha_ahead),)
     return record_class(type(law).__name__, tuple(numbers), formulas)(*numbers.values())
 

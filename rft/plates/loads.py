@@ -89,6 +89,7 @@ def parts(outline: Outline, pose, twist, side: float = 1.0) -> Part:
 
 
 def _triples(name: str, values) -> np.ndarray:
+    """Return poses or twists as an array (..., 3); ValueError unless they are finite numbers of that shape."""
     values = real_array(name, values)
     require(values.ndim > 0 and values.shape[-1] == 3, f"{name} must have shape (..., 3), got {values.shape}")
     require(bool(np.isfinite(values).all()), f"{name} must be finite")

@@ -42,6 +42,7 @@ class Drag(Motion):
         check_numbers(self)
 
     def trajectory(self, outline: Outline) -> Trajectory:
+        """Return the motion of an outline in time."""
         return _straight(self, 0.0, -self.depth, self.distance)
 
 
@@ -60,6 +61,7 @@ class Penetrate(Motion):
         self.require_downwards()
 
     def trajectory(self, outline: Outline) -> Trajectory:
+        """Return the motion of an outline in time."""
         x, z = outline.points.T
         lowest = (z * math.cos(self.attitude) - x * math.sin(self.attitude)).min()
         return _straight(self, 0.0, -lowest, self.depth / math.sin(self.direction))
@@ -84,6 +86,7 @@ class Rotate(Motion):
         self.require_turning()
 
     def trajectory(self, outline: Outline) -> Trajectory:
+        """Return the motion of an outline in time."""
         angle = np.linspace(self.start, self.stop, self.samples)
         t = (angle - self.start) / self.rate
         pose = np.stack([self.speed * t, np.full_like(t, self.hub_height), angle], -1)
@@ -121,6 +124,7 @@ class Path(Motion):
         return len(self.t)
 
     def trajectory(self, outline: Outline) -> Trajectory:
+        """Return the motion of an outline in time."""
         t, angle = np.array(self.t), self.angle or (0.0,) * len(self.t)
         pose = np.stack([self.x, self.z, angle], -1)
         return Trajectory(t, pose, np.gradient(pose, t, axis=0, edge_order=2))

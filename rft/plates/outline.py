@@ -11,7 +11,7 @@ from rft.checks import check_numbers, real_array, require
 from rft.metres import LARGEST, metres
 
 MOST_ELEMENTS = 5000
-FEW = 500  # elements up to which all pairs are compared at once, without loading SciPy's tree
+FEW_ELEMENTS = 500  # elements up to which all pairs are compared at once, without loading SciPy's tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +84,7 @@ def _area(points) -> float:
 
 
 def _cross(a, b):
+    """Return the cross products (...,) of vectors (..., 2) in the plane."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
@@ -106,7 +107,7 @@ def _check_simple(points, closed: bool) -> None:
 
 def _close(points, reach: float) -> np.ndarray:
     """Return the pairs (2, K) of points at most ``reach`` from each other, as indices, the smaller first."""
-    if len(points) <= FEW:
+    if len(points) <= FEW_ELEMENTS:
         difference = points[:, None] - points
         return np.array(np.nonzero(np.triu(np.hypot(difference[..., 0], difference[..., 1]) <= reach, 1)))
     from scipy.spatial import cKDTree

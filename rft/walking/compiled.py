@@ -17,7 +17,7 @@ from rft.walking.elements import BodyLoad, body_load, part_motion
 from rft.walking.planar import Robots, difference_steps, stage_residual
 from rft.walking.sdirk import (
     GAMMA,
-    SOLVED,
+    TOLERANCE,
     Effort,
     Step,
     has_ended,
@@ -110,7 +110,7 @@ def kernel(Law: type):
                 for j in range(len(angle)):
                     angle[j] = angles[s, b, j] + time * rate[j]
                 h, width, over = step.stage.part * lengths[s, b], effort.widths[int(step.newton.width), 0], False
-                k, tolerance = GAMMA * h, SOLVED * (rounding * width)
+                k, tolerance = GAMMA * h, TOLERANCE * (rounding * width)
                 ground = (strength, flux, rounding * width, grazing_sine * np.sqrt(width), downhill_loss)
                 evaluation = residual_of(law, ground, disturbed, robot, bodies[b], step, k, angle, rate, sums)
                 residual, slopes, power = evaluation

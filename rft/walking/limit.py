@@ -15,14 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.walking.planar import State
-from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, Strides
+from rft.walking.stride import FEW_STRIDES, LAST_CYCLES, MOST_STRIDES, SETTLED, Strides
 
-FARTHEST = 0.2  # scaled: a longer step of Newton's method is cut
-NUDGE = 1e-3  # scaled, for differences
-SHORT = 0.01  # scaled: slopes are computed afresh after a longer step, after one
-SLOW = 0.5  # that leaves more than this share of the residual, and after `FEW_STRIDES`
+FARTHEST = 0.2  # longest step of Newton's method, scaled
+NUDGE = 1e-3  # change of a start for differences, scaled
+# Slopes are computed afresh after a step longer than `SHORT`, after one that leaves more than the share `SLOW` of the residual,
+# and after `FEW_STRIDES` strides.
+SHORT = 0.01  # scaled
+SLOW = 0.5
 NEUTRAL = 1e-9  # determinant of identity - slopes, below which a push in some direction never decays
-RETURNS = 1.001  # largest eigenvalue of a map whose fixed point is stable
+LARGEST_EIGENVALUE = 1.001  # of a map whose fixed point is stable
 PREDICTED = 1000  # cycles, at most, that the slopes of a map predict
 
 
@@ -137,7 +139,7 @@ class _Search:
         failed = ~np.isfinite(step).all(-1) | (np.abs(np.linalg.det(matrix)) < NEUTRAL)
         near = ~failed & (np.maximum(far, size) <= SHORT)
         near &= self.drift[r] <= SETTLED * self.strides.reach[r] * self.strides.period
-        self.periodic[r] = near & (np.abs(np.linalg.eigvals(self.slopes[r])).max(-1) <= RETURNS)
+        self.periodic[r] = near & (np.abs(np.linalg.eigvals(self.slopes[r])).max(-1) <= LARGEST_EIGENVALUE)
         self.active[r] = ~near & ~failed
 
     def result(self) -> LimitCycles:
@@ -155,14 +157,14 @@ def _with_means(strides: Strides, limits: list[Limit], r, cycles: LimitCycles) -
     """Fill in the means over a few cycles of the robots r, from the states of ``limits``."""
     first = state = _concatenated([limits[k].state for k in r])
     places, count = [first.pose[:, 0]], strides.cycle
-    for k in range(LATE * count):
+    for k in range(LAST_CYCLES * count):
         state = strides.run(state, k, r)[1].take(-1)
         places.append(state.pose[:, 0])
     moved = np.diff(places[::count], axis=0) * strides.period
     cycles.progress[r], cycles.drift[r] = moved.mean(0), np.ptp(moved, axis=0)
-    error = (state.defect - first.defect) / LATE / count * strides.period / strides.frequency[r]
+    error = (state.defect - first.defect) / LAST_CYCLES / count * strides.period / strides.frequency[r]
     cycles.unsolved_error[r] = error
-    cycles.strides[r] += LATE * count
+    cycles.strides[r] += LAST_CYCLES * count
     cycles.ends[r] = strides.end_status(state, r)
     for j, k in enumerate(r):
         cycles.limits[k] = Limit(state.take([j]), 1)

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from rft.balance.backend import compiles
-from rft.vectors import at
+from rft.vectors import gather
 from rft.walking.planar import Robots, State
 from rft.walking.sdirk import (
     EFFORT,
     GAMMA,
-    SOLVED,
+    TOLERANCE,
     Effort,
     Step,
     has_ended,
@@ -66,13 +66,13 @@ def run_steps_by_numpy(robots: Robots, index, start: np.ndarray, angles, rates, 
     while column.size:
         robot, length = index[column], lengths[number, column]
         h, time = steps.stage.part * length, (stage_time(steps.stage) * length)[:, None]
-        width, rate = at(effort.widths, steps.newton.width, 0), rates[number, column]
+        width, rate = gather(effort.widths, steps.newton.width, 0), rates[number, column]
         ground, k = robots.ground_under(robot, width), GAMMA * h
         residual, slopes, power = robots.residual(
             robot, steps.stage.base, steps.stage.start, steps.newton.trial, angles[number, column] + time * rate, rate, k,
             ground,
         )  # fmt: skip
-        tolerance = SOLVED * ground.rounding
+        tolerance = TOLERANCE * ground.rounding
         newton, solved, failed = newton_step(
             steps.newton, residual, slopes, power, k, robots.reach[robot], tolerance, effort
         )

@@ -23,7 +23,16 @@ from rft.walking.facets import Grains
 from rft.walking.machine import FREE, HINGE, JOINT, SLIDE, Clock, machine
 from rft.walking.multibody import Multibody
 from rft.walking.robot import intervals, walking_rounding
-from rft.walking.stride import FEW_STRIDES, LATE, MOST_STRIDES, SETTLED, STUCK, Walk, compute_stride, cycles_to_settle
+from rft.walking.stride import (
+    FEW_STRIDES,
+    LAST_CYCLES,
+    MOST_STRIDES,
+    SETTLED,
+    STUCK,
+    Walk,
+    compute_stride,
+    cycles_to_settle,
+)
 
 REPEATED = 1e-2  # largest difference of the starts of strides that repeat, over the speed of the legs' ends
 STRAIGHT = 0.05  # rad, largest turn until the end of a walk whose strides are repeated along a line
@@ -180,7 +189,7 @@ class Simulation:
             ahead, left, _ = _moved(rows[0], rows[-1])
             turn = np.diff(np.unwrap(rows[:, ROW.index("yaw")])[[0, -1]])[0]
             return (np.array([ahead, left, turn]) / (rows[-1, 0] or np.inf)).tolist(), 0.0, ended
-        late = moves[-1:] if periodic else moves[-LATE:]
+        late = moves[-1:] if periodic else moves[-LAST_CYCLES:]
         if not periodic:
             drift = np.ptp(late[:, 0]) if len(late) > 1 else abs(late[0, 0])
         status = "stuck" if abs(late[:, 0].mean()) < STUCK * self.reach else "walking"

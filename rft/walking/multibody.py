@@ -19,7 +19,7 @@ import numpy as np
 
 from rft.checks import require
 from rft.walking.facets import Facets, Grains, Poses, Surface
-from rft.walking.sdirk import ENOUGH, FARTHEST, GAMMA, HALVINGS, LEAST, SOLVED
+from rft.walking.sdirk import FARTHEST, GAMMA, HALVINGS, LEAST_DECREASE, LEAST_SHARE, TOLERANCE
 
 ITERATIONS = 12  # of Newton's method
 WIDTHS = (30.0, 8.0, 3.0, 1.5, 1.0)  # factors of the rounding, one after another where Newton's method fails
@@ -153,21 +153,21 @@ class Multibody:
         if self.control:
             data.ctrl[:] = self.control(t, rate_time)
         velocity, residual = self._newton(q, v, guess, k)
-        if not residual <= SOLVED * self.grains.rounding:
+        if not residual <= TOLERANCE * self.grains.rounding:
             plain = self.grains
             for width in WIDTHS:
                 self.grains = replace(plain, rounding=width * plain.rounding)
                 velocity, residual = self._newton(q, v, velocity if np.isfinite(velocity).all() else guess, k)
             self.grains = plain
         self._step_residual = max(self._step_residual, residual)
-        solved = residual <= SOLVED * self.grains.rounding
+        solved = residual <= TOLERANCE * self.grains.rounding
         motor_power = float(data.qfrc_actuator @ data.qvel)
         losses = data.qfrc_applied + data.qfrc_passive - data.qfrc_spring + data.qfrc_constraint
         return velocity, solved, motor_power, -float(losses @ data.qvel)
 
     def _newton(self, q, v, guess, k) -> tuple[np.ndarray, float]:
         """Return velocities by Newton's method from a guess, and their residual, m/s; the data are those of the velocities."""
-        tolerance, data_match, velocity = SOLVED * self.grains.rounding, True, guess
+        tolerance, data_match, velocity = TOLERANCE * self.grains.rounding, True, guess
         farthest = FARTHEST * self.facets.reach.max() / k
 
         def largest_share(size):
@@ -178,12 +178,12 @@ class Multibody:
         size = np.abs(step * self.size).max()
         share = largest_share(size)
         for _ in range(ITERATIONS):
-            if size <= tolerance or share < LEAST * largest_share(size) or not np.isfinite(size):
+            if size <= tolerance or share < LEAST_SHARE * largest_share(size) or not np.isfinite(size):
                 break
             trial = velocity + share * step
             residual, trial_slope = self._residual(q, v, trial, k)
             trial_size = np.abs(_solve(slope, -residual) * self.size).max()
-            if trial_size <= (1.0 - ENOUGH * share) * size:
+            if trial_size <= (1.0 - LEAST_DECREASE * share) * size:
                 velocity, slope, data_match = trial, trial_slope, True
                 step = _solve(slope, -residual)
                 size = np.abs(step * self.size).max()

@@ -20,11 +20,11 @@ from rft.vectors import absolute, floor, formula, maximum, where
 
 ORDER = 2  # of the error in 1 / steps
 GAMMA = 1.0 - 0.5**0.5
-SOLVED = 1e-3  # residual of a solved stage over the rounding
+TOLERANCE = 1e-3  # largest residual of a solved stage, over the rounding
 HALVINGS = 3  # of a step
 FARTHEST = 0.5  # of a leg's reach, that a step of Newton's method moves a body by
-LEAST = 0.05  # share of a step of Newton's method, below which the method has failed
-ENOUGH = 0.1  # of the fall of the residual that Newton's method predicts
+LEAST_SHARE = 0.05  # share of a step of Newton's method, below which the method has failed
+LEAST_DECREASE = 0.1  # of the residual, over the decrease that Newton's method predicts
 
 
 class Effort(NamedTuple):
@@ -130,7 +130,7 @@ def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
     residual: a triple, m/s. slopes: of the residual, three columns. tolerance: of the residual, m/s."""
     # Not a number where any of the three is not.
     size = largest_speed(residual, reach) + 0.0 * (residual[0] + residual[1] + residual[2])
-    better = size <= (1.0 - ENOUGH * newton.share) * newton.residual
+    better = size <= (1.0 - LEAST_DECREASE * newton.share) * newton.residual
     x, z, pitch = solve3(slopes[0], slopes[1], slopes[2], residual)
     step = pick(better, (-x, -z, -pitch), newton.step)
     longest = 1.0 / maximum(1.0, largest_speed(step, reach) * k / (FARTHEST * reach))
@@ -139,7 +139,7 @@ def newton_step(newton, residual, slopes, power, k, reach, tolerance, effort):
     power = where(better, power[0], newton.power[0]), where(better, power[1], newton.power[1])
     tries, size = newton.tries + 1.0, where(better, size, newton.residual)
     solved = better & (size <= tolerance)
-    failed = (where(solved, np.inf, share) <= LEAST * largest) | (where(solved, 0.0, tries) >= effort.iterations)
+    failed = (where(solved, np.inf, share) <= LEAST_SHARE * largest) | (where(solved, 0.0, tries) >= effort.iterations)
     trial = plus(best, times(share, step))
     return Newton(newton.width, tries, best, trial, step, size, share, largest, power), solved, failed
 

@@ -50,6 +50,7 @@ class View:
         return self._pictures(renderer, states)
 
     def _pictures(self, renderer, states: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the pictures of `pictures`, the camera beside the body that walks."""
         camera, size = mujoco.MjvCamera(), float(np.ptp(self.triangles(states[0]).reshape(-1, 3), axis=0).max())
         camera.azimuth, camera.elevation, camera.distance = AZIMUTH, ELEVATION, DISTANCE * size
         with renderer:

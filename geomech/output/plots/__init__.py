@@ -31,10 +31,11 @@ from geomech.output.plots.measured import measured_figure
 from geomech.output.plots.motion import LINES, filmstrip, stage
 from geomech.output.plots.optimum import optimum_figure, optimum_map
 from geomech.output.plots.plates import penetration_figure, plates_figure
-from geomech.output.plots.precision import KNOB_MARKER, work_precision, work_precision_figure
+from geomech.output.plots.precision import KNOB_MARKER, walk_accuracy_figure, work_precision, work_precision_figure
 from geomech.output.plots.stretched import stretched_figure, stretched_map
 from geomech.output.plots.style import MARKED, STYLE, check_format, figure, quantity, save, styled
 from geomech.output.plots.styles import CCF_STYLES, CONNECTION_STYLES, ccf_contours, ccf_surface, streamlines, winding
+from geomech.output.plots.sweeps import curves, sweep_figure
 from geomech.output.plots.terradynamics import (
     draw_stress,
     elements_figure,
@@ -62,6 +63,7 @@ __all__ = [
     "certain",
     "check_format",
     "connection_figure",
+    "curves",
     "displacement",
     "displacement_figure",
     "drag_figure",
@@ -95,8 +97,10 @@ __all__ = [
     "stretched_figure",
     "stretched_map",
     "styled",
+    "sweep_figure",
     "unknown",
     "vector_field",
+    "walk_accuracy_figure",
     "winding",
     "work_precision",
     "work_precision_figure",

@@ -76,3 +76,21 @@ def work_precision_figure(results: Mapping):
     fig, axes = figure(5.0 * count, 5.2, count)
     work_precision(results, axes[0])
     return fig
+
+
+@styled
+def walk_accuracy_figure(results: dict):
+    """Error of the speed against each knob of a robot (`geomech.study.accuracy`)."""
+    fig, axes = figure(8.4, 2.9, len(results["lines"]))
+    labels = {"steps": "steps of a cycle", "elements": "elements of an outline", "rounding": "rounding (m/s)"}
+    for ax, line in zip(axes[0], results["lines"]):
+        value, error = np.array(line["value"], float), np.maximum(line["error"], 1e-12)
+        ax.loglog(value, error, "o-", color="black", lw=1.0)
+        sign = 1 if line["label"] == "rounding" else -1
+        slope = error.max() * (value / value[error.argmax()]) ** (sign * line["order"])
+        ax.loglog(value, slope, color="0.6", ls="--", lw=0.8, label=f"order {line['order']}")
+        ax.set(xlabel=labels[line["label"]], ylabel="error of the speed (m/s)")
+        ax.set_xticks(value, [f"{v:g}" for v in value], rotation=45)
+        ax.minorticks_off()
+        ax.legend(loc="best")
+    return fig

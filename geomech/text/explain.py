@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from geomech.core.errors import plain
 from geomech.gaits import KINDS as GAITS
-from geomech.output.system import described, engine
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
 from geomech.systems.premises import listed
+from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved
 from rft.premise import ALL

@@ -1,32 +1,29 @@
-"""Forces along a motion as text."""
+"""Forces along a motion, in lines."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from geomech.core.variables import Result
 from geomech.study.intrusion import Estimate
 
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
 
-def csv(columns: Mapping[str, np.ndarray]) -> str:
-    """The columns under their names, SI units and radians, all digits."""
-    rows = np.stack(list(columns.values()), -1).tolist()
-    return "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
-
-
-def as_json(scene, columns: Mapping[str, np.ndarray], error: Estimate) -> str:
-    """The columns, and the errors of force, N, and moment, N m; null where there are none."""
+def numbers(result: Result) -> dict[str, Any]:
+    """Return the columns, and the errors of force, N, and moment, N m; None where there are none."""
+    error, parts = result.attributes["error"], result.subject[0].parts
     known = {k: x if np.isfinite(x) else None for k, x in error._asdict().items()}
-    told = {"force": known["force"], "moment": known["moment"], f"from_{scene.parts}": error.count}
-    return json.dumps({**{k: v.tolist() for k, v in columns.items()}, "estimate": told})
+    told = {"force": known["force"], "moment": known["moment"], f"from_{parts}": error.count}
+    return {**{v.name: v.values.tolist() for v in result.variables}, "estimate": told}
 
 
-def told(scene, columns: Mapping[str, np.ndarray], found, error: Estimate) -> str:
-    """Extremes of force and moment, and where they are; their errors; work."""
+def text(result: Result) -> str:
+    """Return extremes of force and moment, and where they are; their errors; work."""
+    (scene, found), error = result.subject, result.attributes["error"]
+    columns = {v.name: v.values for v in result.variables}
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
     lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
     if matched := getattr(scene, "matched", ""):
@@ -38,7 +35,7 @@ def told(scene, columns: Mapping[str, np.ndarray], found, error: Estimate) -> st
         ends = [(columns[name][k], np.degrees(columns[place][k]) if place == "angle" else columns[place][k])
                 for k in (columns[name].argmin(), columns[name].argmax())]  # fmt: skip
         low, high = (f"{value + 0.0:.4g} at {place} = {where + 0.0:.4g} {UNITS[place]}" for value, where in ends)
-        lines.append(f"{name:8} {low}, to {high} ({'N' if name.startswith('force') else 'N m'})")
+        lines.append(f"{name:8} {low}, to {high} ({result[name].unit})")
     lines.append(f"error    {_error(scene, error)}")
     work = float(np.sum((found.power[1:] + found.power[:-1]) / 2 * np.diff(found.t)))
     lines.append(f"work     {work:.4g} J of the grains on the body; power at most {found.power.max():.4g} W")

@@ -1,13 +1,13 @@
-"""Connections as self-describing NetCDF (classic format, which every NetCDF library opens)."""
+"""Connections, their CCFs and what else a study tells of shape space, as variables of results."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
+from geomech.core.variables import Result, Variable
 from geomech.geometry import two_form
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -15,59 +15,38 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.tube import Known, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.files import whole_file
+from geomech.io.results import units_of, write_netcdf
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
-from geomech.systems.base import length_unit, shape_labels
+from geomech.study.tables import COMPONENTS
+from geomech.systems.base import System, length_unit, shape_labels
 from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored
 from geomech.systems.framed import Framed
 
-COMPONENTS = ("x", "y", "theta")
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 INTERVAL_OF_CCF = "half width of the interval of ccf"
-UNITS = {"BL": "body length", "m": "m"}
+INTERVAL_OF_A = "half width of the interval of A"
 
 
-class Variable(NamedTuple):
-    """One of a file, or of a data set of xarray."""
-
-    name: str
-    dimensions: tuple[str, ...]
-    values: np.ndarray
-    units: str
-    long_name: str
+def of_study(study: Study) -> Result:
+    """Return A (component, joint, alpha_1, ...), its fit residual, the rms of xi, the CCF with its estimated error, of each
+    pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
+    something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
+    read the file of it."""
+    labels = shape_labels(study.scene.system)
+    return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
 
 
 def save_connection(path: str | Path, study: Study) -> None:
-    """Write A (component, joint, alpha_1, ...), its fit residual, the rms of xi, the CCF with its estimated error, of each
-    pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
-    something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
-    read it. The file appears whole or not at all."""
-    write(path, attributes(study), study.fitted.axes, shape_labels(study.scene.system), variables(study))
-
-
-def write(path: str | Path, told: Mapping, axes, labels, found: Sequence[Variable]) -> None:
-    """A file of variables on the grid of ``axes``; told: its attributes; labels: (name, unit) of each shape variable. It
-    appears whole or not at all."""
-    from scipy.io import netcdf_file
-
-    with whole_file(path) as part, netcdf_file(part, "w", version=2) as file:
-        for key, value in told.items():
-            text = isinstance(value, str)  # SciPy keeps but seven digits of a float of Python's
-            setattr(file, key, attribute(value) if text else np.float64(value) if isinstance(value, float) else value)
-        _coordinates(file, axes, labels)
-        for name, dimensions, values, units, long_name in found:
-            for dimension, size in zip(dimensions, values.shape):
-                if dimension not in file.dimensions:
-                    file.createDimension(dimension, size)
-            _variable(file, name, values, dimensions, units, long_name)
+    """Write what `of_study` has as NetCDF; the file appears whole or not at all."""
+    write_netcdf(path, of_study(study))
 
 
 def attributes(study: Study) -> dict:
-    """Of a file of the scene's connection: what it is, what it rests on, and the scene's text."""
+    """Return what a scene's connection is, what it rests on, and the scene's text, as attributes of a file."""
     scene = study.scene
     numerics = (
         repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
@@ -87,17 +66,14 @@ def attributes(study: Study) -> dict:
 
 
 def variables(study: Study) -> list[Variable]:
-    """Of a file of the scene's connection, without its coordinates."""
+    """Return what a study tells of shape space, without its coordinates."""
     unit = length_unit(study.scene.system)
-    found = of_connection(study.fitted)
-    if (error := stored(study.scene.system, "A_error")) is not None:
-        found.append(of_error(error, unit))
+    found = of_connection(study.fitted, stored(study.scene.system, "A_error"))
     if isinstance(study.fitted, Tube):
         found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
-        found.append(of_ccf(study.curvature))
         what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
-        found.append(of_ccf(study.curvature_error, "ccf_error", what))
+        found.append(of_ccf(study.curvature, study.curvature_error, what))
     elif len(study.fitted.axes) > 2:
         found += of_pairs(study.two_form, two_form.error(study.fitted))
     if isinstance(study.scene.system, Framed):
@@ -115,23 +91,19 @@ def variables(study: Study) -> list[Variable]:
     return found
 
 
-def of_connection(fitted: Connection) -> list[Variable]:
-    """A, what its fit leaves, and the rms of xi."""
+def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
+    """Return A, what its fit leaves, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
     units = f"{units_of(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
     left = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
-        Variable("A", ("component", "joint", *angles), fitted.A, units, "local connection"),
+        Variable(
+            "A", ("component", "joint", *angles), fitted.A, units, "local connection", error, error_label=INTERVAL_OF_A
+        ),
         Variable("fit_residual", ("component", *angles), fitted.residual, units, left),
         Variable("speed", ("component", *angles), fitted.speed, units, speed),
     ]
-
-
-def of_error(error: np.ndarray, unit: str) -> Variable:
-    """Half widths (3, d, N_1, ...) of intervals of A."""
-    units, over = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)", angles_of(error.shape[2:])
-    return Variable("A_error", ("component", "joint", *over), error, units, "half width of the interval of A")
 
 
 def of_reach(tube: Tube) -> Variable:
@@ -174,11 +146,11 @@ def of_known(known: Known, unit: str) -> list[Variable]:
     ]  # fmt: skip
 
 
-def of_ccf(field: Field, name: str = "ccf", said: str = "") -> Variable:
-    """A CCF, or its error."""
+def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
+    """Return a CCF as a variable. what: its error is, in words."""
     units = f"{units_of(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
-    said = said or "curvature constraint function of joints 1 and 2"
-    return Variable(name, ("component", *angles_of(field.axes)), field.values, units, said)
+    said, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
+    return Variable(name, dims, field.values, units, said, None if error is None else error.values, error_label=what)
 
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
@@ -189,8 +161,15 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     said = f"curvature constraint function of joints {told}, in this order"
     return [
         Variable("pair_joints", ("pair", "first_and_second"), pairs, "1", "joints i < j of each pair"),
-        Variable("ccf_pairs", over, form.field.values, units, said),
-        Variable("ccf_pairs_error", over, error.field.values, units, ERROR_OF_CCF.replace("ccf", "ccf_pairs", 1)),
+        Variable(
+            "ccf_pairs",
+            over,
+            form.field.values,
+            units,
+            said,
+            error.field.values,
+            error_label=ERROR_OF_CCF.replace("ccf", "ccf_pairs", 1),
+        ),
     ]
 
 
@@ -234,23 +213,47 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
     ]
 
 
-def units_of(unit: str) -> str:
-    """A unit of lengths as files name it."""
-    return UNITS.get(unit, unit)
-
-
 def angles_of(axes) -> tuple[str, ...]:
     """Names of the axes of shape space."""
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
 
 
-def shapes(axes, labels) -> list[Variable]:
-    """The axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an angle between links."""
-    found = []
+def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -> list[Variable]:
+    """Return components, joints and the axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an
+    angle between links."""
+    found = [
+        Variable("component", ("component",), np.array(COMPONENTS)),
+        Variable("joint", ("joint",), np.arange(1, len(axes) + 1, dtype="i4")),
+    ]
     for k, (name, axis, (label, unit)) in enumerate(zip(angles_of(axes), axes, labels)):
         joint = f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
         found.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
     return found
+
+
+def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
+    """Return A, its fit residual and the rms of xi. shapes: names of the shape variables, where these are no joint angles."""
+    sized = {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": units_of(fitted.unit)}
+    found = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
+    return Result("connection", found, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
+
+
+def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
+    """Return a field; with rows x, y and theta it is a CCF, in its units."""
+    lead = values.values.shape[: -values.joints]
+    dims = (*(f"dimension_{k}" for k in range(len(lead))), *angles_of(values.axes))
+    field = of_ccf(values, name=name) if lead == (3,) else Variable(name, dims, values.values)
+    return Result("field", (*coordinates(values.axes, _labels(values.axes, shapes)), field), {}, values)
+
+
+def _labels(axes, names: Sequence[str]) -> list[tuple[str, str]]:
+    return [(name, "rad") for name in names or angles_of(axes)]
+
+
+def recorded(system: System) -> dict:
+    """Return what a system says of itself in the files of its connection."""
+    recorded = capability(system, Recorded)
+    return {} if recorded is None else dict(recorded.about())
 
 
 def about(scene: Scene) -> dict:
@@ -272,33 +275,3 @@ def about(scene: Scene) -> dict:
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
         "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
     }
-
-
-def recorded(system) -> dict:
-    recorded = capability(system, Recorded)
-    return {} if recorded is None else recorded.about()
-
-
-def attribute(text: str) -> bytes:
-    """In UTF-8; what is none in a file name is escaped."""
-    return text.encode("utf-8", "backslashreplace")
-
-
-def _coordinates(file, axes, labels) -> None:
-    width = max(map(len, COMPONENTS))
-    file.createDimension("component", len(COMPONENTS))
-    file.createDimension("component_length", width)
-    variable = file.createVariable("component", "c", ("component", "component_length"))
-    variable[:] = np.array([list(name.ljust(width, "\0")) for name in COMPONENTS], "S1")
-    variable._Encoding = "ascii"
-    file.createDimension("joint", len(axes))
-    file.createVariable("joint", "i4", ("joint",))[:] = np.arange(1, len(axes) + 1)
-    for name, dimensions, axis, units, long_name in shapes(axes, labels):
-        file.createDimension(name, len(axis))
-        _variable(file, name, axis, dimensions, units, long_name)
-
-
-def _variable(file, name, values, dimensions, units, long_name) -> None:
-    variable = file.createVariable(name, "f8", dimensions)
-    variable[:] = values
-    variable.units, variable.long_name = units, long_name

@@ -1,9 +1,11 @@
-"""An optimum as text, and as a scene file."""
+"""The best gait of a scene, in lines and as a scene file."""
 
 from __future__ import annotations
 
 import textwrap
+from typing import Any
 
+from geomech.core.variables import Result
 from geomech.optimise import Optimum
 from geomech.scene.write import toml
 from geomech.study.effort import METRIC
@@ -12,8 +14,18 @@ from geomech.systems.base import length_unit
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 
 
-def text(optimum: Optimum) -> str:
-    """What was found, in lines."""
+def numbers(result: Result) -> dict[str, Any]:
+    """Return what was found as `Optimum.numbers` has it."""
+    return result.subject.numbers()
+
+
+def text(result: Result) -> str:
+    """Return what was found."""
+    return told(result.subject)
+
+
+def told(optimum: Optimum) -> str:
+    """Return what was found, in lines."""
     aim, best, system = optimum.request.aim, optimum.best, optimum.scene.system
     towards = f" along {aim.direction}" if aim.direction else ""
     (x, y, theta), unit = best.displacement, length_unit(system)
@@ -31,8 +43,8 @@ def text(optimum: Optimum) -> str:
             "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",
             "power": aim.power and f"mean power {aim.power:g}",
         }
-        told = " and ".join(filter(None, limits.values()))
-        lines.append(f"frequency {best.gait.frequency:.6g} Hz, with {told}")
+        limited = " and ".join(filter(None, limits.values()))
+        lines.append(f"frequency {best.gait.frequency:.6g} Hz, with {limited}")
     lines.append(f"limits that it touches: {', '.join(optimum.active) or 'none'}")
     if optimum.request.starts > 1:
         lines += _found(optimum)
@@ -55,6 +67,6 @@ def _found(optimum: Optimum) -> list[str]:
 
 
 def scene_toml(optimum: Optimum) -> str:
-    """The scene with the best gait, and what it is, as a comment."""
-    told = textwrap.wrap(" ".join(text(optimum).splitlines()[:1]), 110)
-    return "".join(f"# {line}\n" for line in told) + "\n" + toml(optimum.scene)
+    """Return the scene with the best gait, and what it is, as a comment."""
+    about = textwrap.wrap(" ".join(told(optimum).splitlines()[:1]), 110)
+    return "".join(f"# {line}\n" for line in about) + "\n" + toml(optimum.scene)

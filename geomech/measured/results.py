@@ -1,0 +1,121 @@
+"""What a measured gait tells as a result: A, nan where the data do not reach, and all that a lookup near the gait takes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech.core.variables import Result, Variable
+from geomech.geometry.curvature import ccf
+from geomech.geometry.curvature import error as curvature_error
+from geomech.geometry.tube import BEYOND
+from geomech.io.results import units_of
+from geomech.measured.fit import Fitted, fit_log
+from geomech.scene.write import gait_table, table
+from geomech.study import fields
+from geomech.study.fields import INTERVAL_OF_CCF, angles_of
+from geomech.study.question import Allow, Progress, Question
+from geomech.study.tables import COMPONENTS
+
+ALONG = "fitted along the gait alone"
+
+
+def status(fit: Fitted) -> str:
+    """What of A is told, and why not all; with the cure, where joints depend on each other."""
+    if fit.across:
+        return "fitted"
+    if not fit.combined:
+        return f"{ALONG}: its cycles do not vary enough to tell A across it"
+    said = ", ".join(f"{fit.log.joints[k]} is {_sum(fit, factors)}" for k, factors in fit.combined.items())
+    names = ", ".join(fit.log.joints[k] for k in fit.combined)
+    return (
+        f"{ALONG}: {said}, but for constants and noise, which leaves A across it open: leave {names} out with --columns"
+    )
+
+
+def _sum(fit: Fitted, factors: np.ndarray) -> str:
+    """0.5 alpha_1 - 2 alpha_2."""
+    terms = (f"{x:.3g} {name}" for x, name in zip(factors, fit.log.joints) if x)
+    return " + ".join(terms).replace("+ -", "- ")
+
+
+@dataclass(frozen=True)
+class Fit(Question):
+    """The connection near a measured gait; as `fit_log` has it."""
+
+    log: Path
+    columns: tuple[str, ...] = ()
+    degrees: bool = False
+    level: float = 0.95
+    harmonics: int | None = None
+    within: float | None = None
+    body_length: float = 1.0
+
+    def inputs(self) -> list[Path]:
+        return [self.log]
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        found = fit_log(
+            self.log,
+            columns=self.columns,
+            degrees=self.degrees,
+            level=self.level,
+            harmonics=self.harmonics,
+            within=self.within,
+            body_length=self.body_length,
+        )
+        (net, off), (mean, mean_off) = found.displacement, found.mean
+        over, unit = ("component",), f"{found.unit} (x, y), rad (theta)"
+        told = (
+            Variable("component", over, np.array(COMPONENTS)),
+            Variable("displacement_measured", over, mean, unit, "mean of the log's cycles", mean_off),
+            Variable("displacement_predicted", over, net, unit, "of the mean gait, by the connection", off),
+        )
+        return Result("measured", told, {"status": status(found)}, found)
+
+
+def of_fit(fit: Fitted) -> Result:
+    """Return A with its error, the CCF of two joints, and all that a lookup near the gait takes; the NetCDF file of it is read
+    by `Connection.load` and [system] kind = "table"."""
+    tube, unit = fit.tube, fit.unit
+    error = tube.at_grid(tube.known.of_error)
+    found = [*fields.of_connection(tube, error), *fields.of_known(tube.known, unit), fields.of_reach(tube)]
+    if len(tube.axes) == 2:
+        found.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
+    axes = fields.coordinates(tube.axes, [(name, "rad") for name in angles_of(tube.axes)])
+    return Result("connection", (*axes, *found), _about(fit), fit)
+
+
+def _about(fit: Fitted) -> dict:
+    return {
+        "title": f"Local connection near the mean gait of the log {fit.log.name}",
+        "Conventions": "xi = + A alphadot; CCF = dA + [A, A], positive for counter-clockwise loops",
+        "method": "first-order Taylor series of A in the deviation from the mean gait, by regression over all cycles (Bittner, "
+        "Hatton and Revzen, Nonlinear Dynamics 94, 1933 (2018))",
+        "frame": "that of the log",
+        "frame_meaning": "body frame: the one whose x, y and heading were logged",
+        "body_length": float(fit.length),
+        "length_unit": units_of(fit.unit),
+        "components": "x, y, theta of the body velocity xi: along the heading, to the left, counter-clockwise",
+        "sign_of_A": "xi = + A alphadot",
+        "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",
+        "pair_of_ccf": "CCF_12 = dA_2 / dalpha_1 - dA_1 / dalpha_2 + [A_1, A_2]",
+        "interpolation": int(fit.tube.degree),
+        "singular_shapes": BEYOND,
+        "level": float(fit.known.level),
+        "error_factor": float(fit.known.factor),
+        "cycles": len(fit.measured),
+        "frequency": float(fit.frequency),
+        "columns": ", ".join(fit.log.joints),
+        "status": status(fit),
+    }
+
+
+def scene_toml(fit: Fitted, field: Path, scene: Path) -> str:
+    """A scene of the mean gait with the field's file, named by its place beside the scene."""
+    file = os.path.relpath(field.resolve(), scene.resolve().parent)
+    head = f"# The mean gait of {len(fit.measured)} cycles of {fit.log.name}, and the connection near it.\n"
+    return "\n".join([head, table("system", {"kind": "table", "file": file}), table("gait", gait_table(fit.gait))])

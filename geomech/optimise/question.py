@@ -1,0 +1,65 @@
+"""The best gait of a scene for an aim, as a question."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from geomech.core.errors import SceneError
+from geomech.core.variables import Result, Variable
+from geomech.optimise.limits import Asked
+from geomech.optimise.request import Request, checked
+from geomech.optimise.search import search
+from geomech.run.cost import Cost
+from geomech.scene.model import Scene
+from geomech.study.effort import why_none
+from geomech.study.question import Allow, Progress, Question
+from geomech.systems.base import length_unit
+
+
+@dataclass(frozen=True)
+class Optimize(Question):
+    """The best gait of a scene; as `optimise` has it. stretch: it is drawn where equal lengths cost the same, too."""
+
+    scene: Scene
+    aim: str
+    direction: str | None = None
+    harmonics: int | None = None
+    within: Asked = None
+    starts: int | None = None
+    rate: float | None = None
+    power: float | None = None
+    stretch: bool = False
+
+    @property
+    def title(self) -> str:
+        return f"{self.aim} of {self.scene.name}"
+
+    @cached_property
+    def request(self) -> Request:
+        return checked(
+            self.scene, self.aim, self.direction, self.harmonics, self.within, self.starts, self.rate, self.power
+        )
+
+    def check(self) -> None:
+        _ = self.request  # refuses what makes no sense
+        name, joints = self.scene.name, self.scene.system.joints
+        if self.stretch and joints != 2:
+            raise SceneError(f"{name}: --stretch takes two joints, this one has {joints}: drop it")
+        if self.stretch and (reason := why_none(self.scene.system)):
+            raise SceneError(f"{name}: {reason}: drop --stretch")
+
+    def cost(self) -> Cost:
+        return self.request.cost()
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        found = search(self.request, progress)
+        best, aim, unit = found.best, self.request.aim, length_unit(self.scene.system)
+        told = [Variable("value", (), best.value, aim.unit, aim.name, best.error)]
+        told += [
+            Variable(name, (), x, u, "net displacement per cycle")
+            for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad"))
+        ]
+        costs = (("path_length", best.length), ("work", best.work))
+        told += [Variable(name, (), x) for name, x in costs if x is not None]
+        return Result("optimum", tuple(told), {"active": found.active, "evaluations": found.evaluations}, found)

@@ -1,0 +1,77 @@
+"""Files that scenes take their parts from: connections, media, and scenes themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from geomech.core.errors import SceneError, choose
+from geomech.core.variables import Result
+from geomech.io.files import note, write_text
+from geomech.io.results import write_netcdf
+from geomech.io.tables import ORDERS, SIGNS
+from geomech.measured import results
+from geomech.output import mat
+from geomech.text import optimum
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Writes a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
+
+    ending: str
+    sign: str | None = None
+    order: str | None = None
+
+    def __post_init__(self) -> None:
+        for option, word, known in (("--sign", self.sign, SIGNS), ("--order", self.order, ORDERS)):
+            if word is not None:
+                choose(option, word, known)
+                if self.ending == ".nc":
+                    raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
+
+    @property
+    def matlab(self) -> bool:
+        return self.ending == ".mat"
+
+    def __call__(self, result: Result, path: Path) -> None:
+        if not self.matlab:
+            write_netcdf(path, result)
+            return
+        mat.save_connection(path, result.subject.study, self.sign or "+", self.order or "ndgrid")
+        if not self.sign:
+            note(f"{path} has {SIGNS['+']}; --sign - gives the other")
+
+
+def write_tube(result: Result, path: Path) -> None:
+    """Write the connection near a measured gait."""
+    write_netcdf(path, results.of_fit(result.subject))
+
+
+def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:
+    """Return what writes a scene of a measured gait, whose connection is in the file ``field``, and what checks its name."""
+
+    def check(path: Path) -> None:
+        if path.suffix != ".toml":
+            raise SceneError(f"cannot write {path}: end the name of a scene in .toml")
+        if field is None:
+            raise SceneError("--scene names the field's file: say -o FIELD.nc, too")
+
+    return lambda result, path: write_text(path, results.scene_toml(result.subject, field, path)), check
+
+
+def write_best(result: Result, path: Path) -> None:
+    """Write a scene with the best gait."""
+    write_text(path, optimum.scene_toml(result.subject))
+
+
+def write_medium(result: Result, path: Path) -> None:
+    """Write a medium that was calibrated."""
+    write_text(path, result.subject.toml())
+
+
+def about_medium(result: Result, path: Path) -> str:
+    """Return how a scene takes a medium."""
+    return f'medium in {path}: in {result.subject.scene}, [medium] file = "{path.name}"'

@@ -1,0 +1,136 @@
+"""Results as files of figures: functions of (result, path)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from geomech.core.errors import SceneError, choose
+from geomech.core.variables import Result
+from geomech.geometry import stretch
+from geomech.output import plots
+from geomech.study import tables
+from geomech.study.shape_space import Space
+from geomech.systems.base import shape_labels
+
+check = plots.check_format
+
+
+def displacement(result: Result, path: Path) -> None:
+    """Draw net displacements against amplitude."""
+    _, gait = result.subject
+    plots.save(plots.displacement_figure({type(gait).__name__.lower(): tables.table(result)}, [gait]), path)
+
+
+def sweep(result: Result, path: Path) -> None:
+    """Draw a sweep over one parameter or two."""
+    from geomech.study.sweep import Swept
+
+    plots.save(plots.sweep_figure(result.subject, Swept(result)), path)
+
+
+def intrusion(result: Result, path: Path) -> None:
+    """Draw forces along a motion."""
+    plots.save(plots.intrusion_figure(*result.subject), path)
+
+
+def stress(result: Result, path: Path) -> None:
+    """Draw a stress map."""
+    plots.save(plots.stress_figure(*result.subject), path)
+
+
+def measured(result: Result, path: Path) -> None:
+    """Draw a measured gait."""
+    plots.save(plots.measured_figure(result.subject), path)
+
+
+def calibration(result: Result, path: Path) -> None:
+    """Draw measurements and the law that was fitted to them."""
+    plots.save(getattr(plots, result.subject.picture)(result.subject.curves()), path)
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Draws the best gait. stretch: where equal lengths cost the same, too."""
+
+    stretch: bool
+    plot: Path | None
+
+    def __post_init__(self) -> None:
+        if self.stretch and self.plot is None:
+            raise SceneError("--stretch is a way to draw: say --plot FILE, too")
+
+    def __call__(self, result: Result, path: Path) -> None:
+        plots.save(plots.optimum_figure(result.subject, self.stretch), path)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Draws a connection as arrows or streamlines."""
+
+    style: str | None
+    plot: Path | None
+    pair: str | None
+    slice_: str | None
+    beside: str | None
+
+    def __post_init__(self) -> None:
+        if self.plot is None and not (self.style, self.pair, self.slice_, self.beside) == (None,) * 4:
+            raise SceneError("--style, --pair, --slice and --beside are those of a figure: say --plot FILE")
+        if self.style is not None:
+            choose("--style", self.style, plots.CONNECTION_STYLES)
+
+    def __call__(self, result: Result, path: Path) -> None:
+        space: Space = result.subject
+        scene = space.study.scene
+        told: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
+        if space.planes:
+            plots.save(plots.plane_connection_figure(space.planes, **told), path)
+            return
+        if space.beside:
+            told |= {"beside": space.beside.fitted, "names": [scene.frame, self.beside]}
+        plots.save(plots.connection_figure(space.study.fitted, **told), path)
+
+
+@dataclass(frozen=True)
+class Ccf:
+    """Draws a CCF with the scene's gait on it, or slices of it."""
+
+    style: str | None
+    metric: bool
+    stretch: bool
+    beside: str | None
+
+    def __post_init__(self) -> None:
+        if self.style is not None:
+            choose("--style", self.style, plots.CCF_STYLES)
+        if self.stretch and (self.metric or self.beside or self.style not in (None, "map")):
+            raise SceneError("--stretch is a map of its own: drop --style, --metric and --beside")
+        if self.metric and self.style not in (None, "map"):
+            raise SceneError(f"--metric draws on a map: drop --style {self.style}")
+
+    def __call__(self, result: Result, path: Path) -> None:
+        space: Space = result.subject
+        plots.save(self._slices(space) if space.planes else self._map(space), path)
+
+    def _slices(self, space: Space) -> Any:
+        scene, told = space.study.scene, {"style": self.style or "map"}
+        if space.planes_beside:
+            told |= {"beside": space.planes_beside[0], "names": [scene.frame, self.beside]}
+        return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **told)
+
+    def _map(self, space: Space) -> Any:
+        study, scene, other = space.study, space.study.scene, space.beside
+        told: dict[str, Any] = {
+            "gaits": [scene.gait],
+            "error": study.curvature_error,
+            "labels": shape_labels(scene.system),
+        }
+        if self.stretch:
+            effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
+            return plots.stretched_figure(study.curvature, stretch.stretch(study.metric), **told, effort=effort)
+        told |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
+        if other:
+            told |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.beside]}
+        return plots.ccf_figure(study.curvature, **told)

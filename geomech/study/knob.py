@@ -1,0 +1,28 @@
+"""One approximation of a question, with its settings from coarse to fine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+ROUNDING = 1e-13  # errors below this are rounding, and say nothing about a knob
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One approximation. order: of the error in 1/value, in value where that falls, as theory gives it. buys: what turning it
+    up buys, to complete a sentence. against: "truth", or "limit" of the knob alone. setting: the name of an entry of
+    [numerics], where that is not the knob's; loads for rules, whose prefix is ``rule``. tier: whose it is."""
+
+    name: str
+    values: tuple
+    order: Any
+    buys: str = ""
+    against: str = "truth"
+    tier: str = ""
+    setting: str = ""
+    rule: str = ""
+
+    @property
+    def label(self) -> str:
+        return f"{self.tier}: {self.name}" if self.tier else self.name

@@ -1,0 +1,51 @@
+"""The stress of the grains on a plate, by a stress map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from geomech.core.errors import SceneError
+from geomech.core.variables import Result, Variable
+from geomech.scene.stress import load_medium
+from geomech.study.question import Allow, Progress, Question
+from rft.plates import survey
+
+LARGEST_ANGLE = 1e6  # degrees
+
+
+@dataclass(frozen=True)
+class Stress(Question):
+    """Stress per unit depth at one tilt and direction, degrees, or, to be drawn, of the whole plane of them."""
+
+    medium: str
+    beta: float | None = None
+    gamma: float | None = None
+    drawn: bool = False
+
+    def inputs(self) -> list[Path]:
+        return [Path(self.medium)]
+
+    def check(self) -> None:
+        if (self.beta is None) != (self.gamma is None) or (self.beta is None and not self.drawn):
+            raise SceneError("give both --beta and --gamma, in degrees, or --plot for all angles")
+        if not all(x is None or abs(x) <= LARGEST_ANGLE for x in (self.beta, self.gamma)):
+            raise SceneError("--beta and --gamma must be finite angles in degrees, of at most 1e6")
+
+    def answer(self, progress: Progress, allow: Allow) -> Result:
+        law = load_medium(self.medium)
+        whole = survey(law)
+        told = f"{self.medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
+        facts, angles = {"told": told, "notes": [told] if whole.pushing else []}, None
+        if self.beta is None:
+            found = [Variable(name, (), getattr(whole, name), "1") for name in ("pulling", "pushing")]
+        else:
+            angles = self.beta, self.gamma
+            values = [np.round(float(x), 12) + 0.0 for x in law(*map(math.radians, angles))]
+            labels = "against the motion's x", "upwards"
+            names = "alpha_x", "alpha_z"
+            found = [Variable(*x, "N/cm^3", label) for *x, label in zip(names, ((), ()), values, labels)]
+        return Result("stress", tuple(found), facts, (whole, angles))

@@ -1,0 +1,209 @@
+"""The displacement of a gait by every tier, at settings from coarse to fine: what accuracy costs in a scene with a gait.
+
+Errors are distances between net positions in body lengths, rms over a few amplitudes up to the gait's own; the truth is the
+direct tier, far finer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from geomech.core.errors import SceneError, named
+from geomech.run.cost import Cost
+from geomech.scene.model import Scene, checked_scene
+from geomech.study import cost as foretold
+from geomech.study import estimate
+from geomech.study.bench import Study
+from geomech.study.knob import Knob
+from geomech.study.offer import tiers
+from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
+from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers.base import Plan
+from geomech.tiers.direct import DIRECT
+
+FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
+TRUTH_PHASES = 4096
+TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
+FINE_PIECES = 320  # of body, where effects cut it
+FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
+GRIDS = (7, 11, 15, 21, 31, 45, 61)
+NOTHING = "nothing that exact link integrals do not give for less"
+
+KNOBS = (
+    Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer", tier="direct"),
+    Knob("segments", (2, 4, 8, 16, 32, 64), "2; less with pivots in links", NOTHING, "limit", "direct", "loads", "midpoint"),
+    Knob(
+        "nodes", (2, 4, 8, 16, 32, 64), "spectral; about 1 to 2 with pivots in links", NOTHING, "limit", "direct", "loads",
+        "gauss",
+    ),
+    Knob(
+        "regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit", "direct",
+    ),
+    Knob(
+        "pieces", (5, 10, 20, 40, 80), "2 in the mean, scattered by pivots", "effects that vary along long links", "limit",
+        "direct",
+    ),
+    Knob(
+        "curves", (4, 6, 8, 12, 16, 24, 48), "4 if smooth, about 2 across kinks",
+        "every amplitude of one family from one table", tier="adapted",
+    ),
+    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table", tier="harmonic"),
+    Knob(
+        "harmonics", (1, 3, 5, 9, 15, 21), "1 to 2, set by the kinks",
+        "the part of the velocity that is not linear in alphadot", tier="harmonic",
+    ),
+    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further", tier="path"),
+    Knob("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit", "path"),
+    Knob("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit", "path"),
+    Knob("grid", GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits", tier="area"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A gait at fractions of its amplitude. runs: of each setting; of time stepping one, it is long enough to tell."""
+
+    scene: Scene
+    runs: int = 2
+
+    measures: ClassVar[tuple[str, ...]] = ("error",)
+    tolerances: ClassVar[np.ndarray] = 10.0 ** -np.arange(1, 7)
+    picture: ClassVar[str] = "work_precision_figure"
+
+    def __post_init__(self) -> None:
+        if checked_scene(self.scene).system.traits.steps:
+            object.__setattr__(self, "runs", 1)
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        return self.scene.gait.amplitude * FRACTIONS
+
+    def check(self) -> None:
+        """SceneError for a gait that does not move, or leaves the field that a knob turns."""
+        scene = self.scene
+        if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
+            raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+        tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
+        if any(table and table.axes for table in tables):
+            with named(scene.name):
+                Study(scene).refuse_outside()
+
+    def cost(self) -> Cost:
+        scene = self.scene
+        jobs = foretold.direct(scene, scene.gait, len(FRACTIONS), _truth_phases(scene), checked=False)
+        for knob in self.knobs():
+            jobs += [job for value in knob.values for job in self.runs * self._jobs(knob, value)]
+            jobs += self._jobs(knob, None) if knob.against == "limit" else []
+        return foretold.price(jobs)
+
+    def _jobs(self, knob: Knob, value: Any) -> list[foretold.Job]:
+        """Return those of a displacement at a setting."""
+        scene = self.at(knob, value)
+        plan = _plan(scene, knob.tier)
+        if not plan.exact:
+            return foretold.predicted(scene, plan, len(FRACTIONS))
+        return foretold.direct(scene, scene.gait, len(FRACTIONS), scene.numerics.phases, checked=False)
+
+    def prepared(self) -> Settings:
+        return self
+
+    def knobs(self) -> list[Knob]:
+        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
+
+    def at(self, knob: Knob | None, value: Any) -> Scene:
+        """Return the scene at a setting; of a knob at None as far as it goes, without a knob as the truth has it."""
+        scene = self.scene
+        if knob is None:
+            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
+            return finest.with_numerics(phases=_truth_phases(scene))
+        setting = knob.setting or knob.name
+        if value is not None:
+            return scene.with_numerics(**{setting: f"{knob.rule}:{value}" if knob.rule else value})
+        if setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
+            return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
+        return scene.with_numerics(**{setting: FINEST[setting]})
+
+    def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
+        """Return net poses (B, 3), with tables built anew so that their cost is counted."""
+        tier = knob.tier if knob else "direct"
+        return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
+
+    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        off = estimate.distance(found[0], truth[0]) / self.scene.system.length
+        return {"error": float(np.sqrt(np.mean(off**2)))}
+
+    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+        entry = {
+            "label": knob.label,
+            "tier": knob.tier,
+            "knob": knob.name,
+            "order": knob.order,
+            "against": knob.against,
+        }
+        return {**entry, "buys": knob.buys}
+
+    @property
+    def own_error(self) -> float:
+        """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
+        shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
+        return float(own_error(self.scene.system, *shapes)[..., 0].max())
+
+    def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
+        return cheapest(lines, tolerance, self.own_error)
+
+    def facts(self) -> dict[str, Any]:
+        own = self.own_error
+        units = {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"}
+        told = {"scene": self.scene.name, "amplitudes": self.amplitudes.tolist(), "units": units}
+        return {**told, **({"own_error": own} if own else {})}
+
+
+def applies(knob: Knob, scene: Scene) -> bool:
+    """Return whether a knob is one of a scene's."""
+    system, setting = scene.system, knob.setting or knob.name
+    if system.traits.linear and setting in ("regularisation", "directions"):
+        return False
+    if setting == "regularisation" and solver_of(system) is None:
+        return False
+    of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
+    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+        return False
+    if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
+        return False
+    return setting != "pieces" or pieces_of(system) > 0
+
+
+def _plan(scene: Scene, tier: str) -> Plan:
+    """Return how a tier predicts what a knob of it is swept for."""
+    return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
+
+
+def _truth_phases(scene: Scene) -> int:
+    return TRUTH_STEPS if scene.system.traits.steps else TRUTH_PHASES
+
+
+def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:
+    """Return the quickest measured setting whose error against the truth, with the system's own, is at most ``tol``; no tier if
+    there is none."""
+    found = [
+        (t, line, v, e + own)
+        for line in lines
+        if line["against"] == "truth"
+        for v, e, t in zip(line["value"], line["error"], line["seconds"])
+        if e + own <= tol
+    ]
+    if not found:
+        return {"tolerance": float(tol), "tier": None}
+    seconds, line, value, error = min(found, key=lambda f: f[0])
+    return {
+        "tolerance": float(tol),
+        "tier": line["tier"],
+        "knob": line["knob"],
+        "value": value,
+        "error": error,
+        "seconds": seconds,
+    }

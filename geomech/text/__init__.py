@@ -1,0 +1,24 @@
+"""Results in words: a kind has a module of its name.
+
+In it ``text(result)`` gives lines for a reader, and ``numbers(result)`` what JSON has of it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from geomech.core.variables import Result
+
+
+def text(result: Result) -> str:
+    """Return a result as lines."""
+    return _module(result).text(result)
+
+
+def numbers(result: Result) -> dict[str, Any]:
+    """Return a result as JSON takes it."""
+    return _module(result).numbers(result)
+
+
+def _module(result: Result) -> Any:
+    return import_module(f"geomech.text.{result.kind}")

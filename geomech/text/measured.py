@@ -1,0 +1,90 @@
+"""What a measured gait tells, in lines and as JSON has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from geomech.core.variables import Result
+from geomech.measured.fit import SHOWN, Fitted
+from geomech.measured.results import status
+from geomech.scene.write import gait_table
+
+
+def numbers(result: Result) -> dict[str, Any]:
+    return told(result.subject)
+
+
+def told(fit: Fitted) -> dict[str, Any]:
+    """What `geomech fit --json` prints. Triples are x, y and theta; intervals are (low, high) of each; A, its interval's half
+    width and the half width of the data at SHOWN phases of the gait."""
+    (net, off), (mean, mean_off) = fit.displacement, fit.mean
+    t = 2 * np.pi * np.arange(SHOWN) / SHOWN
+    A, error = fit.along(t)
+    apart, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
+    return {
+        "log": fit.log.name,
+        "rows": len(fit.log.t),
+        "columns": list(fit.log.joints),
+        "cycles": len(fit.measured),
+        "frequency": fit.frequency,
+        "phase_residual": fit.irregular,
+        "gait": gait_table(fit.gait),
+        "displacement_measured": mean.tolist(),
+        "displacement_predicted": net.tolist(),
+        "interval": np.stack([net - off, net + off], -1).tolist(),
+        "interval_measured": np.stack([mean - mean_off, mean + mean_off], -1).tolist(),
+        "coverage_level": fit.known.level,
+        "harmonics": fit.known.A.shape[-1] // 2,
+        "residual": fit.residual.tolist(),
+        "explained": fit.explained.tolist(),
+        "misfit": fit.misfit.tolist(),
+        "noise": dict(zip((*fit.log.joints, "x", "y", "heading"), fit.noise.tolist())),
+        "reach": reach(fit).tolist(),
+        "phase": t.tolist(),
+        "A": np.moveaxis(A, 0, -1).tolist(),
+        "A_error": np.moveaxis(error, 0, -1).tolist(),
+        "per_cycle": {
+            "measured": fit.measured.tolist(),
+            "predicted": fit.predicted.tolist(),
+            "rms": np.sqrt((apart**2).mean(0)).tolist(),
+        },
+        "body_length": fit.length,
+        "units": {"displacement": [fit.unit, fit.unit, "rad"], "frequency": "cycles per unit of t", "phase_residual": "rad",
+                  "residual": rates, "misfit": rates, "A": rates, "reach": "rad", "body_length": fit.unit},
+        "status": status(fit),
+    }  # fmt: skip
+
+
+def reach(fit: Fitted) -> np.ndarray:
+    """Half width, rad, of what the data reach across the gait, in the direction in which that is least, at SHOWN phases."""
+    spread = fit.known.spread
+    least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
+    return least[np.arange(SHOWN) * spread.shape[-1] // SHOWN]
+
+
+def text(result: Result) -> str:
+    """Return the same in lines."""
+    return described(result.subject)
+
+
+def described(fit: Fitted) -> str:
+    """Return what a measured gait tells, in lines."""
+    (net, off), (mean, mean_off), unit = fit.displacement, fit.mean, fit.unit
+    apart, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
+    lines = [
+        f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t; "
+        f"phase within {fit.irregular:.2g} rad of a uniform run through each",
+        f"displacement per cycle, with intervals of {fit.known.level:.3g} of cases:",
+        "            mean of the log        mean gait, by the connection   rms of a cycle: log - prediction",
+    ]
+    for k, (name, u) in enumerate((("x", unit), ("y", unit), ("heading", "rad"))):
+        pair = f"{mean[k]:11.6f} +-{mean_off[k]:7.1e}      {net[k]:11.6f} +-{off[k]:7.1e}"
+        lines.append(f"{name:>8}{pair}          {apart[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
+    told = "  ".join(f"{name} {100 * x:.3g} %" for name, x in zip(("x", "y", "heading"), fit.explained))
+    return "\n".join([
+        *lines,
+        f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explains of the body velocity {told}",
+        f"the data reach {wide.min():.3g} to {wide.max():.3g} rad from the mean gait; status: {status(fit)}",
+    ])  # fmt: skip
