@@ -18,7 +18,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import Cycle, Given, System, as_system, kind_of, note_angles
+from geomech.systems.base import Cycle, System, as_system, given, kind_of, note_angles
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
@@ -92,9 +92,9 @@ class Scene(Told):
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
-            system = _given(own.get("system", self.system))
+            system = given(own.get("system", self.system))
             for name in of_system:
-                choose("part", name, ["system", "gait", "numerics", "name", *[f.name for f in _fields(system)]])
+                choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
             if of_system:
                 own["system"] = dataclasses.replace(system, **of_system)
             return dataclasses.replace(self, **own)
@@ -103,11 +103,6 @@ class Scene(Told):
         """A gait, or the scene's own, run for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
-
-
-def _given(system: System) -> Any:
-    """Return what a user gave for a system."""
-    return system.given if isinstance(system, Given) else system
 
 
 def _fields(thing) -> tuple:

@@ -18,7 +18,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.scene.sections import Each, Keys, Section, sections_of, variants
-from geomech.systems.base import Given
+from geomech.systems.base import given
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
@@ -155,7 +155,7 @@ def _named(part: Any) -> Any:
     """Return the object inside a system that a scene file can name."""
     if isinstance(part, Framed):
         return _named(part.inner)
-    return part.given if isinstance(part, Given) else part
+    return given(part)
 
 
 def _numerics(scene: Scene) -> dict:

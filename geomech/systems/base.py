@@ -154,6 +154,11 @@ def as_system(given: Any, joints: int | None = None) -> System:
     return Given(given, joints, getattr(given, "length", 1.0), getattr(given, "traits", NOTHING))
 
 
+def given(system: Any) -> Any:
+    """Return what `as_system` was given."""
+    return system.given if isinstance(system, Given) else system
+
+
 def kind_of(system: Any) -> str:
     """Return the name of a kind of system, for messages."""
     return getattr(system, "kind", None) or getattr(system, "__name__", type(system).__name__)
