@@ -19,6 +19,7 @@ from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.knob import Knob
 from geomech.study.offer import tiers
+from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -110,14 +111,14 @@ class Settings:
         return self
 
     def knobs(self) -> list[Knob]:
-        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not self.scene.system.closed)]
+        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
 
     def at(self, knob: Knob | None, value: Any) -> Scene:
         """Return the scene at a setting; of a knob at None as far as it goes, without a knob as the truth has it."""
         scene = self.scene
         if knob is None:
-            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
-            finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
+            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
             return finest.with_numerics(phases=_truth_phases(scene))
         setting = knob.setting or knob.name
         if value is not None:
@@ -149,7 +150,7 @@ class Settings:
     def own_error(self) -> float:
         """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
-        return float(self.scene.system.own_error(*shapes)[..., 0].max())
+        return float(own_error(self.scene.system, *shapes)[..., 0].max())
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         return cheapest(lines, tolerance, self.own_error)
@@ -166,14 +167,14 @@ def applies(knob: Knob, scene: Scene) -> bool:
     system, setting = scene.system, knob.setting or knob.name
     if system.traits.linear and setting in ("regularisation", "directions"):
         return False
-    if setting == "regularisation" and system.solver is None:
+    if setting == "regularisation" and solver_of(system) is None:
         return False
     of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
         return False
     if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False
-    return setting != "pieces" or system.cut > 0
+    return setting != "pieces" or pieces_of(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:

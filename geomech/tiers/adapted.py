@@ -10,8 +10,8 @@ import numpy as np
 from geomech.core.errors import real_array
 from geomech.geometry import family
 from geomech.geometry.family import Family
-from geomech.systems.base import SHAPE_ALONE
 from geomech.tiers.base import Plan, Table, Tier, solved
+from rft.premise import SHAPE_ALONE
 
 
 def table(system, numerics, gait, amplitudes) -> Table:

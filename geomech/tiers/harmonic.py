@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.geometry import harmonics
 from geomech.geometry.harmonics import Harmonics
+from geomech.systems.capabilities import stored
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
 from geomech.tiers.direct import itself
@@ -55,7 +56,7 @@ def _axes(system, numerics) -> tuple[np.ndarray, ...]:
 
 
 def _build(system, numerics, progress: Callable | None) -> Harmonics:
-    if own := system.stored("harmonics"):
+    if own := stored(system, "harmonics"):
         return own
     count, degree = directions(system, numerics), numerics.interpolation
     known = {"highest": highest(system, numerics), "traits": system.traits}
