@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import in_range, require, shown
+from rft.checks import formatted, in_range, require
 from rft.drag import Rod, RodDrag
 from rft.effects.end_caps import EndCaps
 from rft.laws.base import Medium
@@ -166,7 +166,7 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
     if a parameter ends on a bound."""
     fitted_law = FITS[law]
     fits_caps = isinstance(end_caps, str)
-    require(not fits_caps or end_caps == "fitted", f"end caps must be 'fitted' or a number, got {shown(end_caps)}")
+    require(not fits_caps or end_caps == "fitted", f"end caps must be 'fitted' or a number, got {formatted(end_caps)}")
     if not fits_caps:
         in_range("end caps", end_caps, 0, MOST_CAPS)
     if end_caps:

@@ -58,7 +58,7 @@ def real_array(name: str, x) -> np.ndarray:
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ValueError(f"{name} must be real numbers in equal rows, got {shown(x)}")
+    raise ValueError(f"{name} must be real numbers in equal rows, got {formatted(x)}")
 
 
 def is_number(value) -> bool:
@@ -70,7 +70,7 @@ def in_range(name: str, value, low: float, high: float, whole: bool = False, uni
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
     if not (is_number(value) and low <= value <= high and (not whole or value == int(value))):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {shown(value)}")
+        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {formatted(value)}")
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
@@ -81,7 +81,7 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
     matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
-        f"covariance must be {allowed} finite numbers, got {shown(value)}",
+        f"covariance must be {allowed} finite numbers, got {formatted(value)}",
     )
     deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     scale = np.where(deviation > 0, deviation, 1.0)
@@ -91,12 +91,12 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
         is_symmetric
         and bool(np.linalg.eigvalsh(correlation)[0] >= -1e-9)
         and bool((matrix[:, deviation == 0] == 0).all()),
-        f"covariance must be symmetric and without negative eigenvalues, got {shown(value)}",
+        f"covariance must be symmetric and without negative eigenvalues, got {formatted(value)}",
     )
     return tuple(tuple(row) for row in matrix.tolist())
 
 
-def shown(value) -> str:
+def formatted(value) -> str:
     """Return repr(value) as one line of at most 60 characters."""
     try:
         text = " ".join(repr(value).split())

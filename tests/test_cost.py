@@ -1,34 +1,26 @@
 """Large requests: foretold, refused without --yes, stopped at once, kept as far as they got, and bounded in memory."""
 
 import contextlib
-import dataclasses
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future
 
 import numpy as np
 import pytest
-import tasks
 from scipy.io import netcdf_file
 from test_cli import geomech as run
 
 from geomech import scene as scenes
 from geomech import terminal
-from geomech.core.errors import SceneError
 from geomech.geometry import connection, harmonics
 from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.run import cost as run_cost
-from geomech.run import jobs
-from geomech.study import accuracy, cost, cycles, effort, estimate, motion, sweep
+from geomech.study import cycles, estimate, sweep
 from geomech.study.bench import Study
-from rft.balance.backend import preferring
-from rft.balance.listening import listener, listening, nobody
-from rft.effects import SkinFriction, Slope
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
@@ -41,200 +33,6 @@ FIVE_LINKS = (
     + '[gait]\nkind = "wave"\njoints = 4\namplitude = 0.4\n'
 )
 FIVE = scenes.parse(FIVE_LINKS)
-
-
-@pytest.fixture
-def solved():
-    """Counts the force balances that are solved."""
-    counts = []
-    with listening(lambda samples, points, linear: counts.append(samples)):
-        yield counts
-
-
-SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
-SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
-FOUND = {
-    "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
-    "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
-    "errors alone": (GLASS.with_numerics(grid=9, phases=40), ("path",)),
-    "a family": (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
-    "four joints": (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
-    "four joints, errors alone": (FIVE.with_numerics(grid=4, directions=16), ("path",)),
-    "around the gait": (FIVE.with_numerics(grid=15, directions=16, phases=16), ("area", "path", "direct")),
-    "linear": (VISCOUS, ("area", "path", "harmonic", "direct")),
-    "by a rule": (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
-    "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
-    "a backbone": (SNAKE, ("direct",)),
-    "a frame": (Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene, ("harmonic", "direct")),
-    "time stepping": (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
-    "place": (GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32), ("direct",)),
-}
-
-
-@pytest.mark.parametrize("name", FOUND)
-def test_the_balances_foretold_are_those_solved(name, solved):
-    scene, methods = FOUND[name]
-    foretold = Study(scene).cost([0.1, 0.2, 0.3], methods).balances
-    Study(scene).study([0.1, 0.2, 0.3], methods)
-    assert foretold == sum(solved)
-
-
-@pytest.mark.parametrize("scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)])
-def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
-    foretold = cost.price(cost.of_effort(scene, 3)).balances
-    effort.effort(scene, None, [0.1, 0.2, 0.3])
-    assert foretold == sum(solved)
-
-
-PLACE = FOUND["place"][0]
-
-
-@pytest.mark.parametrize(("scene", "cycles"), [(GLASS, 3), (PLACE, 3), (PLACE.with_numerics(cycles=2), 2)])
-def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
-    foretold = motion.cost(scene, cycles).balances
-    motion.motion(scene, cycles)
-    assert foretold == sum(solved)
-
-
-TABLES = {
-    "connection": (cost.connection, lambda study: study.fitted),
-    "harmonics": (cost.harmonics, lambda study: study.compute_harmonics()),
-    "metric": (cost.of_metric, lambda study: study.metric),
-    "even part": (cost.of_even_part, lambda study: study.even_part),
-    "plane": (lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]), lambda study: study.plane((0, 1))),
-}
-
-
-@pytest.mark.parametrize("name", TABLES)
-@pytest.mark.parametrize("grid", [7, 8])
-@pytest.mark.parametrize("scene", [GLASS, VISCOUS, SKIN])
-def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
-    scene, (jobs, compute) = scene.with_numerics(grid=grid), TABLES[name]
-    study = Study(scene)
-    if name == "even part":
-        study.compute_field()  # on whose grid it is
-    if name == "metric" and effort.why_none(scene.system):
-        pytest.skip("it has none")
-    solved.clear()
-    compute(study)
-    assert sum(solved) == cost.price(jobs(scene)).balances
-
-
-def test_accuracy_and_sweep_say_what_they_cost(solved):
-    scene = VISCOUS.with_numerics(grid=5)
-    foretold = accuracy.Accuracy(scene).cost().balances
-    accuracy.study(scene)
-    assert foretold == sum(solved)
-    media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
-    for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
-        foretold = sweep.Sweep(scene, over).cost().balances
-        solved.clear()
-        sweep.sweep(scene, over)
-        assert foretold == sum(solved)
-
-
-def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
-    """Ten times as many places, or batches, take ten times as long; a linear medium takes a tenth."""
-    with preferring("numpy"):
-        one, places, batches = (
-            run_cost.assumed(*x) for x in ((1e6, 3, False, 0), (1e6, 30, False, 0), (0, 0, False, 1e3))
-        )
-        assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
-        assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
-    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (100, 1000))  # each medium is a batch
-    assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
-        10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
-    )
-    together = {"medium.ratio": many["medium.ratio"][:100], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
-    assert sweep.Sweep(VISCOUS, together).cost().seconds < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
-
-
-class Clock:
-    """Computing time that passes as a request says it does."""
-
-    def __init__(self, monkeypatch):
-        self.now = 0.0
-        monkeypatch.setattr(run_cost.time, "process_time", lambda: self.now)
-
-    def solve(self, seconds, samples=1000, count=1):
-        """Batches that take so long each."""
-        for _ in range(count):
-            self.now += seconds
-            listener()(samples, 3, False)
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    with listening(nobody), preferring("numpy"):
-        yield Clock(monkeypatch)
-
-
-BATCH = 1000 * 3 * run_cost.BALANCE["numpy"] + run_cost.BATCH["numpy"]  # s that one is assumed to take
-
-
-@pytest.mark.parametrize("factor", [0.1, 1.0, 3.0])
-def test_the_first_batches_tell_what_the_others_take(factor, clock):
-    """The very first one, and one that is far off, have loaded code."""
-    judged = []
-    run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8, 1.0), judged.append)
-    assert run_cost.is_undecided()
-    clock.solve(9.0)
-    clock.solve(factor * BATCH)
-    clock.solve(25 * factor * BATCH)
-    assert judged == []
-    clock.solve(factor * BATCH, count=500)
-    (told,) = judged
-    assert told.seconds == pytest.approx(1 + factor * 30) and not run_cost.is_undecided()
-    assert (told.balances, told.memory) == (10**6, 1e8)
-
-
-@pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 700.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
-def test_what_is_sure_is_decided_at_once(cost, clock):
-    """Little, very much, much memory, or much that is no balances."""
-    judged = []
-    run_cost.decide(run_cost.Cost(*cost), judged.append)
-    assert judged == [run_cost.Cost(*cost)] and not run_cost.is_undecided()
-
-
-class Others:
-    """Who begin at once, and are given what they compute."""
-
-    remote, patience = True, None
-
-    def __init__(self):
-        self.given = 0
-
-    def submit(self, task, *arguments):
-        assert not run_cost.is_undecided()
-        self.given, future = self.given + 1, Future()
-        future.set_result(task(*arguments))
-        return future
-
-    def ahead(self):
-        return 1
-
-
-def test_others_compute_once_it_is_decided(clock):
-    others, found = Others(), []
-    run_cost.decide(run_cost.Cost(10**6, 30.0, 1e8), lambda told: None)
-    with jobs.running(dataclasses.replace(jobs.runner(), executor=others)):
-        for x in jobs.runner().map(tasks.doubled, 2.0, range(8), 8):
-            found.append(x)
-            clock.solve(1.0)
-    assert found == [2.0 * x for x in range(8)] and others.given == 8 - 1 - run_cost.FEWEST
-
-
-def test_what_is_refused_leaves_nothing(tmp_path, clock):
-    def refused():
-        with jobs.storing(tmp_path / ".a.partial", keep=True) as runner:
-            runner.store.put(b"key", 1.0, float)
-            runner.store.commit()
-            run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8), lambda told: told.check("here", False))
-            clock.solve(1.0, count=9)
-
-    with pytest.raises(SceneError, match="here: 1,000,000 force balances, about"):
-        refused()
-    assert list(tmp_path.iterdir()) == []
 
 
 LARGE = {
@@ -306,18 +104,6 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
 
-def test_a_cost_reads_well():
-    assert str(run_cost.Cost(1_000_000, 90.0, 2.1e9)) == (
-        "1,000,000 force balances, about 1.5 min of computing and 2.1 GB of memory"
-    )
-    assert "about 14 h" in str(run_cost.Cost(1, 5e4, 0)) and "about 116 days" in str(run_cost.Cost(1, 1e7, 0))
-    run_cost.Cost(1, 59.0, 1.9e9).check("here", False)
-    for beyond in (run_cost.Cost(1, 61.0, 1.0), run_cost.Cost(1, 1.0, 2.1e9)):
-        beyond.check("here", True)
-        with pytest.raises(SceneError, match="here: 1 force balances"):
-            beyond.check("here", False)
-
-
 def test_pieces_change_no_numbers(monkeypatch):
     """What is computed in groups is what it is at once."""
     scene = GLASS.with_numerics(grid=7, phases=48, harmonics=5)
@@ -332,6 +118,7 @@ def test_pieces_change_no_numbers(monkeypatch):
 
     whole = everything()
     monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
     monkeypatch.setattr("geomech.systems.swimmer.STEPPED_TOGETHER", 1)
     for module in (
         connection,

@@ -10,6 +10,7 @@ import rft
 from geomech import cli
 from geomech.gaits import Circle
 from geomech.measured import synthetic
+from geomech.study import effort
 
 SMALL = """[medium]\nname = "glass-0.3mm-loose"\n[body]\nkind = "chain"\nlengths = [1, 1.4, 0.8]\n
 [gait]\nkind = "ellipse"\nsemi_axes = [0.8, 0.5]\n[numerics]\ngrid = 7\nphases = 32\nharmonics = 5\nextent = 2.0\n"""
@@ -158,16 +159,17 @@ def test_what_the_user_can_mend_ends_with_2(name, ended):
 
 
 def failing(monkeypatch, how):
-    """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the third,
+    """Batches of body velocities that fail, all saying so, or one of them raising; of an interrupted `run` the second,
     when there is something in its folder."""
     solve, calls = rft.body_velocity, []
+    effort._even.cache_clear()  # it asks for velocities, too
 
     def fails(*args, **kwargs):
         calls.append(1)
         if how == "unconverged":
             found = solve(*args, **kwargs)
             return found._replace(status=np.full(found.status.shape, "unconverged"))
-        if len(calls) == (3 if "run" in sys.argv and how is interrupt else 1):
+        if len(calls) == (2 if "run" in sys.argv and how is interrupt else 1):
             how()
         return solve(*args, **kwargs)
 
@@ -200,7 +202,8 @@ def test_what_is_stopped_leaves_nothing_half_written(name, how, ends, said, ende
     code, out, err, files = ended(*arguments(name))
     assert calls
     assert (code, out) == (ends, "")
-    assert files == set()
+    stored = {".out.partial"} if "the same command goes on from there" in err else set()
+    assert files == stored and (not stored or how is interrupt)
     assert said in err
     assert err == "" or err.startswith("error: ")
 

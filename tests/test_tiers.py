@@ -8,7 +8,7 @@ from registry import GAITS, MEDIA
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
-from geomech.gaits import Butterfly, Circle, Fourier
+from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry import connection, family, harmonics
 from geomech.output import plots
 from geomech.scene import Numerics, Scene
@@ -16,8 +16,10 @@ from geomech.study import estimate
 from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
 from geomech.systems import Swimmer
+from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, se2
+from rft.balance.listening import listening
 
 GLASS = scenes.load("three-link-glass")
 BENCH = Study(GLASS)
@@ -263,6 +265,29 @@ def test_look_up_estimates_cover_the_truth(truths):
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
+
+
+def test_a_tier_is_one_expression(monkeypatch):
+    """The constant of the connection alone, looked up where the path tier looks: predicted, counted, and judged like any."""
+
+    def plan(system, numerics, gait, amplitudes):
+        straight = lambda A, some: direct(lambda a, u: np.einsum("...ij,...j->...i", A(0 * a), u), gait, some, 64)
+        return Plan(straight, fitted.table(system, numerics))
+
+    leading = Tier("leading", "A at the straight pose", {"color": "k"}, plan, joints=range(2, 3))
+    monkeypatch.setitem(TIERS, "leading", leading)
+    scene, counts = GLASS.with_numerics(grid=9), []
+    study = Study(scene)
+    foretold = study.cost([0.05, 1.0], ["path", "leading", "direct"]).balances
+    with listening(lambda samples, points, linear: counts.append(samples)):
+        table = study.study([0.05, 1.0], ["path", "leading", "direct"])
+    assert foretold == sum(counts) and [*table["seconds"]] == ["field", "direct", "leading", "path"]
+    off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
+    assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
+    assert "leading" in study.tiers and "leading" in study.methods and "leading" in study.lookups
+    assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
+    with pytest.raises(SceneError, match="the leading tier takes a body of joints, this body has 4: use direct"):
+        Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")
 
 
 MANY = np.linspace(0.3, 2.0, 201)

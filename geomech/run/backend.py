@@ -10,12 +10,12 @@ from geomech.core import version
 from rft import SOLVER
 from rft.balance import backend
 from rft.balance.backend import prefer, preferred, preferring
-from rft.balance.listening import listen, listener
+from rft.balance.listening import listen, listener, nobody
 from rft.threads import cores, one_thread
 
 __all__ = [
-    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "one_thread", "prefer", "prefer_for",
-    "preferred", "preferring", "suiting",
+    "BACKENDS", "VERSION", "at_most", "cores", "fastest", "listen", "listener", "nobody", "one_thread", "prefer",
+    "prefer_for", "preferred", "preferring", "suiting",
 ]  # fmt: skip
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from geomech.core.errors import SceneError
-from geomech.run.backend import listen, listener, preferred
+from geomech.run.backend import listen, listener, nobody, preferred
 
 LONGEST = 60.0  # s of computing that a command begins without being told to
 LARGEST = 2e9  # bytes of memory, likewise
@@ -67,9 +67,9 @@ class Cost(NamedTuple):
             raise TooLong(f"{place}: {self}: to compute for more than {limits} say --yes, or {less}")
 
 
-def assumed(samples: float, points: int, linear: bool, batches: float) -> float:
-    """Return the seconds that balances take, so many in all in so many batches."""
-    back_end = preferred()
+def assumed(samples: float, points: int, linear: bool, batches: float, back_end: str = "") -> float:
+    """Return the seconds that balances take, so many in all in so many batches, by the preferred back end or another."""
+    back_end = back_end or preferred()
     return samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end] + batches * BATCH[back_end]
 
 
@@ -78,10 +78,12 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     it raises ends the request."""
     of_balances = cost.seconds - cost.besides
     tells_enough = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
-    if tells_enough or cost.memory > LARGEST:
+    decided = tells_enough or cost.memory > LARGEST
+    listen(
+        nobody if decided else _Watch(cost, judge)
+    )  # what an earlier part of the request took says nothing of this one
+    if decided:
         judge(cost)
-    else:
-        listen(_Watch(cost, judge))
 
 
 def is_undecided() -> bool:
@@ -94,6 +96,7 @@ class _Watch:
 
     def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
         self.cost, self.judge, self.over = cost, judge, False
+        self.back_end = preferred()  # which threads of the solver do not know
         self.last: float | None = None
         self.batches: list[tuple[float, float]] = []  # (seconds, those assumed)
 
@@ -102,7 +105,7 @@ class _Watch:
             return
         now = time.process_time()
         if self.last is not None:
-            self.batches.append((now - self.last, assumed(samples, points, linear, 1)))
+            self.batches.append((now - self.last, assumed(samples, points, linear, 1, self.back_end)))
         self.last = now
         if len(self.batches) >= FEWEST and sum(took for took, _ in self.batches) >= ENOUGH:
             self.over = True

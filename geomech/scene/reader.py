@@ -108,8 +108,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
-            cure = f"add it, 'geomech keys {path}' has its keys; {source.cure}"
-            raise SceneError(f"{place}: the table [{within}] is missing: {cure}")
+            raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
     if variant.file:
         table = _from_file(place, table, variant)
     return build(source, place, table, variant.kind, inner, label)

@@ -24,7 +24,8 @@ from geomech.run.progress import progress as shown
 from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
-from geomech.study.offer import METHODS, methods, tiers
+from geomech.study.offer import METHODS as METHODS
+from geomech.study.offer import methods, tiers
 from geomech.study.results import Displacements
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
@@ -219,7 +220,7 @@ class Study(Faced):
         return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
-        """Net pose per cycle (..., 3) by one tier of METHODS for amplitudes (...,), of a gait or the scene's own."""
+        """Net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
         with named(scene.name):
             plan = self.plan(method, gait, amplitudes)
@@ -252,7 +253,7 @@ class Study(Faced):
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
     ) -> dict:
-        """A table (`geomech.study.tables.table`) of the net poses by tiers of METHODS, with their errors, and besides
+        """A table (`geomech.study.tables.table`) of the net poses by tiers of TIERS, with their errors, and besides
         {"seconds": {...}, "kept": [...]}.
 
         estimate, estimate_heading: errors (`geomech.study.estimate`), in the unit of the poses, and rad.
@@ -267,7 +268,10 @@ class Study(Faced):
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
         size = [self.scene.system.length, 1.0]  # estimates are in body lengths
-        for method in sorted(chosen, key=METHODS.index, reverse=True):  # direct first: the others are checked with it
+        order = [*TIERS]
+        for method in sorted(
+            chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
+        ):  # others are checked with direct
             if chosen[method].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
                 reference, seconds[method] = timed(direct)
@@ -312,7 +316,7 @@ class Study(Faced):
         if amplitudes.ndim != 1:
             raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
         if isinstance(methods, str) or not isinstance(methods, Sequence):
-            raise SceneError(f"{scene.name}: methods must be a list of {', '.join(METHODS)}, got {short(methods)}")
+            raise SceneError(f"{scene.name}: methods must be a list of {', '.join(TIERS)}, got {short(methods)}")
         with named(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
@@ -327,7 +331,7 @@ class Study(Faced):
 
 
 def _tier(name: str) -> Tier:
-    return TIERS[choose("methods", name, METHODS)]
+    return TIERS[choose("methods", name, TIERS)]
 
 
 def timed(f: Callable) -> tuple[Any, float]:

@@ -21,7 +21,7 @@ from geomech.study.grid import Grid, at_points
 from geomech.systems.base import length_unit
 
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
-MAKING = 3e-4  # s that a scene takes to be made of its tables; assumed
+MAKING = 6e-4  # s that a scene takes to be made of its tables, measured
 SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
 WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"

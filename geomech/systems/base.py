@@ -18,9 +18,9 @@ from rft.premise import ALL, NONE, SHAPE_ALONE, Premise, negated
 
 __all__ = ["ALL", "NONE", "SHAPE_ALONE", "Cycle", "Plain", "Premise", "System", "checked_system", "negated"]
 
-# Of gaits run side by side, angles and velocities, a batch of which takes some 30 MB with what is made of them: more take
+# Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
 # no less time each, and the first of a long request is soon done, which tells how long the others take.
-VALUES_TOGETHER = 1 << 18
+VALUES_TOGETHER = 1 << 20
 
 
 class Cycle(NamedTuple):

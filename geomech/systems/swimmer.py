@@ -16,7 +16,7 @@ from geomech.core.work import iterate
 from geomech.geometry.images import Around, around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import NONE, SHAPE_ALONE, Cycle, Plain, Premise, refuse_mutable
+from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
 from geomech.systems.said import Said
 from geomech.systems.solver import Solver
 from rft.balance.solver import ELEMENTS_TOGETHER
@@ -273,7 +273,7 @@ class Swimmer(Said, Plain):
         if any(map(np.ndim, batched)):
             return sys.maxsize  # a parameter for each amplitude: they belong together
         if not self.traits.steps:
-            return super().at_once(phases)
+            return max(1, VALUES_TOGETHER // (phases * max(self.joints + 6, 2 * self.elements)))
         # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
         return max(1, STEPPED_TOGETHER // max(phases * (self.joints + 6), 4 * self.elements + self.held // 8))
 

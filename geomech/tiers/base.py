@@ -50,7 +50,7 @@ class Numerics:
             raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """What is computed once for a system, and looked up from then on.
 
@@ -78,7 +78,7 @@ def undecided(table: Any, amplitudes) -> None:
     """Return None, the spread of a prediction that leaves no choice."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """How a tier predicts displacements of one gait of one system.
 
@@ -99,7 +99,7 @@ class Plan:
     read: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tier:
     """A way to predict displacements.
 

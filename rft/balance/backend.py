@@ -12,7 +12,7 @@ import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.laws.records import is_compilable
 
 BACKENDS = ("auto", "numpy", "numba")
@@ -25,7 +25,7 @@ class Note(UserWarning):
 def check(backend: str) -> None:
     """Raise ValueError unless a back end exists and is installed."""
     if not (isinstance(backend, str) and backend in BACKENDS):
-        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {shown(backend)}")
+        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {formatted(backend)}")
     require(
         backend != "numba" or installed(), "backend = 'numba' takes numba: pip install 'geomech[fast]', or take 'auto'"
     )

@@ -13,7 +13,7 @@ import numpy as np
 
 from rft.bodies.base import Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
-from rft.checks import Number, check_numbers, require, shown
+from rft.checks import Number, check_numbers, formatted, require
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Serpenoid(Backbone):
     def __post_init__(self):
         super().__post_init__()
         in_bounds = 0 < self.waves <= self.elements / 4
-        require(in_bounds, f"waves must be > 0 and at most elements / 4, got {shown(self.waves)}")
+        require(in_bounds, f"waves must be > 0 and at most elements / 4, got {formatted(self.waves)}")
 
     @property
     def joints(self) -> int:

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import Number, require, shown
+from rft.checks import Number, formatted, require
 from rft.laws.base import cached_if_immutable
 
 Length = Annotated[
@@ -80,7 +80,7 @@ class Body(Protocol):
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
     is_body = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
-    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {shown(body)}")
+    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {formatted(body)}")
     return body
 
 

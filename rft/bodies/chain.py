@@ -12,7 +12,7 @@ import numpy as np
 
 from rft.bodies.base import Elements, Length, numbered_labels
 from rft.bodies.modes import checked_modes, mode_rows
-from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.se2 import rotated
 
 
@@ -38,11 +38,11 @@ class Chain:
 
     def __post_init__(self):
         lengths = real_array("lengths", self.lengths)
-        require(lengths.ndim == 1, f"lengths must be a list of numbers, got {shown(self.lengths)}")
+        require(lengths.ndim == 1, f"lengths must be a list of numbers, got {formatted(self.lengths)}")
         object.__setattr__(self, "lengths", tuple(lengths.tolist()))
         require(len(self.lengths) >= 2, f"lengths needs at least two links, got {len(self.lengths)}")
         are_lengths = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        require(are_lengths, f"lengths must all be finite and > 0, got {shown(list(self.lengths))}")
+        require(are_lengths, f"lengths must all be finite and > 0, got {formatted(list(self.lengths))}")
         shortest = min(self.lengths) / sum(self.lengths)
         require(shortest >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}")
         object.__setattr__(self, "modes", checked_modes(self.modes, self.waves, len(self.lengths)))
@@ -90,7 +90,7 @@ class Chain:
         match, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
         require(
             bool(match) and int(match[1]) <= n,
-            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {shown(frame)}",
+            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {formatted(frame)}",
         )
         return int(match[1]) - 1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rft.checks import in_range, real_array, require, shown
+from rft.checks import formatted, in_range, real_array, require
 
 LARGEST = 1e3  # of an entry: angles of larger modes have few digits left
 ROUNDOFF = 1e-12  # of the largest mode: a smaller mode is roundoff
@@ -18,7 +18,7 @@ def checked_modes(modes, waves, links: int) -> tuple[tuple[float, ...], ...] | s
         require(waves is None, "waves are those of modes = 'serpenoid': add that, or drop waves")
         return None
     if isinstance(modes, str):
-        require(modes == "serpenoid", f"modes must be rows of joint angles or 'serpenoid', got {shown(modes)}")
+        require(modes == "serpenoid", f"modes must be rows of joint angles or 'serpenoid', got {formatted(modes)}")
         if waves is not None:
             in_range("waves", waves, 1e-6, links / 2)
     else:
@@ -42,8 +42,10 @@ def mode_rows(modes, waves: float | None, links: int) -> np.ndarray:
 def _checked_rows(modes, joints: int) -> np.ndarray:
     array = real_array("modes", modes)
     has_shape = array.ndim == 2 and len(array) > 0 and array.shape[1] == joints
-    require(has_shape, f"modes must be rows of {joints} joint angles, one row a mode, got {shown(modes)}")
-    require(bool((np.abs(array) <= LARGEST).all()), f"modes must be finite and at most {LARGEST:g}, got {shown(modes)}")
+    require(has_shape, f"modes must be rows of {joints} joint angles, one row a mode, got {formatted(modes)}")
+    require(
+        bool((np.abs(array) <= LARGEST).all()), f"modes must be finite and at most {LARGEST:g}, got {formatted(modes)}"
+    )
     return array
 
 

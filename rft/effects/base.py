@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.contact import Problem
 from rft.premise import NONE, SHAPE_ALONE, Premise
 
@@ -141,7 +141,7 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
 def broken_premises(effects: Sequence[Effect]) -> Premise:
     """Return the premises that the effects break; ValueError unless all are effects."""
     is_list = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
-    require(is_list, f"effects must be a list of effects such as EndCaps(radius=0.06), got {shown(effects)}")
+    require(is_list, f"effects must be a list of effects such as EndCaps(radius=0.06), got {formatted(effects)}")
     return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 

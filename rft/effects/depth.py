@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.contact import Contact, Problem
 from rft.effects.base import Effect, Site
 from rft.premise import NONE, Premise
@@ -39,7 +39,7 @@ class DepthProfile(Effect):
         along = real_array("along", self.along)
         require(
             along.ndim == 1 and along.size >= 2 and bool(((along > 0) & (along <= 1000)).all()),
-            f"along must be two depths or more, over the reference depth, > 0 to 1000, got {shown(self.along)}",
+            f"along must be two depths or more, over the reference depth, > 0 to 1000, got {formatted(self.along)}",
         )
         object.__setattr__(self, "along", tuple(along.tolist()))
         check_numbers(self)

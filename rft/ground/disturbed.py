@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.ground.base import Ground, GroundEffect
 from rft.premise import Premise
 
@@ -37,7 +37,7 @@ class DisturbedGround(GroundEffect):
     def __post_init__(self):
         places = real_array("places", self.places)
         valid = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
-        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {shown(self.places)}")
+        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {formatted(self.places)}")
         object.__setattr__(self, "places", tuple(places.tolist()))
         check_numbers(self)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.vectors import formula, sqrt, where
 
 
@@ -162,7 +162,7 @@ def is_odd(medium: Medium) -> bool:
 def require_law(medium: Medium) -> None:
     """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
-    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {shown(medium)}")
+    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {formatted(medium)}")
     if is_closed(medium):
         return
     name = f"{type(medium).__name__}.traction"

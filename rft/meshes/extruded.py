@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.ground.lead import rounded
 from rft.plates.stress import PER_CUBIC_METRE, StressMap
 
@@ -35,7 +35,9 @@ class Extruded:
     stress: StressMap
 
     def __post_init__(self):
-        message = f"stress must be a StressMap, nine coefficients, got {shown(self.stress)}: fit some to plate drags"
+        message = (
+            f"stress must be a StressMap, nine coefficients, got {formatted(self.stress)}: fit some to plate drags"
+        )
         require(isinstance(self.stress, StressMap), message)
 
     def traction(self, n: np.ndarray, v: np.ndarray, up: np.ndarray = UP) -> np.ndarray:

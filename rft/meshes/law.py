@@ -24,7 +24,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range, require, shown
+from rft.checks import Number, check_numbers, formatted, in_range, require
 from rft.ground.lead import jump, smoothstep
 
 TENSION = ("cut", "keep", "push")
@@ -115,7 +115,7 @@ class Spatial:
 
     def __post_init__(self):
         check_numbers(self)
-        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {shown(self.tension)}")
+        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {formatted(self.tension)}")
 
     @classmethod
     def from_grains(cls, density: float, friction: float, **more) -> Spatial:

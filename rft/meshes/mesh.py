@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.checks import real_array, require, shown
+from rft.checks import formatted, real_array, require
 from rft.metres import LARGEST
 
 MOST_TRIANGLES = 2_000_000  # triangles
@@ -41,7 +41,7 @@ class Mesh:
         require(0 < len(faces) <= MOST_TRIANGLES, f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}")
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         _require_known(faces, len(vertices))
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
+        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
         normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
         valid = normals is None or (normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all()))
         require(valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)")
@@ -251,4 +251,4 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         mesh = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
         return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
     except Exception as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise ValueError(f"{path} is no {kind.upper()} mesh: {shown(str(error))}") from None
+        raise ValueError(f"{path} is no {kind.upper()} mesh: {formatted(str(error))}") from None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.meshes.mesh import Mesh
 from rft.metres import LARGEST, metres
 from rft.prescribed import FARTHEST, MOST_SAMPLES, Depth, Direction, Distance, Height, Motion, Samples
@@ -116,7 +116,7 @@ class Rotate(Motion):
         axis = real_array("axis", self.axis)
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         valid = 1e-9 < size < 1e9
-        require(valid, f"axis must be three numbers that are not all 0, such as [0, 1, 0], got {shown(self.axis)}")
+        require(valid, f"axis must be three numbers that are not all 0, such as [0, 1, 0], got {formatted(self.axis)}")
         object.__setattr__(self, "axis", tuple(axis.tolist()))
         _set_attitude(self)
 
@@ -213,7 +213,7 @@ def _set_attitude(motion) -> None:
     array = real_array("attitude", value)
     valid = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
     message = "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad"
-    require(valid, f"{message}, got {shown(value)}")
+    require(valid, f"{message}, got {formatted(value)}")
     vector = array.tolist() if array.ndim else [0.0, float(array), 0.0]
     object.__setattr__(motion, "attitude", tuple(vector))
 

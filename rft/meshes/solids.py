@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range, require, shown
+from rft.checks import Number, check_numbers, formatted, in_range, require
 from rft.meshes import shapes
 from rft.meshes.blade import blade
 from rft.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered, read
@@ -96,7 +96,7 @@ class Screw(Solid):
         message = "thickness must be 0, or from a thousandth of the pitch to less than that"
         within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
         require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
-        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {shown(self.handed)}")
+        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {formatted(self.handed)}")
         require(self.turns <= MOST_TURNS, f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}: length / pitch")
 
     @property
@@ -182,10 +182,10 @@ class MeshFile(Solid):
     smooth: bool = False
 
     def __post_init__(self):
-        require(isinstance(self.file, str), f"file must be the name of a mesh, got {shown(self.file)}")
+        require(isinstance(self.file, str), f"file must be the name of a mesh, got {formatted(self.file)}")
         check_numbers(self)
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {shown(self.closed)}")
-        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {shown(self.smooth)}")
+        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
+        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {formatted(self.smooth)}")
         mesh = read(self.file, self.closed, self.scale)
         mesh = smooth(mesh) if self.smooth else mesh
         object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, in_range, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, in_range, real_array, require
 from rft.metres import LARGEST, metres
 from rft.plates.outline import MOST_ELEMENTS, Outline
 
@@ -81,7 +81,7 @@ class HalfCylinder(Shape):
         super().__post_init__()
         require(
             isinstance(self.flat, str) and self.flat in ("down", "up"),
-            f"flat must be 'down' or 'up', got {shown(self.flat)}",
+            f"flat must be 'down' or 'up', got {formatted(self.flat)}",
         )
 
     def curve(self, elements: int):
@@ -275,9 +275,9 @@ def _subdivided(points, elements: int):
 
 def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     """Return the points as pairs of numbers, without a last one that repeats the first; ValueError for bad ones."""
-    require(isinstance(closed, bool), f"closed must be true or false, got {shown(closed)}")
+    require(isinstance(closed, bool), f"closed must be true or false, got {formatted(closed)}")
     array = real_array("points", points)
-    require(array.ndim == 2 and array.shape[1] == 2, f"points must be a list of (x, z), got {shown(points)}")
+    require(array.ndim == 2 and array.shape[1] == 2, f"points must be a list of (x, z), got {formatted(points)}")
     if closed and len(array) > 1 and (array[0] == array[-1]).all():
         array = array[:-1]
     fewest = 3 if closed else 2

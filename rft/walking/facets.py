@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, require, shown
+from rft.checks import Number, check_numbers, formatted, require
 from rft.ground import Ground
 from rft.meshes.contact import Motion, Part, cross, load
 from rft.meshes.extruded import Extruded
@@ -37,7 +37,9 @@ class Grains:
     )
 
     def __post_init__(self):
-        require(isinstance(self.law, Extruded | Spatial), f"law must be an Extruded or Spatial, got {shown(self.law)}")
+        require(
+            isinstance(self.law, Extruded | Spatial), f"law must be an Extruded or Spatial, got {formatted(self.law)}"
+        )
         check_numbers(self)
 
     @property

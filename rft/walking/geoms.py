@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from rft.checks import require, shown
+from rft.checks import formatted, require
 from rft.meshes import shapes
 from rft.meshes.mesh import Mesh
 from rft.meshes.smooth import smooth
@@ -22,7 +22,7 @@ def surfaces(model: mujoco.MjModel, meshes: Mapping[str, Mesh]) -> list[Surface]
     out = []
     for name, mesh in meshes.items():
         geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-        require(geom >= 0, f"there is no geom {shown(name)} in the model")
+        require(geom >= 0, f"there is no geom {formatted(name)} in the model")
         out.append(surface(model, geom, mesh))
     return out
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.checks import in_range, real_array, require, shown
+from rft.checks import formatted, in_range, real_array, require
 from rft.walking.facets import Surface
 from rft.walking.robot import Robot
 
@@ -39,14 +39,14 @@ class Mjcf(Robot):
     period = 1.0
 
     def __post_init__(self):
-        require(isinstance(self.mjcf, str), f"mjcf must be the name of an MJCF file, got {shown(self.mjcf)}")
+        require(isinstance(self.mjcf, str), f"mjcf must be the name of an MJCF file, got {formatted(self.mjcf)}")
         for name in ("geoms", "actuators"):
             value = getattr(self, name)
             if value is None and name == "actuators":
                 continue
             valid = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
-            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names, got {shown(value)}")
-            require(len({*value}) == len(value), f"{name} names one twice: {shown(value)}")
+            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names, got {formatted(value)}")
+            require(len({*value}) == len(value), f"{name} names one twice: {formatted(value)}")
             object.__setattr__(self, name, tuple(value))
         require(len(self.geoms) > 0, "a robot without legs: geoms must name those that touch the ground")
         model, digest = _compiled(self.mjcf)
@@ -76,7 +76,9 @@ class Mjcf(Robot):
         for name in self.geoms:
             geom = self._number("geom", name, model.ngeom)
             fixed = model.body_weldid[model.geom_bodyid[geom]] == 0
-            require(not fixed, f"{self.mjcf}: the geom {shown(name)} is fixed to the world: name those of the robot")
+            require(
+                not fixed, f"{self.mjcf}: the geom {formatted(name)} is fixed to the world: name those of the robot"
+            )
             numbers.append(geom)
         object.__setattr__(self, "geom_numbers", np.array(numbers))
 
@@ -90,8 +92,8 @@ class Mjcf(Robot):
             names = [x for x in (mujoco.mj_id2name(self.model, kinds, k) for k in range(count)) if x]
             near = difflib.get_close_matches(name, names, 1, 0.5)
             few = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
-            cure = f"did you mean {shown(near[0])}?" if near else f"it has {few}"
-            raise ValueError(f"{self.mjcf} has no {kind} {shown(name)}: {cure}")
+            cure = f"did you mean {formatted(near[0])}?" if near else f"it has {few}"
+            raise ValueError(f"{self.mjcf} has no {kind} {formatted(name)}: {cure}")
         return number
 
     def _find_driven(self) -> None:
@@ -115,15 +117,15 @@ class Mjcf(Robot):
         else:
             ids = [self._number("actuator", name, model.nu) for name in self.actuators]
             for name, k in zip(self.actuators, ids):
-                require(bool(able[k]), f"{self.mjcf}: the actuator {shown(name)} cannot follow the clock: {cure}")
+                require(bool(able[k]), f"{self.mjcf}: the actuator {formatted(name)} cannot follow the clock: {cure}")
             driven = np.array(ids, int)
         for k in driven:
-            name = shown(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
+            name = formatted(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
             message = f"{self.mjcf}: the actuator {name} has a ctrlrange: a leg that turns round needs none; drop it"
             require(not model.actuator_ctrllimited[k], message)
         phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
         valid = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
-        require(valid, f"phases must be {len(driven)} numbers, one for each actuator, got {shown(self.phases)}")
+        require(valid, f"phases must be {len(driven)} numbers, one for each actuator, got {formatted(self.phases)}")
         object.__setattr__(self, "phases", tuple(map(float, phases)))
         object.__setattr__(self, "driven", driven)
 
@@ -137,7 +139,7 @@ class Mjcf(Robot):
             try:
                 out.append(geoms.surface(self.model, geom, geoms.geom_mesh(self.model, geom, elements)))
             except ValueError as error:
-                raise ValueError(f"{self.mjcf}: geom {shown(name)}: {error}") from None
+                raise ValueError(f"{self.mjcf}: geom {formatted(name)}: {error}") from None
         return out
 
     def check(self, elements: int) -> None:

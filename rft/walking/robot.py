@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array, require, shown
+from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.metres import LARGEST, metres
 from rft.plates.outline import Outline
 from rft.plates.shapes import Polygon, Shape
@@ -126,7 +126,7 @@ class Robot:
     def _check(self) -> None:
         """Raise ValueError for numbers out of range, and without legs."""
         check_numbers(self)
-        require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {shown(self.legs)}")
+        require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {formatted(self.legs)}")
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class Rhex(Robot):
     def __post_init__(self):
         self._check()
         hips = real_array("hips", self.hips)
-        require(hips.ndim == 1, f"hips must be a list of x in m, got {shown(self.hips)}")
+        require(hips.ndim == 1, f"hips must be a list of x in m, got {formatted(self.hips)}")
         require(
             0 < len(hips) <= MOST_HIPS, f"a robot without legs: hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}"
         )
@@ -172,7 +172,7 @@ class Rhex(Robot):
             aside = real_array("aside", self.aside)
             valid = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
             message = f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip"
-            require(valid, f"{message}, got {shown(self.aside)}")
+            require(valid, f"{message}, got {formatted(self.aside)}")
             object.__setattr__(self, "aside", tuple(map(float, aside)))
 
     @property

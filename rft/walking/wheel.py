@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.checks import in_range, real_array, require, shown
+from rft.checks import formatted, in_range, real_array, require
 from rft.ground import GroundEffect
 from rft.plates.loads import loads
 from rft.plates.shapes import Shape
@@ -41,7 +41,7 @@ def rolling(
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
     require(radius is not None, f"a {type(wheel).__name__} has no radius: give one")
-    require(bool((np.abs(slip) <= 100).all()), f"slip must be within +-100, got {shown(slip)}")
+    require(bool((np.abs(slip) <= 100).all()), f"slip must be within +-100, got {formatted(slip)}")
     in_range("load", load, 1e-6, 1e6)
     in_range("rate", rate, 1e-9, 1e4)
     reach = float(np.hypot(*points.points.T).max())

@@ -1,0 +1,45 @@
+"""The scenes and media that ship with the toolkit: a list of them, and the TOML of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import rft
+from geomech.core.errors import choose
+from geomech.scene import builtin_names, intruder_names, walker_names
+from geomech.scene.read import builtin_text
+from geomech.scene.write import medium_toml, vertical_toml
+from rft.plates import VERTICAL
+
+
+def listing() -> Iterator[str]:
+    """Yield a line for each scene and medium, with what it is."""
+    for title, names in (
+        ("", builtin_names()),
+        ("intruder scenes, for 'geomech intrude'", intruder_names()),
+        ("scenes of walking robots, for 'geomech walk'", walker_names()),
+    ):
+        if title:
+            yield f"\n{title}"
+        for name in names:
+            yield f"{name:24} {builtin_text(name).splitlines()[0].lstrip('# ')}"
+    for title, media in (
+        ("media for [medium] name = ...", rft.CATALOGUE),
+        ("media of intruder and walker scenes, and for 'geomech stress'", VERTICAL),
+    ):
+        yield f"\n{title}"
+        for name, entry in media.items():
+            yield f"{name:24} {entry.source}"
+
+
+def toml_of(name: str) -> str:
+    """Return the TOML of a scene or medium, without its last line's end."""
+    known = [*builtin_names(), *intruder_names(), *walker_names(), *rft.CATALOGUE, *VERTICAL]
+    name = choose("--show", name, known)
+    if name in rft.CATALOGUE:
+        text = medium_toml(name, rft.CATALOGUE[name])
+    elif name in VERTICAL:
+        text = vertical_toml(name, VERTICAL[name])
+    else:
+        text = builtin_text(name)
+    return text.removesuffix("\n")

@@ -1,0 +1,111 @@
+"""Counted beforehand: the force balances of every tier, table, error, motion and sweep are those that are solved."""
+
+import pytest
+
+from geomech import scene as scenes
+from geomech.study import accuracy, cost, effort, motion, sweep
+from geomech.study.bench import Study
+from rft.balance.listening import listening
+from rft.effects import SkinFriction, Slope
+
+GLASS = scenes.load("three-link-glass")
+VISCOUS = scenes.load("three-link-viscous")
+SLOPING = scenes.parse(
+    scenes.load("sandfish-loose").text.partition("[[effects]]")[0].replace("elements = 100", "elements = 10")
+    + '\n[[effects]]\nkind = "transient"\ntravel = 0.1'
+)
+FIVE_LINKS = (
+    GLASS.text.partition("[gait]")[0].replace("[1, 1, 1]", "[1, 1.2, 1, 0.8, 1]")
+    + '[gait]\nkind = "wave"\njoints = 4\namplitude = 0.4\n'
+)
+FIVE = scenes.parse(FIVE_LINKS)
+
+
+@pytest.fixture
+def solved():
+    """Counts the force balances that are solved."""
+    counts = []
+    with listening(lambda samples, points, linear: counts.append(samples)):
+        yield counts
+
+
+SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
+SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
+FOUND = {
+    "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
+    "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
+    "errors alone": (GLASS.with_numerics(grid=9, phases=40), ("path",)),
+    "a family": (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
+    "four joints": (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
+    "four joints, errors alone": (FIVE.with_numerics(grid=4, directions=16), ("path",)),
+    "around the gait": (FIVE.with_numerics(grid=15, directions=16, phases=16), ("area", "path", "direct")),
+    "linear": (VISCOUS, ("area", "path", "harmonic", "direct")),
+    "by a rule": (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),
+    "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
+    "a backbone": (SNAKE, ("direct",)),
+    "a frame": (Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene, ("harmonic", "direct")),
+    "time stepping": (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
+    "place": (GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32), ("direct",)),
+}
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_the_balances_foretold_are_those_solved(name, solved):
+    scene, methods = FOUND[name]
+    foretold = Study(scene).cost([0.1, 0.2, 0.3], methods).balances
+    Study(scene).study([0.1, 0.2, 0.3], methods)
+    assert foretold == sum(solved)
+
+
+@pytest.mark.parametrize("scene", [GLASS, SKIN, SLOPING.with_numerics(phases=32, cycles=2)])
+def test_what_moving_costs_takes_the_balances_foretold(scene, solved):
+    foretold = cost.price(cost.of_effort(scene, 3)).balances
+    effort.effort(scene, None, [0.1, 0.2, 0.3])
+    assert foretold == sum(solved)
+
+
+PLACE = FOUND["place"][0]
+
+
+@pytest.mark.parametrize(("scene", "cycles"), [(GLASS, 3), (PLACE, 3), (PLACE.with_numerics(cycles=2), 2)])
+def test_a_motion_takes_the_balances_foretold(scene, cycles, solved):
+    foretold = motion.cost(scene, cycles).balances
+    motion.motion(scene, cycles)
+    assert foretold == sum(solved)
+
+
+TABLES = {
+    "connection": (cost.connection, lambda study: study.fitted),
+    "harmonics": (cost.harmonics, lambda study: study.compute_harmonics()),
+    "metric": (cost.of_metric, lambda study: study.metric),
+    "even part": (cost.of_even_part, lambda study: study.even_part),
+    "plane": (lambda s: cost.of_planes(s, [(0, 1)], [s.gait.middle]), lambda study: study.plane((0, 1))),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("grid", [7, 8])
+@pytest.mark.parametrize("scene", [GLASS, VISCOUS, SKIN])
+def test_a_table_takes_the_balances_foretold(scene, grid, name, solved):
+    scene, (jobs, compute) = scene.with_numerics(grid=grid), TABLES[name]
+    study = Study(scene)
+    if name == "even part":
+        study.compute_field()  # on whose grid it is
+    if name == "metric" and effort.why_none(scene.system):
+        pytest.skip("it has none")
+    solved.clear()
+    compute(study)
+    assert sum(solved) == cost.price(jobs(scene)).balances
+
+
+def test_accuracy_and_sweep_say_what_they_cost(solved):
+    scene = VISCOUS.with_numerics(grid=5)
+    foretold = accuracy.Accuracy(scene).cost().balances
+    accuracy.study(scene)
+    assert foretold == sum(solved)
+    media = {"medium.ratio": [2.0, 3.0], "gait.amplitude": [0.5, 1.0, 1.5]}
+    for scene, over in ((VISCOUS, media), (SKIN, {"effects.skin-friction.backward": [0.2, 0.3]})):
+        foretold = sweep.Sweep(scene, over).cost().balances
+        solved.clear()
+        sweep.sweep(scene, over)
+        assert foretold == sum(solved)
