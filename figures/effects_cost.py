@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 
+import rft
 from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
@@ -47,7 +48,7 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
     for again in range(repeats + 1):  # the first round warms up
         for name, scene in scenes.items():
-            if again != 1 and scene.system.engine != "algebraic":
+            if again != 1 and rft.effects.engine(scene.system.effects) != "algebraic":
                 continue  # long enough for one timing to tell, and nothing to warm up that the others have not
             start = time.perf_counter()
             runs[name] = scene.cycle(amplitudes=amplitudes, phases=phases)
@@ -57,7 +58,7 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
     return {
         name: {
             "ratio": float(np.median(np.array(taken) / plain[: len(taken)])),
-            "engine": scenes[name].system.engine,
+            "engine": rft.effects.engine(scenes[name].system.effects),
             "cycles": runs[name].cycles,
         }
         for name, taken in seconds.items()

@@ -28,6 +28,7 @@ from scipy.spatial.transform import Rotation
 
 import geomech
 import rft
+from geomech.systems.capabilities import solver_of
 from rft.meshes import Spatial, wrench
 from rft.plates import loads
 from rft.walking import Fineness, engine
@@ -66,7 +67,7 @@ def velocities():
 def tiers():
     for name in shipped("gait"):
         scene = geomech.load(name)
-        own = COARSE if scene.system.solver else {k: v for k, v in COARSE.items() if k in GEOMETRY}
+        own = COARSE if solver_of(scene.system) else {k: v for k, v in COARSE.items() if k in GEOMETRY}
         study = geomech.Study(scene.with_numerics(**own))
         amplitudes = scene.gait.amplitude * np.array([0.6, 1.0])
         for tier in study.tiers:

@@ -5,8 +5,9 @@ import pathlib
 
 import numpy as np
 
-from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Points, Wave
-from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer, Table
+from geomech.gaits import GAITS as kinds_of_gaits
+from geomech.systems import SYSTEMS as kinds_of_systems
+from geomech.systems import Table
 from rft import (
     Backbone,
     BodyInertia,
@@ -47,6 +48,7 @@ from rft.plates import (
 )
 from rft.walking import Rhex, Roller, Tripod, Walker
 
+DATA = pathlib.Path(__file__).parent / "data"
 _PSI = np.linspace(0.0, math.pi / 2, 12)  # rad
 
 MEDIA = {
@@ -75,26 +77,8 @@ BODIES = {
     "backbone": Backbone(elements=9, length=0.1),
 }
 
-GAITS = {
-    "circle": Circle(amplitude=0.9, centre=(0.2, -0.1)),
-    "ellipse": Ellipse(semi_axes=(1.0, 0.4), tilt=0.7),
-    "butterfly": Butterfly(amplitude=0.8),
-    "backwards": Butterfly(reverse=True),
-    "fourier": Fourier(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0))),
-    "points": Points(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9))),
-    "wave": Wave(amplitude=0.8, waves=0.6, offset=0.2, joints=2),
-}
-
-SYSTEMS = {
-    "swimmer": Swimmer(CATALOGUE["glass-0.3mm-loose"].medium, BODIES["uneven"]),
-    "no-slip-snake": NoSlipSnake((0.8, 1.3, 1.0), length=0.4, frame="link-1"),
-    "differential-drive": DifferentialDrive(0.03, 0.15),
-    "ideal-fluid-swimmer": IdealFluidSwimmer((0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0)),
-    "floating-chain": FloatingChain((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05)),
-    "table": Table(
-        pathlib.Path(__file__).parent / "data" / "uneven.nc"
-    ),  # of the swimmer above; the file has its scene
-}
+GAITS = kinds_of_gaits.examples()
+SYSTEMS = kinds_of_systems.examples() | {"table": Table(DATA / "uneven.nc")}  # of the swimmer; the file has its scene
 
 # Stress maps and outlines of the vertical plane.
 PLATES = np.radians(np.meshgrid(np.arange(-60, 91, 30), np.arange(-90, 91, 30))).reshape(2, -1)

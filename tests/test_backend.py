@@ -21,6 +21,7 @@ from geomech import scene as scenes
 from geomech.gaits import Ellipse
 from geomech.systems import solver
 from geomech.text.explain import explain
+from geomech.text.system import described
 from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
 from rft.balance import backend
 from rft.balance import solver as balance
@@ -216,7 +217,7 @@ class Sheared:
 def test_what_stays_with_numpy_and_why():
     scene = scenes.load("three-link-glass")
     swimmer = scene.system
-    line = lambda s: next(x for x in s.told() if x.startswith("back end: ")).removeprefix("back end: ")
+    line = lambda s: next(x for x in described(s) if x.startswith("back end: ")).removeprefix("back end: ")
     assert line(swimmer).startswith("compiled code")
     assert line(swimmer).endswith("commands take NumPy where there is little to compute")
     assert line(swimmer) in explain(scene)

@@ -11,18 +11,21 @@ import rft
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier, Sine
+from geomech.geometry import connection
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
-from geomech.systems import Solver, Swimmer, base
+from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
+from geomech.systems.capabilities import solver_of
+from geomech.systems.framed import in_frame
 
 GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
 
 @pytest.fixture
 def fits(monkeypatch):
-    counts, fit = [], base.fit
-    monkeypatch.setattr(base, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
+    counts, fit = [], connection.fit
+    monkeypatch.setattr(connection, "fit", lambda *args, **options: counts.append(1) or fit(*args, **options))
     return counts
 
 
@@ -54,7 +57,7 @@ def test_a_scene_is_small_and_remembers_nothing():
     for name in scenes.builtin_names():
         scene = scenes.load(name)
         held = dict(scene.__dict__)
-        study = Study(scene.with_numerics(phases=32, grid=5) if scene.system.solver else scene)
+        study = Study(scene.with_numerics(phases=32, grid=5) if solver_of(scene.system) else scene)
         study.displacement("direct", amplitudes=[scene.gait.amplitude / 2])
         if "path" in study.tiers:
             study.compute_field()
@@ -172,7 +175,7 @@ def test_the_frame_is_the_scenes():
         "frame" in scenes.tables(top.changed(name="x", text=""))
         and "frame" not in scenes.tables(top.changed(text=""))["body"]
     )
-    turned = top.changed(system=top.system.in_frame("link-3"))
+    turned = top.changed(system=in_frame(top.system, "link-3"))
     assert turned.frame == "link-3" and Study(turned.with_numerics(phases=32)).displacement("direct").shape == (3,)
 
 

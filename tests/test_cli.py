@@ -195,12 +195,12 @@ def test_scenes_are_listed():
 
 BAD = [
     (["velocity", "nothing", "--alpha", "0,0", "--alphadot", "1,0"], "scene: 'nothing' is unknown"),
-    (["velocity", "three-link-glass", "--alpha", "0", "--alphadot", "1"], r"alpha must have shape (..., 2)"),
+    (["velocity", "three-link-glass", "--alpha", "0", "--alphadot", "1"], r"alpha must be 2 finite numbers"),
     (
         ["velocity", "three-link-glass", "--alpha", "0,x", "--alphadot", "1,0"],
         "--alpha: '0,x' is not a list of numbers",
     ),
-    (["velocity", "three-link-glass", "--alpha", "0,nan", "--alphadot", "1,0"], "alpha must be finite, got nan"),
+    (["velocity", "three-link-glass", "--alpha", "0,nan", "--alphadot", "1,0"], "alpha must be 2 finite numbers"),
     (["velocity", "three-link-glass", "--alpha", "0,0"], "Missing option '--alphadot'"),
     (["displacement", "three-link-glass", "--amplitudes", "2.6"], "lies outside the field's -2.5 to 2.5"),
     (["displacement", "three-link-glass", "--amplitudes", "1:2"], "nor START:STOP:COUNT"),

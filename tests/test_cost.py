@@ -117,9 +117,8 @@ def test_pieces_change_no_numbers(monkeypatch):
         return [*tiers, *fields, marched, *estimate.direct(scene, scene.gait, amplitudes, 32)]
 
     whole = everything()
-    monkeypatch.setattr("geomech.systems.base.VALUES_TOGETHER", 1)
-    monkeypatch.setattr("geomech.systems.swimmer.VALUES_TOGETHER", 1)
-    monkeypatch.setattr("geomech.systems.swimmer.STEPPED_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1)
+    monkeypatch.setattr("geomech.systems.capabilities.STEPPED_TOGETHER", 1)
     for module in (
         connection,
         *(sys.modules[f"geomech.{name}"] for name in ("tiers.area", "tiers.direct", "geometry.family")),

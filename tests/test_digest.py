@@ -56,7 +56,7 @@ OTHER = [
     *(Request(1.0), Request(2.0), Body(1.0), Body(2.0), Body(1.0).scaled, Body(2.0).scaled, adder, adder(1), adder(2)),
     *(lambda: 0, lambda: 1, partial(max, 1), partial(max, 2), partial(max, key=len), np.add.reduce, np.multiply.reduce),
     *(VISCOUS, VISCOUS.with_numerics(grid=9), VISCOUS.system.velocity, VISCOUS.system.in_frame("mean").velocity),
-    *(Solver(), Solver(backend="numpy"), VISCOUS.system.driven, _Driven(VISCOUS.system, [])),
+    *(Solver(), Solver(backend="numpy"), VISCOUS.system.power, _Driven(VISCOUS.system, [])),
 ]
 
 

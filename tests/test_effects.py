@@ -430,7 +430,7 @@ def test_what_a_march_cannot_give_is_refused_by_name(name):
         with pytest.raises(ValueError, match=f"with the effect {name}, which is not .*: .*, or drop the effect"):
             asked()
     told = explain(swimmer)
-    assert f"engine: {swimmer.system.engine}" in told
+    assert f"engine: {engine(swimmer.system.effects)}" in told
     assert f"with {name} " in told
     assert (
         f"not available: connection, CCF, velocity at a single shape, area, adapted, path and harmonic tiers: {name}"

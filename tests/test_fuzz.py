@@ -72,7 +72,7 @@ def outcome(text):
     try:
         read = scenes.parse(text)
         read = read.with_numerics(phases=max(16, 2 * read.gait.harmonics + 1), loads="exact")
-        if read.system.engine != "algebraic":
+        if read.system.traits.steps:
             run = read.with_numerics(cycles=1).cycle(phases=8)
             assert np.isfinite(run.xi).all()
             return "marched"

@@ -80,7 +80,10 @@ def test_fields_of_bodies_that_slide_more_easily_forwards(medium, effects):
     """Their velocity does not turn round with the rates, so that a mirror tells nothing of the same directions."""
     swimmer, axes = Swimmer(medium, Chain((1, 2, 1)), effects), connection.grid(2, 5, 1.5)
     assert swimmer.traits.mirror and swimmer.traits.halved == (type(effects[0]) is EndCaps if effects else False)
-    whole, part = connection.fit(swimmer.velocity, axes, 5, trusted=True), swimmer.fitted(axes, 5, 3)
+    whole, part = (
+        connection.fit(swimmer.velocity, axes, 5, trusted=True),
+        connection.fit(swimmer.velocity, axes, 5, traits=swimmer.traits, trusted=True),
+    )
     for name in ("A", "residual", "speed"):
         np.testing.assert_allclose(getattr(part, name), getattr(whole, name), rtol=0, atol=1e-9)
 
@@ -148,7 +151,7 @@ def cycles():
 def test_gaits_are_those_of_all_phases(name):
     body, effects, gait, amplitudes, phases, count = cycles()[name]
     swimmer, (alpha, alphadot) = Swimmer(GLASS, body, effects), gait.cycle(phases, amplitudes)
-    assert swimmer.images(alpha, alphadot).count == count
+    assert swimmer.solved(alpha, alphadot) == count
     run, xi = swimmer.run(alpha, alphadot, work=True), swimmer.velocity(alpha, alphadot)
     size = np.abs(xi).max((-1, -2), keepdims=True) + 1e-300
     np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
@@ -178,7 +181,7 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
     both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
     alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    assert both.images(alpha, alphadot).count == 16
+    assert both.solved(alpha, alphadot) == 16
     run = both.run(alpha, alphadot)
     for k in range(2):
         own = Swimmer(GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),))

@@ -18,6 +18,7 @@ from geomech import scene as scenes
 from geomech import terminal
 from geomech.commands.pipeline import allow, storing
 from geomech.core.errors import SceneError
+from geomech.core.knob import Knob
 from geomech.geometry import connection
 from geomech.optimise import checked, search
 from geomech.output import plots
@@ -29,12 +30,13 @@ from geomech.run.workers import using
 from geomech.scene import inputs, kinds
 from geomech.study import accuracy, cost, estimate, tiered, walking
 from geomech.study.bench import Study
-from geomech.study.knob import Knob
 from geomech.study.motion import Trajectory
+from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
 from rft.balance import backend
 from rft.effects import Effect
+from rft.laws import LAWS
 from rft.premise import Premise
 from rft.stepping import Stepping
 
@@ -256,7 +258,7 @@ def march(effects, cycles=None):
     """All of a run of two gaits."""
     body = Backbone(elements=5, length=0.3)
     system = dataclasses.replace(VISCOUS.system, medium=Granular(C=1.6, gamma0=0.3), body=body, effects=tuple(effects))
-    system, size = system.with_solver(**SOLVER, cycles=cycles), np.array([0.5, -0.7])[:, None, None]
+    system, size = with_solver(system, {**SOLVER, "cycles": cycles}), np.array([0.5, -0.7])[:, None, None]
     turns = T[:, None] - 0.9 * np.arange(body.joints)
     return tuple(system.time_steps(np.cos(turns) * size + 0.05, -np.sin(turns) * size, cycles, work=True, path=True))
 
@@ -367,7 +369,7 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
 
 def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):
     amplitudes = np.array([0.4, 0.9, 1.3])
-    monkeypatch.setattr(type(GLASS.system), "at_once", lambda self, phases: 1)
+    monkeypatch.setattr(estimate, "at_once", lambda system, phases: 1)
     ask = lambda: estimate.direct(GLASS, GLASS.gait, amplitudes, 32)
     whole = ask()
     stopped(tmp_path / "p", 2, ask)
@@ -521,7 +523,7 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
     """That of a law in a file of one's own, which a stopped command has used."""
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
-    laws = kinds.FAMILIES["geomech.media"].kinds
+    laws = LAWS
     monkeypatch.setitem(laws, "power-of-jobs", None)  # which is undone at the end
     del laws["power-of-jobs"]
     text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace("ratio = 2.0", "power = 1.0")

@@ -27,6 +27,7 @@ from geomech.scene.model import Scene
 from geomech.scene.schema import schema
 from geomech.scene.sections import file_sections, keys_in
 from rft import CATALOGUE
+from rft.laws import LAWS
 from rft.plates import VERTICAL
 
 TABLES = file_sections(Scene)
@@ -123,7 +124,7 @@ def test_the_command_prints_them_all_or_a_section(capsys):
 
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
-    family = kinds.FAMILIES["geomech.media"].kinds
+    family = LAWS
     monkeypatch.setattr(kinds, "_code", {})
     section = (ROOT / "geomech" / "scene" / "README.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"

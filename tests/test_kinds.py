@@ -16,17 +16,19 @@ from registry import EFFECTS
 
 from geomech import cli
 from geomech.core.errors import SceneError
+from geomech.core.registry import REGISTRIES
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
 from geomech.scene import Numerics, Scene, kinds, load, parse, toml
 from geomech.scene.keys import text
-from geomech.scene.kinds import FAMILIES, load_file, register
+from geomech.scene.kinds import load_file, register
 from geomech.scene.schema import schema
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.systems import Plain, Premise, Solver, Swimmer
+from geomech.systems import Premise, Solver, Swimmer
 from geomech.text.explain import explain
+from geomech.text.system import notes
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent
@@ -37,14 +39,13 @@ SMALL = Numerics(grid=7, phases=32)
 
 @pytest.fixture(autouse=True)
 def as_before(monkeypatch):
-    before = {group: dict(family.kinds) for group, family in FAMILIES.items()}
+    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
     modules = set(sys.modules)
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
     yield
-    for group, family in FAMILIES.items():
-        family.kinds.clear()
-        family.kinds.update(before[group])
+    for group, registry in REGISTRIES.items():
+        registry.restore(before.get(group, registry))
     for name in set(sys.modules) - modules:
         if name.startswith("geomech_plugin_"):
             del sys.modules[name]
@@ -133,10 +134,10 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
     assert fine.evaluations == 24 * exact.evaluations
     assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
-    assert fine.finer().solver.loads == "gauss:48"
+    assert fine.refined().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"
-    told_otherwise = fine.with_solver(loads="midpoint:10")
-    assert (told_otherwise.notes, told_otherwise.finer().solver.loads) == ((), "midpoint:20")
+    told_otherwise = fine.with_solver(Solver(loads="midpoint:10"))
+    assert (notes(told_otherwise), told_otherwise.refined().solver.loads) == ((), "midpoint:20")
 
 
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "end-caps"])
@@ -238,7 +239,7 @@ class Slick(Effect):
 
 
 @dataclass(frozen=True)
-class Car(Plain):
+class Car:
     """base (m): between the axles."""
 
     base: float = 0.4
@@ -329,7 +330,7 @@ def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, sa
     assert said in str(caught.value)
     assert str(caught.value).startswith(f"--plugin {path}")
     assert kinds.code() == {}
-    assert "thick" not in FAMILIES["geomech.media"].kinds
+    assert "thick" not in REGISTRIES["geomech.media"]
     assert not [name for name in sys.modules if name.startswith("geomech_plugin_own")]
 
 
@@ -392,7 +393,7 @@ def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
     package("raise RuntimeError('loaded unasked')", "other", dist="broken")
     assert load("three-link-viscous")
     assert "sands_laws" not in sys.modules
-    assert "thick" in kinds.offered("geomech.media")
+    assert "thick" in REGISTRIES["geomech.media"].offered()
     scene = parse(SCENE)
     assert type(scene.system.medium).__module__ == "sands_laws"
     assert parse(toml(scene)) == scene
@@ -411,7 +412,7 @@ def test_entry_points_of_all_families_are_read(package):
     [
         ("import no_such_thing", {}, "'thick' of the package sands 1.2 cannot be loaded: ModuleNotFoundError"),
         ("x = 1", {}, "of the package sands 1.2 cannot be loaded: AttributeError"),
-        ("Thick = 3", {}, "of the package sands 1.2: 3 is no part of a scene"),
+        ("Thick = 3", {}, "of the package sands 1.2: 3 is not a law"),
         (LAW.replace('"thick"', '"thin"'), {}, "of the package sands 1.2: its law is 'thin': give both one name"),
         (LAW.replace("(frozen=True)", ""), {}, "of the package sands 1.2: a law of one's own, Thick, must be a value"),
         ("from test_kinds import Hinge as Thick", {}, "of the package sands 1.2: Hinge is not a law"),
@@ -449,4 +450,4 @@ def test_parts_are_values_and_need_not_be_registered_from_python():
     assert Study(scene).displacement("area").shape == (3,)
     with pytest.raises(SceneError, match="Bare is of no kind that a scene file can name"):
         toml(scene)
-    assert set(GAITS) == {*kinds.BUILT_IN["geomech.gaits"]}
+    assert set(GAITS) == GAITS.built_in

@@ -641,7 +641,7 @@ def test_what_an_older_file_does_not_have_is_told_all_the_same(field, tmp_path):
     (tmp_path / "old.nc").write_bytes((field / "field.nc").read_bytes().replace(b"A_error", b"a_error"))
     old, now = Table(tmp_path / "old.nc"), Table(field / "field.nc")
     assert old.held.A_error is None
-    np.testing.assert_allclose(old.stored("A_error"), now.stored("A_error"), rtol=1e-12)
+    np.testing.assert_allclose(old.table("A_error"), now.table("A_error"), rtol=1e-12)
 
 
 def test_lengths_and_signs_of_a_field(usual, field, tmp_path):

@@ -22,6 +22,7 @@ from geomech.geometry.stretch import stretch
 from geomech.scene import Numerics, Scene
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.study.single import single as single_of
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
@@ -127,8 +128,8 @@ def test_from_python_units_are_warned_of_by_name():
         lambda: Study(VISCOUS).displacement("direct", amplitudes=[1, -30]),
         lambda: Study(VISCOUS).study([30], ["direct"]),
         lambda: cheapest(VISCOUS, [30.0], 1.0),
-        lambda: VISCOUS.system.single([30, 17], [1, 0]),
-        lambda: NoSlipSnake().single([30, 17], [1, 0]),
+        lambda: single_of(VISCOUS.system, [30, 17], [1, 0]),
+        lambda: single_of(NoSlipSnake(), [30, 17], [1, 0]),
     ):
         with pytest.warns(UnitWarning, match="a joint angle of .* rad is beyond a full turn"):
             make()

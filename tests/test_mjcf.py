@@ -12,8 +12,8 @@ from matplotlib import image
 
 from geomech import scene as scenes
 from geomech.core.errors import SceneError
+from geomech.core.knob import Knob
 from geomech.study import accuracy, walking
-from geomech.study.knob import Knob
 from geomech.study.sweep import sweep
 from rft.meshes import Spatial
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine

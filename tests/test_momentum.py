@@ -13,6 +13,8 @@ from geomech.scene import Scene
 from geomech.study import motion as moving
 from geomech.study.bench import Study
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
+from geomech.systems.capabilities import OwnMetric, capability
+from geomech.systems.framed import in_frame
 from geomech.tiers.base import Numerics
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.7, -0.2), tilt=0.3)
@@ -96,14 +98,14 @@ def own(system):
 @pytest.mark.parametrize("system", [AFLOAT, SWIMMER], ids=lambda s: s.kind)
 def test_momentum_is_conserved_in_the_world(system, frame):
     """Over two cycles, whatever the frame; and `cost` is twice the kinetic energy that is seen."""
-    system = system.in_frame(frame)
+    system = in_frame(system, frame)
     masses, inertia, unit = own(system)
     found = moving.motion(Scene(system, OVAL, Numerics(phases=256)), 2)
     impulse, size, energy = impulses(found, masses, inertia)
     assert min(size) > 1e-6
     assert (np.abs(impulse) < 1e-9 * np.array(size)).all()
     alpha, alphadot = OVAL.cycle(256)
-    cost = np.tile(system.cost(alpha, alphadot), 2)[4 : 4 + len(energy)]
+    cost = np.tile(system.squared_speed(alpha, alphadot), 2)[4 : 4 + len(energy)]
     np.testing.assert_allclose(cost * unit, energy, rtol=1e-8)
 
 
@@ -134,12 +136,12 @@ def test_heavy_links_are_afloat():
 def test_cost_is_a_metric(system):
     """Quadratic in alphadot and positive; the same in every frame; and `metric.fit` takes it."""
     alpha, alphadot = np.random.default_rng(4).normal(size=(2, 20, system.joints))
-    cost = system.cost(alpha, alphadot)
+    cost = system.squared_speed(alpha, alphadot)
     assert (cost > 0).all()
-    np.testing.assert_allclose(system.cost(alpha, -3 * alphadot), 9 * cost, rtol=1e-12)
-    np.testing.assert_allclose(system.in_frame("link-2").cost(alpha, alphadot), cost, rtol=1e-12)
+    np.testing.assert_allclose(system.squared_speed(alpha, -3 * alphadot), 9 * cost, rtol=1e-12)
+    np.testing.assert_allclose(in_frame(system, "link-2").squared_speed(alpha, alphadot), cost, rtol=1e-12)
     if system.joints == 2:
-        fitted = metric.fit(system.cost, (np.linspace(-3, 3, 41),) * 2)
+        fitted = metric.fit(system.squared_speed, (np.linspace(-3, 3, 41),) * 2)
         inside = np.abs(alpha).max(-1) < 2.5
         np.testing.assert_allclose(fitted.norm(alpha[inside], alphadot[inside]) ** 2, cost[inside], rtol=2e-3)
 
@@ -182,7 +184,7 @@ def test_what_is_wrong_is_refused_in_a_line(what):
 
 
 def test_systems_without_a_metric_have_no_cost():
-    assert [name for name, system in SYSTEMS.items() if getattr(system, "cost", None)] == [
+    assert [name for name, system in SYSTEMS.items() if capability(system, OwnMetric)] == [
         "ideal-fluid-swimmer",
         "floating-chain",
     ]
@@ -194,7 +196,7 @@ def test_frames_tell_of_one_motion(system):
     seen = system.velocity(alpha, alphadot)
     for frame in ("mean", "link-2", "link-3"):
         h, hdot = system.frame_pose(frame, alpha, alphadot)
-        other = system.in_frame(frame).velocity(alpha, alphadot)
+        other = in_frame(system, frame).velocity(alpha, alphadot)
         np.testing.assert_allclose(coordinates.change_velocity(seen, h, hdot), other, atol=1e-14)
 
 

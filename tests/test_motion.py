@@ -19,7 +19,8 @@ from geomech.output import animate, plots, trajectories
 from geomech.scene import Numerics, Scene
 from geomech.study import motion as moving
 from geomech.study.bench import Study
-from geomech.systems import NoSlipSnake, Plain, Solver, Swimmer
+from geomech.systems import NoSlipSnake, Solver, Swimmer
+from geomech.systems.capabilities import solver_of
 from rft import (
     Backbone,
     BodyInertia,
@@ -159,14 +160,14 @@ def test_where_cycles_differ_each_goes_on_from_the_one_before(name):
     scene = SCENES[name]
     system, n = scene.system, scene.numerics.phases
     last = {}
-    for cycles in (system.solver.cycles, system.solver.cycles + 1):
+    for cycles in (solver_of(system).cycles, solver_of(system).cycles + 1):
         last[cycles] = time_steps(
             system.medium,
             system.body,
             *scene.gait.cycle(n),
             effects=system.effects,
             cycles=cycles,
-            pieces=system.solver.pieces,
+            pieces=solver_of(system).pieces,
         ).pose
     ground = np.concatenate([last[cycles - 1][:-1], last[cycles]])
     expected = se2.compose(se2.inverse(ground[:1]), ground)
@@ -369,7 +370,7 @@ def test_systems_without_a_map_are_shown_all_the_same(name, tmp_path):
     animate.save(tmp_path / "out.png", found)
 
 
-class Sled(Plain):
+class Sled:
     """Nothing but a velocity."""
 
     joints, length = 2, 0.5

@@ -10,6 +10,7 @@ import geomech
 from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
 from geomech.geometry.reconstruct import displacement, slopes
+from geomech.geometry.traits import Traits
 from geomech.optimise import checked, optimise
 from geomech.optimise import loops as series
 from geomech.optimise.aims import Aim
@@ -20,7 +21,8 @@ from geomech.optimise.stroke import Stroke
 from geomech.scene import Scene, parse
 from geomech.study import fields
 from geomech.study.bench import Study
-from geomech.systems import Plain, Swimmer, Table
+from geomech.systems import Swimmer, Table
+from geomech.systems.capabilities import OwnMetric, capability
 from geomech.text import optimum as optima
 from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
@@ -628,7 +630,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
     scene = geomech.load("three-link-ideal-fluid")
     found = optimise(scene, "efficiency", harmonics=2)
     alpha, alphadot = found.gait.cycle(256)
-    length = 2 * np.pi * np.sqrt(scene.system.cost(alpha, alphadot)).mean()
+    length = 2 * np.pi * np.sqrt(scene.system.squared_speed(alpha, alphadot)).mean()
     assert found.best.work is None
     assert found.best.length == pytest.approx(length, rel=1e-10)
     assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
@@ -646,19 +648,19 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     own, found = (optimise(s, "efficiency", harmonics=2) for s in (scene.changed(gait=Circle()), table))
     assert found.value == pytest.approx(own.value, abs=found.estimate + 1e-3 * own.value)
     assert (found.best.work is None) == (own.best.work is None)
-    if scene.system.cost is not None:
-        assert table.system.cost([0.3, -0.5], [1.0, 2.0]) == pytest.approx(
-            scene.system.cost([0.3, -0.5], [1.0, 2.0]), rel=1e-4
-        )
+    metrics = [capability(s.system, OwnMetric) for s in (scene, table)]
+    if None not in metrics:
+        own, found = (metric.squared_speed([0.3, -0.5], [1.0, 2.0]) for metric in metrics)
+        assert found == pytest.approx(own, rel=1e-4)
     with pytest.raises(SceneError, match="outside the field that the scene has: -2.5 to 2.5"):
         checked(table, "displacement", within=3.0)
 
 
 @dataclass(frozen=True)
-class Strips(Plain):
+class Strips:
     """Displacement is the area under 3 cos(3 alpha_1) + 0.2, so that each strip between its zeros has a best loop."""
 
-    joints, linear, kind = 2, True, "strips"
+    joints, traits, kind = 2, Traits(linear=True), "strips"
 
     def velocity(self, alpha, alphadot):
         alpha, alphadot = np.broadcast_arrays(alpha, alphadot)

@@ -17,7 +17,7 @@ from geomech.output import plots
 from geomech.scene.frames import framed
 from geomech.study.choose import cheapest
 from geomech.study.shape_space import through as _held
-from geomech.systems import Plain, Swimmer
+from geomech.systems import Swimmer
 from geomech.tiers import TIERS
 from geomech.tiers.fitted import fits, is_too_large
 from rft import CATALOGUE, Chain, Viscous, se2
@@ -45,11 +45,11 @@ extent = 1.2
 
 
 @dataclass(frozen=True)
-class Cubic(Plain):
+class Cubic:
     """A of three joints in closed form. turns (-): scales its row of headings."""
 
     turns: float = 1.0
-    kind, joints, linear, length = "cubic", 3, True, 0.5
+    kind, joints, traits, length = "cubic", 3, Traits(linear=True), 0.5
 
     def A(self, alpha):
         a, b, c = np.moveaxis(np.asarray(alpha, float), -1, 0)
@@ -93,7 +93,7 @@ def test_planes_have_the_curvature_of_the_pair(pair):
 
 def test_a_plane_is_that_of_the_whole_field_in_sand():
     system, axes = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6))), connection.grid(3, 5, 1.2)
-    fitted = system.fitted(axes, 16, 3)
+    fitted = connection.fit(system.velocity, axes, 16, traits=system.traits, trusted=True)
     for at, half in (([0.6, 0.6, -1.2], False), ([0.0, 0.0, 0.0], True)):
         asked = []
         velocity = lambda a, u: asked.append(len(a)) or system.velocity(a, u)
@@ -222,7 +222,7 @@ def test_many_joints_have_planes_and_no_field():
 
 
 @dataclass(frozen=True)
-class Sandy(Plain):
+class Sandy:
     """Of four joints, not linear in alphadot."""
 
     kind, joints = "sandy", 4
@@ -292,15 +292,15 @@ def test_six_links_have_area_and_path_and_a_field_is_refused(tmp_path):
 def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     """Even where the force balance is near by chance."""
     spread = np.array([[0.3, 0.2], [1e-9, 0.4]])
-    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: spread))
+    monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: spread))
     scene = Scene(Cubic(), LOOP, Numerics(grid=7, extent=1.2))
     table = Study(scene).study([0.4, 0.5], ["area"])
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
-    monkeypatch.setitem(TIERS, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
+    monkeypatch.setitem(TIERS._parts, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
     monkeypatch.setattr("geomech.study.choose.solved", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
-    monkeypatch.setitem(TIERS, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
+    monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
     assert found["tier"] == "area" and min(found["estimate"]["area"]) == 0.01
 

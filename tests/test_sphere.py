@@ -46,7 +46,7 @@ def test_polynomials_on_the_sphere_come_back(joints, highest):
 def test_the_first_degree_is_the_connection():
     system, axes = Swimmer(GLASS, Chain((0.7, 1.4, 0.9, 0.6))), connection.grid(3, 4, 1.0)
     fitted, table = (
-        system.fitted(axes, 24, 3),
+        connection.fit(system.velocity, axes, 24, traits=system.traits),
         harmonics.fit(system.velocity, axes, 24, highest=1, traits=Traits(mirror=True)),
     )
     alpha, u = np.random.default_rng(1).uniform(-1, 1, (2, 9, 3))

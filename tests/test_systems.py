@@ -18,8 +18,11 @@ from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
 from geomech.study.bench import Study
-from geomech.systems import KINDS, NoSlipSnake, Plain, Swimmer
-from geomech.systems.base import length_unit
+from geomech.study.single import single
+from geomech.systems import KINDS, NoSlipSnake, Swimmer
+from geomech.systems.base import kind_of, length_unit
+from geomech.systems.capabilities import stored
+from geomech.systems.framed import in_frame
 from geomech.systems.swimmer import Solver
 from geomech.text.explain import explain
 from geomech.tiers.direct import direct
@@ -146,7 +149,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(SceneError, match="numerics: 'regularisation' is unknown"):
         study.turned(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
-        study.scene.system.single([0.4, 0.4], [1.0, 0.0])
+        single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 
 
 def test_files_and_words_say_what_is_singular(tmp_path):
@@ -179,9 +182,9 @@ def test_what_a_system_says_of_itself_holds(name):
     linear = np.abs(np.einsum("bij,bj->bi", columns, alphadot) - xi).max() < 1e-9 * np.abs(columns).max()
     assert linear == system.traits.linear
     assert length_unit(system) == "m"
-    if system.traits.mirror and not system.stored("connection"):  # a cart has one frame, a table that it was made in
-        assert system.in_frame("link-2").traits.frame == "link-2"
-    assert KINDS[system.kind] is type(system)
+    if system.traits.mirror and not stored(system, "connection"):  # a cart has one frame, a table that it was made in
+        assert in_frame(system, "link-2").traits.frame == "link-2"
+    assert KINDS[kind_of(system)] is type(system)
     scene = Scene(system, AWAY)
     run = scene.cycle(phases=64)
     np.testing.assert_allclose(run.net, direct(system.velocity, AWAY, None, 64), atol=1e-9)
@@ -193,7 +196,7 @@ def test_what_a_system_says_of_itself_holds(name):
 def test_whatever_has_a_velocity_is_a_system():
     """A system of one's own: a disc that is pushed along by its one joint, and turns."""
 
-    class Disc(Plain):
+    class Disc:
         joints, traits, kind = 2, Traits(linear=True), "disc"
 
         def velocity(self, alpha, alphadot):

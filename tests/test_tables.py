@@ -26,11 +26,13 @@ from geomech.output import mat, plots
 from geomech.scene import Numerics, Scene
 from geomech.study import accuracy, choose, estimate, fields, tiered
 from geomech.study.bench import Study
+from geomech.study.single import single
 from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.systems.table import LENGTHS
 from geomech.text import accuracy as text
 from geomech.text.explain import explain
+from geomech.text.system import described
 from rft.laws import CATALOGUE
 
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
@@ -153,7 +155,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
         path.write_bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
     else:
         plain_mat(path, s.fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+", "level": 0.9}))
-        halves = Table(path, body_length=2.0).stored("A_error")
+        halves = Table(path, body_length=2.0).table("A_error")
         np.testing.assert_allclose(halves, error * np.array([0.5, 0.5, 1]).reshape(3, 1, 1, 1))
     table = Study(Scene(Table(path), GAIT))
     np.testing.assert_array_equal(table.to_xarray().A_error, error)
@@ -356,7 +358,7 @@ def test_what_is_even_in_alphadot_is_part_of_the_error(ending, tmp_path):
 def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tmp_path):
     plain_mat(tmp_path / "a.mat", made[1].fitted)
     bare = Study(Scene(Table(tmp_path / "a.mat"), GAIT))
-    assert bare.scene.system.single([0.2, 0.3], [1, 0])["residual"] is None
+    assert single(bare.scene.system, [0.2, 0.3], [1, 0])["residual"] is None
     fields.save_connection(tmp_path / "a.nc", bare)
     held = tables.load(tmp_path / "a.nc")
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
@@ -445,13 +447,13 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in bare.told()
+        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
         for length in (1.0, 3.0):
             said = Table(file, body_length=length)
-            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in said.told()
+            assert not [line for line in said.assumed if "body_length" in line] and LENGTHS not in described(said)
             np.testing.assert_allclose(said.held.connection.A[0] * length, bare.held.connection.A[0], rtol=1e-13)
     for file in ("a.nc", "a.mat"):
         whole = Table(folder / file)
@@ -603,7 +605,7 @@ def test_endings_that_lie(made, tmp_path):
         ("a.mat", old, r"is a MATLAB 7.3 \(HDF5\) file"),
         ("a.mat", b"t,x,y\n1,2,3\n", "no MATLAB file"),
         ("a.nc", b"t,x,y\n1,2,3\n", "is no NetCDF file: write it anew"),
-        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .nc or .mat"),
+        ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .mat or .nc"),
     ):
         (tmp_path / name).write_bytes(raw)
         with pytest.raises(SceneError, match=said):

@@ -275,7 +275,7 @@ def test_a_tier_is_one_expression(monkeypatch):
         return Plan(straight, fitted.table(system, numerics))
 
     leading = Tier("leading", "A at the straight pose", {"color": "k"}, plan, joints=range(2, 3))
-    monkeypatch.setitem(TIERS, "leading", leading)
+    monkeypatch.setitem(TIERS._parts, "leading", leading)
     scene, counts = GLASS.with_numerics(grid=9), []
     study = Study(scene)
     foretold = study.cost([0.05, 1.0], ["path", "leading", "direct"]).balances

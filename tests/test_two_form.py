@@ -24,11 +24,11 @@ GAIT = Fourier(
 
 @pytest.fixture(scope="module")
 def form():
-    return two_form(SYSTEM.fitted(connection.grid(3, 13, 1.2), 48, 5))
+    return two_form(connection.fit(SYSTEM.velocity, connection.grid(3, 13, 1.2), 48, 5, traits=SYSTEM.traits))
 
 
 def test_pairs_are_antisymmetric_and_those_of_curvature(form):
-    fitted = SYSTEM.fitted(connection.grid(3, 13, 1.2), 48, 5)
+    fitted = connection.fit(SYSTEM.velocity, connection.grid(3, 13, 1.2), 48, 5, traits=SYSTEM.traits)
     assert form.pairs == ((0, 1), (0, 2), (1, 2))
     for i, j in form.pairs:
         assert np.array_equal(form.pair(i, j).values, curvature.ccf(fitted, i, j).values)
@@ -49,7 +49,10 @@ def test_a_slice_is_the_field_on_a_plane(form):
 
 def test_with_two_joints_every_surface_is_the_area():
     system = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9)))
-    fitted, gait = system.fitted(connection.grid(2, 31, 1.5), 8, 5), Circle(centre=(0.1, -0.2))
+    fitted, gait = (
+        connection.fit(system.velocity, connection.grid(2, 31, 1.5), 8, 5, traits=system.traits),
+        Circle(centre=(0.1, -0.2)),
+    )
     found = spanned(two_form(fitted), gait, [0.4, 1.0])
     assert found.net == pytest.approx(area(curvature.ccf(fitted), gait, [0.4, 1.0]), abs=1e-8)
     assert found.spread.max() < 1e-8

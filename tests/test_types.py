@@ -18,6 +18,7 @@ from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene
 from geomech.study import accuracy, sweep, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.study.single import single
 from geomech.systems import Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.tiers.area import area
@@ -174,8 +175,7 @@ def geometries(value):
     yield "gait of the scene", lambda: Study(plain).table("adapted", value)
     yield "method", lambda: Study(plain).plan(value)
     yield "system", lambda: plain.changed(system=value)
-    yield "one shape", lambda: plain.system.single(value, [1, 0])
-    yield "nothing", lambda: plain.system.with_solver(nonsense=value)
+    yield "one shape", lambda: single(plain.system, value, [1, 0])
     for tier in (path, direct):
         yield "velocity", lambda tier=tier: tier(value, Circle())
         yield "gait", lambda tier=tier: tier(velocity, value)

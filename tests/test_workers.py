@@ -30,6 +30,7 @@ from geomech.study import accuracy, cycles, sweep, tiered
 from geomech.study.bench import Study
 from rft import threads as threaded
 from rft.balance import backend
+from rft.laws import LAWS
 from rft.threads import cores, thread_count
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
@@ -245,7 +246,7 @@ def power(tmp_path, monkeypatch):
     """A law of one's own, whose file is gone."""
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
-    laws, path = kinds.FAMILIES["geomech.media"].kinds, tmp_path / "power.py"
+    laws, path = LAWS, tmp_path / "power.py"
     path.write_text(POWER)
     kinds.load_file(path)
     path.unlink()

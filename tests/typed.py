@@ -11,13 +11,14 @@ import rft
 from geomech import connection, curvature, reconstruct, symbolic
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Gait, Points, Sine
 from geomech.geometry import family, harmonics
+from geomech.geometry.traits import Traits
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
 from geomech.study import accuracy, cost, undulation
 from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.sweep import sweep
-from geomech.systems import NoSlipSnake, Plain, Swimmer
+from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -40,11 +41,13 @@ class Mine:
 
 @geomech.register
 @dataclass(frozen=True)
-class Cart(Plain):
+class Cart:
     """Rolls as its first joint turns."""
 
     kind = "cart"
     joints = 2
+    length = 1.0
+    traits = Traits(linear=True)
 
     def velocity(self, alpha: Array, alphadot: Array) -> Array:
         return np.stack([alphadot[..., 0], 0 * alphadot[..., 0], 0 * alphadot[..., 0]], -1)
@@ -110,7 +113,7 @@ def mechanics() -> list[Any]:
     cycle = Swimmer(sand, swimmer, (rft.EndCaps(radius=0.06),)).run(*Circle().cycle(32, [0.5]))
     steps = time_steps(sand, swimmer, np.zeros((8, 2)), np.ones((8, 2)), effects=[rft.Transient(0.1)], cycles=1)
     power: Array = work_done(sand, swimmer, [0.0, 0.1], [1.0, 0.0], [0.0, 0.0, 0.0]).power
-    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Cart().run(*Circle().cycle(8)).net
+    own = Scene(Swimmer(Mine(), swimmer), Circle(), Numerics(grid=7)), Scene(Cart(), Circle()).cycle(phases=8).net
     media = (
         rft.CATALOGUE["coulomb"].medium.traction(1.0, 0.5),
         rft.Viscous(2.0).slopes(1.0, 2.0, 0.0),

@@ -30,9 +30,10 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     """Return the scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is
     given."""
     from geomech.scene import in_medium
+    from geomech.systems.capabilities import stored
 
     scene = scene_with_gait(name)
-    own = scene.system.stored("connection")
+    own = stored(scene.system, "connection")
     if (grid, extent) != (None, None) and own:
         raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
     if scene.system.traits.joint_angles and not own:

@@ -1,20 +1,25 @@
-"""Gaits: closed curves in shape space."""
+"""Gaits: closed curves in shape space, one file each."""
 
+from geomech.core.registry import load_all
 from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
 from geomech.gaits.waves import Sine, Wave
-from geomech.geometry.gait import Gait
+from geomech.geometry.gait import GAITS, Gait
 
-KINDS = {
-    "circle": Circle,
-    "ellipse": Ellipse,
-    "butterfly": Butterfly,
-    "fourier": Fourier,
-    "points": Points,
-    "sine": Sine,
-    "wave": Wave,
-    "centreline": Centreline,
-}
+load_all(__name__, __path__)
+KINDS = GAITS
 
-__all__ = ["KINDS", "Butterfly", "Centreline", "Circle", "Ellipse", "Fourier", "Gait", "Points", "Sine", "Wave"]
+__all__ = [
+    "GAITS",
+    "KINDS",
+    "Butterfly",
+    "Centreline",
+    "Circle",
+    "Ellipse",
+    "Fourier",
+    "Gait",
+    "Points",
+    "Sine",
+    "Wave",
+]

@@ -12,7 +12,7 @@ import numpy as np
 
 from geomech.core.errors import Note, UnitWarning, short
 from geomech.gaits import frames, midline
-from geomech.geometry.gait import LARGEST, Gait
+from geomech.geometry.gait import GAITS, LARGEST, Gait
 from geomech.io.rows import LARGEST_NUMBER
 from rft.checks import Number
 
@@ -26,6 +26,7 @@ BACKWARDS = 1.0  # rad of phase along the body, by which a wave surely runs from
 OFF = 0.05  # of a period, by which the frequency may contradict the file
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Centreline(Gait):
     """The bends of a body of ``elements`` as measured, at amplitude 1; the amplitude scales them.
@@ -53,6 +54,8 @@ class Centreline(Gait):
     20 % longer or shorter than the mean, a quarter of the period without a frame, a gait that does not close, or that
     repeats within the period. Noted: a wave that runs from tail to head, as of points that were given from the head.
     """
+
+    kind = "centreline"
 
     estimate_is = "of the computation alone: what the measured midlines are off by is not in it"
 
@@ -150,6 +153,10 @@ class Centreline(Gait):
 
     def unit_rate(self, t) -> np.ndarray:
         return self._curve(np.asarray(t, float), 1)
+
+    @classmethod
+    def examples(cls) -> dict[str, Centreline]:
+        return {}  # of a file
 
 
 def _series(fitted: np.ndarray, t: np.ndarray, order: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from geomech.core.errors import short
-from geomech.geometry.gait import LARGEST, Gait, finite_array
+from geomech.geometry.gait import GAITS, LARGEST, Gait, finite_array
 from rft.checks import Number
 
 
@@ -42,11 +42,14 @@ class Series(Gait):
         return np.cos(kt) @ (k * sin).T - np.sin(kt) @ (k * cos).T
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Circle(Series):
     """alpha = centre + amplitude (cos t, sin t): counter-clockwise."""
 
     amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "its radius")] = 1.0
+
+    kind = "circle"
 
     @property
     def amplitude_label(self) -> str:
@@ -55,13 +58,20 @@ class Circle(Series):
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array([[1.0], [0.0]]), np.array([[0.0], [1.0]])
 
+    @classmethod
+    def examples(cls) -> dict[str, Circle]:
+        return {"circle": cls(amplitude=0.9, centre=(0.2, -0.1))}
 
+
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Ellipse(Series):
     """Counter-clockwise about its centre.
 
     semi_axes (rad): at amplitude 1.
     """
+
+    kind = "ellipse"
 
     semi_axes: tuple[float, float] = (1.0, 0.5)
     tilt: Annotated[
@@ -78,25 +88,39 @@ class Ellipse(Series):
         (a, b), c, s = self.semi_axes, math.cos(self.tilt), math.sin(self.tilt)
         return np.array([[a * c], [a * s]]), np.array([[-b * s], [b * c]])
 
+    @classmethod
+    def examples(cls) -> dict[str, Ellipse]:
+        return {"ellipse": cls(semi_axes=(1.0, 0.4), tilt=0.7)}
 
+
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Butterfly(Series):
     """The butterfly of Fig. 11(e), as distributed with sysplotter (OSU-LRAM/GeometricSystemPlotter):
     (alpha_1 + alpha_2)/2 = 1.0908 cos t - 0.2508 cos 3t - 0.18 cos 5t, (alpha_1 - alpha_2)/2 = 1.052 sin t + 0.0859 sin 3t
     at amplitude 1."""
 
+    kind = "butterfly"
+
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         sum_cos = np.array([1.0908, 0.0, -0.2508, 0.0, -0.18])
         difference_sin = np.array([1.052, 0.0, 0.0859, 0.0, 0.0])
         return np.array([sum_cos, sum_cos]), np.array([difference_sin, -difference_sin])
 
+    @classmethod
+    def examples(cls) -> dict[str, Butterfly]:
+        return {"butterfly": cls(amplitude=0.8), "backwards": cls(reverse=True)}
 
+
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Fourier(Series):
     """A Fourier series of one's own.
 
     cos, sin (rad): coefficients, a row for each joint, harmonics 1, 2 ... along the row.
     """
+
+    kind = "fourier"
 
     cos: tuple[tuple[float, ...], ...]
     sin: tuple[tuple[float, ...], ...]
@@ -111,3 +135,7 @@ class Fourier(Series):
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.cos), np.array(self.sin)
+
+    @classmethod
+    def examples(cls) -> dict[str, Fourier]:
+        return {"fourier": cls(cos=((0.5, 0.1), (0.0, 0.2)), sin=((0.0, 0.3), (0.6, 0.0)))}

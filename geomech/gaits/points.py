@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.core.errors import short
-from geomech.geometry.gait import Gait, finite_array
+from geomech.geometry.gait import GAITS, Gait, finite_array
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Points(Gait):
     """The periodic cubic spline through given shapes, in order and back to the first, phase running with chord length.
 
     points (rad): three rows of joint angles or more.
     """
+
+    kind = "points"
 
     points: tuple[tuple[float, ...], ...]
 
@@ -45,3 +48,7 @@ class Points(Gait):
 
     def unit_rate(self, t) -> np.ndarray:
         return self._spline()(np.asarray(t, float), 1)
+
+    @classmethod
+    def examples(cls) -> dict[str, Points]:
+        return {"points": cls(points=((1, 0), (0.4, 0.8), (-0.7, 0.2), (-0.1, -0.9)))}

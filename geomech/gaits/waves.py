@@ -9,10 +9,11 @@ import numpy as np
 
 from geomech.core.errors import real_array
 from geomech.gaits.fourier import Series
-from geomech.geometry.gait import LARGEST, Gait
+from geomech.geometry.gait import GAITS, LARGEST, Gait
 from rft.checks import Number, in_range
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Wave(Series):
     """A travelling wave of joint angles: alpha_k = offset + amplitude cos(t + 2 pi waves k / (joints + 1)), k = 1, 2 ... from
@@ -22,6 +23,8 @@ class Wave(Series):
     In the two modes of a serpenoid chain of as many waves (`rft.bodies.modes`) it is the circle of that amplitude, run in
     reverse.
     """
+
+    kind = "wave"
 
     amplitude: Annotated[float, Number(-LARGEST, LARGEST, "rad", "of each joint")] = 0.5
     waves: Annotated[float, Number(-5000.5, 5000.5, "-", "on the body, at most half as many as links")] = 1.0
@@ -61,6 +64,10 @@ class Wave(Series):
     def _sizes(self, amplitudes) -> np.ndarray:
         return np.abs(real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes))
 
+    @classmethod
+    def examples(cls) -> dict[str, Wave]:
+        return {"wave": cls(amplitude=0.8, waves=0.6, offset=0.2, joints=2)}
+
 
 def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """p at which the sine y = sin, of largest slope ``slope``, has run the share u / 2 pi of its length per wave.
@@ -81,6 +88,7 @@ def arc_to_phase(u: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return p
 
 
+@GAITS.register
 @dataclass(frozen=True, kw_only=True)
 class Sine(Gait):
     """A body of ``elements`` that lies along an endless sine and moves on along it: with t the wave travels from head to
@@ -90,6 +98,8 @@ class Sine(Gait):
 
     The bends are those between neighbouring elements, so the gait is of order 2 in 1/elements.
     """
+
+    kind = "sine"
 
     amplitude: Annotated[
         float, Number(-10, 10, "-", "A / lambda, the sine's amplitude over its wavelength, 0 to 10")
@@ -163,3 +173,7 @@ class Sine(Gait):
     def relative_curvature(self, amplitudes=None) -> np.ndarray:
         """Mean of |curvature| over a wave, times the wave's arc length (...,): 4 atan(2 pi A / lambda)."""
         return 4 * np.arctan(np.abs(self._slopes(amplitudes)))
+
+    @classmethod
+    def examples(cls) -> dict[str, Sine]:
+        return {}  # of as many joints as elements, of which there are many

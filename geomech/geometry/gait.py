@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from geomech.core.errors import is_whole, real_array, short
+from geomech.core.registry import Registry, subclasses
 from rft.checks import Number, check_numbers
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
@@ -107,6 +108,9 @@ class Gait:
             raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {short(phases)}")
         t = 2 * np.pi * np.arange(phases) / phases
         return self.shape(t, amplitudes), self.rate(t, amplitudes)
+
+
+GAITS = Registry("geomech.gaits", "kind", "a gait", subclasses(Gait))
 
 
 def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:

@@ -24,7 +24,7 @@ def tried(velocity: Callable, axes, masked: bool) -> Callable:
     """
     rng = np.random.default_rng(0)
     alpha = np.stack([rng.uniform(a[0], a[-1], SHAPES) for a in axes], -1)[:, None]
-    rates = rng.normal(size=(RATES, len(axes)))
+    alpha, rates = np.broadcast_arrays(alpha, rng.normal(size=(RATES, len(axes))))
     velocity = in_batches(velocity, alpha, rates)
     ask = lambda rates: np.broadcast_to(np.asarray(velocity(alpha, rates), float), (SHAPES, RATES, 3))
     try:
@@ -54,7 +54,7 @@ def _lacking(xi, back, twice, good, scale) -> list[str]:
 
 
 def in_batches(velocity: Callable, alpha, rates) -> Callable:
-    """The velocity if it takes shapes (S, 1, d) and rates (C, d) at once, else, if it takes a single shape and rate, one that
+    """The velocity if it takes shapes and rates (S, C, d) at once, else, if it takes a single shape and rate, one that
     asks for each in turn."""
     try:
         if fits(velocity(alpha, rates), (*alpha.shape[:-2], *rates.shape[:-1], 3)):
@@ -105,7 +105,7 @@ def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.nd
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
     if not callable(velocity):
         raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
-    xi = real_array("what velocity returns", velocity(alpha, alphadot))
+    xi = real_array("what velocity returns", velocity(*np.broadcast_arrays(alpha, alphadot)))
     if xi.shape != shape and fits(xi, shape):
         xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:

@@ -9,6 +9,8 @@ import numpy as np
 from geomech.core.errors import SceneError, check_angle, is_number, number, real_array, short
 from geomech.scene.model import Scene
 from geomech.systems.base import System
+from geomech.systems.capabilities import stored
+from geomech.systems.framed import Framed
 
 LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
 Within = float | tuple[tuple[float, float], ...]
@@ -22,7 +24,7 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
     system = scene.system
     low, high = edges(system)
     if within is None:
-        if system.stored("connection"):
+        if stored(system, "connection"):
             return _told(low, high)
         n = scene.numerics
         within = min(
@@ -44,10 +46,8 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
 
 def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest shapes (joints,) of the field of a table, or of a frame; infinite where there is neither."""
-    own = system.stored("connection")
-    axes = (
-        own.axes if own else system.axes if getattr(system, "carried", False) else [(-np.inf, np.inf)] * system.joints
-    )
+    own = stored(system, "connection")
+    axes = own.axes if own else system.axes if isinstance(system, Framed) else [(-np.inf, np.inf)] * system.joints
     return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
 
 

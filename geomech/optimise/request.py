@@ -20,7 +20,11 @@ from geomech.optimise.loops import DENSE, IN_MIRROR, OUTLINES, Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
-from geomech.systems.base import Premise, System
+from geomech.systems.base import System, kind_of
+from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near, stored
+from geomech.systems.framed import Framed, in_frame
+from geomech.systems.premises import listed, refuse
+from rft.premise import ALL, Premise
 
 JOINTS = 12  # more make more numbers than a search without a model of them can find
 PHASES = 128  # of a cycle in the search
@@ -71,20 +75,20 @@ class Request:
         and self.system.traits.singularity is None,
         doc="Whether a table leads near.",
     )  # fmt: skip
-    stored = property(lambda self: self.system.stored("connection"))
+    stored = property(lambda self: stored(self.system, "connection"))
 
     @cached_property
     def power(self) -> Callable | None:
         """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square of its
         own metric for a system that has one; None where nothing tells what moving costs."""
-        system, length = self.system, self.system.length
+        system = self.system
         if self.stored:
-            told, degree, box = system.stored("metric"), system.traits.power_degree or 2.0, self.loops.box
+            told, degree, box = stored(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
             return told and (lambda alpha, alphadot, xi: told.norm(np.clip(alpha, *box), alphadot) ** degree)
-        if system.cost is not None:
-            return lambda alpha, alphadot, xi: system.cost(alpha, alphadot)
-        work = getattr(system, "work", None)
-        return work and (lambda alpha, alphadot, xi: work(alpha, alphadot, xi).power / length)
+        if own := capability(system, OwnMetric):
+            return lambda alpha, alphadot, xi: own.squared_speed(alpha, alphadot)
+        dissipative = capability(system, Dissipative)
+        return dissipative and dissipative.power
 
     @cached_property
     def degree(self) -> float:
@@ -93,9 +97,9 @@ class Request:
         if self.power is None:
             instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
             raise ValueError(f"--for {aim.name} asks for power, which {told_by(system)} does not tell: {instead}")
-        if system.cost is not None:
+        if capability(system, OwnMetric) is not None:
             if aim.power is not None:
-                raise ValueError(f"--power is that of drag, and the {system.kind} has none: say --rate")
+                raise ValueError(f"--power is that of drag, and the {kind_of(system)} has none: say --rate")
             return 2.0
         if self.stored:
             return system.traits.power_degree
@@ -110,7 +114,7 @@ class Request:
         degrees = np.log2(fast / slow)
         if np.ptp(degrees) > DEGREES:
             raise ValueError(
-                f"no path has a length with {self.system.blames}: its power is of no one degree in the rate; "
+                f"no path has a length with {listed(self.system, ALL)}: its power is of no one degree in the rate; "
                 "optimize for displacement"
             )
         return float(np.round(degrees.mean(), 3))
@@ -172,14 +176,14 @@ def checked(
         number("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
-        if system.near:
+        if near(system):
             raise SceneError(
-                f"no gait but one to search: A is known near {system.near} alone; measure more varied cycles"
+                f"no gait but one to search: A is known near {near(system)} alone; measure more varied cycles"
             )
         wanted = Aim(aim, towards, system.length, **limits)
         if wanted.timed:
             if system.traits.lacks & Premise.RATE_INDEPENDENT:
-                system.refuse("speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
+                refuse(system, "speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
                 waves = isinstance(scene.gait, Sine)
                 own = {"power": _own_power(scene)} if waves else {"rate": _own_rate(scene)}
@@ -197,9 +201,13 @@ def checked(
         if wanted.costs:
             request.degree  # noqa: B018 - refuses what has none
         if wanted.straight and _stays(system):
-            raise SceneError(f"the {system.kind} goes nowhere: its mean frame stays where it is; optimize for turning")
+            raise SceneError(
+                f"the {kind_of(system)} goes nowhere: its mean frame stays where it is; optimize for turning"
+            )
         if wanted.name == "turning" and _never_turns(request):
-            whose = f"{told_by(system)} tells a body whose" if system.stored("connection") else f"the {system.kind}'s"
+            whose = (
+                f"{told_by(system)} tells a body whose" if stored(system, "connection") else f"the {kind_of(system)}'s"
+            )
             raise SceneError(
                 f"no gait turns it: {whose} heading follows from its shape and comes back with it; optimize for displacement"
             )
@@ -208,7 +216,7 @@ def checked(
 
 def told_by(system: System) -> str:
     """A system, or its file."""
-    return "the table's file" if system.stored("connection") else f"the {system.kind}"
+    return "the table's file" if stored(system, "connection") else f"the {kind_of(system)}"
 
 
 def _in_mirror(request: Request) -> bool:
@@ -218,10 +226,10 @@ def _in_mirror(request: Request) -> bool:
 
 def _stays(system: System) -> bool:
     """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
-    if system.traits.steps or not system.traits.linear or system.stored("connection"):
+    if system.traits.steps or not system.traits.linear or stored(system, "connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
-        system = system.in_frame("mean")
+        system = in_frame(system, "mean")
     rng = np.random.default_rng(0)
     xi = evaluate(system.velocity, *rng.normal(size=(2, 16, system.joints)))
     return bool(np.nanmax(np.abs(xi[:, :2])) <= STILL * system.length * np.nanmax(np.abs(xi)))
@@ -265,4 +273,4 @@ def _loops(scene: Scene, harmonics: int | None, within: Asked) -> Loops | Undula
 
 
 def _inner(system: System) -> System:
-    return system.inner if getattr(system, "carried", False) else system
+    return system.inner if isinstance(system, Framed) else system

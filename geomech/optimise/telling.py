@@ -10,6 +10,7 @@ from geomech.optimise.cycles import Brought, brought
 from geomech.optimise.optimum import Told
 from geomech.optimise.request import Request
 from geomech.study import estimate
+from geomech.systems.capabilities import OwnMetric, capability
 
 
 def told(r: Request, gait: Gait) -> Told:
@@ -33,7 +34,7 @@ def told(r: Request, gait: Gait) -> Told:
         error = (error + value * abs(length - coarse)) / (length or 1.0)
     if aim.timed:
         error = error / (2 * np.pi * (period or 1.0))
-    work = 2 * np.pi * b.power[0] if b.power and system.cost is None else None
+    work = 2 * np.pi * b.power[0] if b.power and capability(system, OwnMetric) is None else None
     return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
 
 

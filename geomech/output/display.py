@@ -17,6 +17,7 @@ from geomech.study.bench import Study
 from geomech.study.results import Displacements
 from geomech.study.sweep import Swept
 from geomech.study.tables import position_spread
+from geomech.text.system import described
 
 MOST_ROWS = 40
 DPI = 90
@@ -63,7 +64,7 @@ def study(bench: Study) -> str:
     """Its scene, tiers and, where it is computed already, the CCF with the scene's gait."""
     scene, held = bench.scene, {key[0] for key in bench.computed}
     rows = [
-        ("system", scene.system.told()[0]),
+        ("system", described(scene.system)[0]),
         ("gait", repr(scene.gait)),
         ("numerics", repr(scene.numerics)),
         ("tiers", ", ".join(bench.tiers)),

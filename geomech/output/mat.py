@@ -10,8 +10,10 @@ import numpy as np
 from geomech.io.files import whole_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 from geomech.study.bench import Study
+from geomech.study.fields import recorded
 from geomech.study.shape_space import check_two_joints
 from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.capabilities import stored
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
@@ -28,7 +30,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     even = study.even_part  # counts at half of all directions
     left = fitted.residual if even is None else np.sqrt(fitted.residual**2 + even**2 / 2)
     rest = {} if np.isnan(left[:, ~np.isnan(fitted.A).any((0, 1))]).any() else {RESIDUAL: left}
-    if (error := scene.system.stored("A_error")) is not None:
+    if (error := stored(scene.system, "A_error")) is not None:
         rest[ERROR] = error
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))
@@ -41,7 +43,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     about = {
         "sign": sign, "frame": scene.frame, "length": float(s.length), "unit": length_unit(s), "interpolation": fitted.degree,
         "shapes": names, "conventions": f"xi = {sign} A alphadot; {meaning}",
-        **{key: value for key, value in s.about().items() if key in ("singular_shapes", "level")},
+        **{key: value for key, value in recorded(s).items() if key in ("singular_shapes", "level")},
     }  # fmt: skip
     arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, **rest}.items()}
     with whole_file(path) as part:

@@ -19,6 +19,7 @@ from geomech.scene.write import toml
 from geomech.study import accuracy, fields, tables
 from geomech.study.report import Reported
 from geomech.systems.base import shape_labels
+from geomech.systems.framed import Framed
 
 SCENE, TABLES = "scene.toml", "displacement.json"
 
@@ -60,7 +61,7 @@ def _maps(found: Reported, folder: Path) -> None:
         _save(plots.planes_figure(found.planes, scene.gait, labels=labels), folder / "ccf")
         return
     _save(plots.connection_figure(study.fitted, labels=labels), folder / "connection")
-    if scene.system.carried:
+    if isinstance(scene.system, Framed):
         _save(plots.frame_figure(scene.system.field.field, labels=labels), folder / "frame")
     maps = plots.ccf_figure(study.curvature, found.gaits, error=study.curvature_error, labels=labels)
     _save(maps, folder / "ccf")

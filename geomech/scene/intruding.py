@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from geomech.core.errors import named, short
-from geomech.systems.said import said
+from geomech.core.summary import part
 from rft.checks import check_numbers
 from rft.ground import KINDS, GroundEffect, checked_effects, weight
 from rft.premise import negated
@@ -68,7 +68,7 @@ class Intruding:
 
     def told(self) -> list[str]:
         """Lines about the law, the body and its motion, and which effects are on and off."""
-        medium, body, motion = (said(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
+        medium, body, motion = (part(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
         lines = [f"{self.name}: {body} of {self.count:,} {self.parts}", f"motion: {motion}", f"medium: {medium}"]
         lines += self.effects_told()
         off = [kind for kind in KINDS if kind not in [e.kind for e in self.effects]]
@@ -91,7 +91,7 @@ def of_effects(effects) -> list[str]:
     lines = []
     for effect in effects:
         lines.append(
-            f"on:  {said(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
             f"gone at {effect.limit}, order {effect.order}"
         )
         if effect.assumes:

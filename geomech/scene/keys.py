@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from geomech.core.errors import choose
+from geomech.core.registry import Registry
 from geomech.scene.intruder import IntruderScene
 from geomech.scene.key import Key, first_sentence
-from geomech.scene.kinds import FAMILIES, unloaded
 from geomech.scene.model import Scene
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, keys_in, variants
 from geomech.scene.solid import MeshScene
@@ -78,8 +78,8 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
 
 def _of_packages(section: Section) -> Iterator[Part]:
     """Yield what installed packages offer."""
-    if group := group_of(section):
-        new, refused = unloaded(group)
+    if (registry := registry_of(section)) is not None:
+        new, refused = registry.unloaded()
         for name, package in new.items():
             yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
         for name, package in refused.items():
@@ -87,10 +87,9 @@ def _of_packages(section: Section) -> Iterator[Part]:
             yield Part(f'{section.key} = "{name}"', why, [])
 
 
-def group_of(section: Section) -> str:
-    """Return the group of entry points by which packages offer what a section may name, "" if there is none."""
-    kinds = section.kinds if isinstance(section, OneOf) else None
-    return next((group for group, family in FAMILIES.items() if family.kinds is kinds), "")
+def registry_of(section: Section) -> Registry | None:
+    """Return the registry of what a section may name, None if that is fixed."""
+    return section.kinds if isinstance(section, OneOf) and isinstance(section.kinds, Registry) else None
 
 
 def names() -> list[str]:

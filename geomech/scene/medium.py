@@ -95,4 +95,4 @@ def _columns(source: Rows) -> tuple[str, tuple[str, str]]:
 
 
 DRAG = FromFile(_rows, "CSV with the header psi_deg,f_t,f_n, in place of psi, f_t and f_n", ("psi", "f_t", "f_n"))
-MEDIUM = OneOf(PARTS["medium"][1], "law", otherwise=(NamedMedium, MediumFile), files={"table": DRAG})
+MEDIUM = OneOf(PARTS["medium"], "law", otherwise=(NamedMedium, MediumFile), files={"table": DRAG})

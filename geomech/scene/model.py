@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import Cycle, System, checked_system
+from geomech.systems.base import Cycle, System, as_system, given, kind_of, note_angles
+from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
 
@@ -27,11 +28,10 @@ FRAME = (
     "which the connection is smallest"
 )
 SHORT = "swimmer"  # the kind of system whose sections may stand by themselves
-_kinds = {part: kinds for part, (_, kinds) in PARTS.items()}
 SWIMMER = {
     "medium": MEDIUM,
-    "body": OneOf(_kinds["body"], sized=True),
-    "effects": Each(_kinds["effects"], sized=True),
+    "body": OneOf(PARTS["body"], sized=True),
+    "effects": Each(PARTS["effects"], sized=True),
 }
 
 
@@ -61,25 +61,27 @@ class Scene(Told):
             for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
                 if not isinstance(getattr(self, what), kind):
                     raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
-            _check_joints(checked_system(self.system), checked_gait(self.gait))
+            gait = checked_gait(self.gait)
+            object.__setattr__(self, "system", as_system(self.system, gait.joints))
+            _check_joints(self.system, gait)
             frequency_of(self.system, self.gait)
             object.__setattr__(self, "system", reframed(self.system, self.numerics))
             self.note_turns(self.gait)
 
     def note_turns(self, gait: Gait, amplitudes=None) -> None:
         """UnitWarning if a gait turns a joint by more than a full turn."""
-        if hasattr(gait, "largest") and hasattr(self.system, "note_angles"):
-            self.system.note_angles(gait.largest(amplitudes))
+        if hasattr(gait, "largest"):
+            note_angles(self.system, gait.largest(amplitudes))
 
     frame = property(lambda self: self.system.traits.frame, doc="The body frame of all velocities and displacements.")
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
         """This scene with some of its [numerics] changed, the system's own among them; None keeps a value."""
-        own = {f.name for f in dataclasses.fields(self.system.solver)} if self.system.solver else set()
+        own = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with named(self.name):
-            system = self.system.with_solver(**{k: v for k, v in changes.items() if k in own})
+            system = with_solver(self.system, {k: v for k, v in changes.items() if k in own})
             rest = {k: v for k, v in changes.items() if k not in own}
             for name in rest:
                 choose("numerics", name, [*own, *self.numerics.__dataclass_fields__])
@@ -90,17 +92,21 @@ class Scene(Told):
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with named(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
-            parts = [f.name for f in dataclasses.fields(checked_system(own.get("system", self.system)))]
+            system = given(own.get("system", self.system))
             for name in of_system:
-                choose("part", name, ["system", "gait", "numerics", "name", *parts])
+                choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
             if of_system:
-                own["system"] = dataclasses.replace(own.get("system", self.system), **of_system)
+                own["system"] = dataclasses.replace(system, **of_system)
             return dataclasses.replace(self, **own)
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
         """A gait, or the scene's own, run for amplitudes (...,), all at once."""
         gait = checked_gait(self.gait if gait is None else gait)
         return self.system.run(*gait.cycle(phases or self.numerics.phases, amplitudes), work)
+
+
+def _fields(thing) -> tuple:
+    return dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
 
 
 def _check_joints(system: System, gait: Gait) -> None:
@@ -110,7 +116,7 @@ def _check_joints(system: System, gait: Gait) -> None:
             "give the body one link more than the gait has joints, or as many modes, or another gait",
         )
         if not hasattr(system, "body"):
-            whose, cure = f"the {system.kind}", "give it another gait"
+            whose, cure = f"the {kind_of(system)}", "give it another gait"
         told = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {whose} has {system.joints}"
         raise ValueError(f"{told}: {cure}")
 
@@ -129,6 +135,6 @@ def frequency_of(system: System, gait: Gait) -> float | None:
     if own is None or others is None:
         return others if own is None else own
     if np.any(np.asarray(others) != own):
-        told = f"[gait] frequency = {own:g}, but the effects of the {system.kind} have {short(others)}"
+        told = f"[gait] frequency = {own:g}, but the effects of the {kind_of(system)} have {short(others)}"
         raise ValueError(f"{told}: it is one swimmer, keep one")
     return own

@@ -14,6 +14,7 @@ from geomech.io.files import note, read_text
 from geomech.scene import reader, slips, swimming
 from geomech.scene.medium import MEDIUM
 from geomech.scene.model import Scene, checked_scene
+from geomech.systems.base import kind_of
 from geomech.systems.swimmer import Swimmer
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def in_medium(scene: Scene, file: str | Path) -> Scene:
     """The scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name ends in .csv;
     relative to the current folder. SceneError if that holds none, or the scene's system takes none."""
     if not isinstance(scene.system, Swimmer):
-        raise SceneError(f"{scene.name}: a {scene.system.kind} takes no medium")
+        raise SceneError(f"{scene.name}: a {kind_of(scene.system)} takes no medium")
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"

@@ -13,9 +13,9 @@ from typing import Any, TypeVar
 import msgspec
 
 from geomech.core.errors import SceneError, UnitWarning, choose, named, short
+from geomech.core.registry import Registry
 from geomech.scene import slips
 from geomech.scene.key import Key, spellings, words_of
-from geomech.scene.kinds import choose_kind
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
 
@@ -114,12 +114,16 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
     return build(source, place, table, variant.kind, inner, label)
 
 
+def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
+    return kinds.choose(place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
+
+
 def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:
     """Return which of the classes a section names, and its other keys."""
     if isinstance(section, Keys):
         return Variant({}, section.kind), table
     if section.key in table:
-        name = choose_kind(f"{place} {section.key}", table[section.key], section.kinds)
+        name = _choose(f"{place} {section.key}", table[section.key], section.kinds)
         table = {key: value for key, value in table.items() if key != section.key}
         if not isinstance(section.kinds[name], OneOf):
             return variant_of(section, name), table

@@ -13,10 +13,16 @@ from geomech.scene.model import SHORT, SWIMMER, Scene
 from geomech.scene.sections import sections_of
 from geomech.scene.sizes import Sizes
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import NoSolver, System
+from geomech.systems.base import System
+from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import Swimmer
 from geomech.tiers.base import Numerics
+
+
+@dataclasses.dataclass(frozen=True)
+class NoSolver:
+    """The part of [numerics] of a system that has none."""
 
 
 def from_tables(tables: Mapping, name: str, text: str) -> Scene:
@@ -48,7 +54,7 @@ def _system(tables: Mapping, name: str) -> dict:
 def _with_numerics(system: System, given: Mapping, source: reader.Source) -> tuple[System, Numerics]:
     """Return a system with its part of [numerics], and the rest, which is the tiers'."""
     place = f"{source.name}: [numerics]"
-    own = type(system.solver) if system.solver else NoSolver
+    own = NoSolver if (solver := solver_of(system)) is None else type(solver)
     names = [field.name for kind in (Numerics, own) for field in dataclasses.fields(kind)]
     of = {True: {}, False: {}}
     for key, value in given.items():
@@ -56,7 +62,7 @@ def _with_numerics(system: System, given: Mapping, source: reader.Source) -> tup
             choose(f"{place} key", key, names)
         of[key in spellings(own)][key] = value
     if of[True]:
-        system = dataclasses.replace(system, solver=reader.build(source, place, of[True], own))
+        system = system.with_solver(reader.build(source, place, of[True], own))
     return system, reader.build(source, place, of[False], Numerics)
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 from geomech.core.errors import SceneError, named, short
+from geomech.core.summary import part
 from geomech.scene.intruder import OUTLINES
 from geomech.scene.intruding import of_effects
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.stress import SpatialKeys, StressKeys
-from geomech.systems.said import said
 from rft.ground import KINDS as EFFECTS
 from rft.ground import GroundEffect
 from rft.meshes import Screw, Spatial
@@ -68,7 +68,7 @@ class WalkerScene:
 
     def told(self) -> list[str]:
         """Lines about the robot, its clock, the law and the engine, and which effects are on and off."""
-        robot, gait, medium = (said(type(x).__name__, x) for x in (self.robot, self.gait, self.medium))
+        robot, gait, medium = (part(type(x).__name__, x) for x in (self.robot, self.gait, self.medium))
         lines = [f"{self.name}: {robot}", f"gait: {gait}", f"medium: {medium}", f"engine: {self.engine}"]
         off = [kind for kind in sorted(KINDS) if kind not in [e.kind for e in self.effects]]
         return [*lines, *of_effects(self.effects), "off, not evaluated: " + (", ".join(off) or "none")]

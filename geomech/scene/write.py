@@ -17,8 +17,10 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.scene.sections import Each, Keys, Section, sections_of, variants
-from geomech.systems.said import name_in
-from geomech.systems.swimmer import Swimmer
+from geomech.systems.base import given
+from geomech.systems.capabilities import solver_of
+from geomech.systems.framed import Framed
+from geomech.systems.swimmer import Swimmer, name_in
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -101,7 +103,7 @@ def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
         out = {}
         for name, (section, *_) in sections_of(type(scene)).items():
             part = getattr(scene, name, scene)  # the scene itself where its own fields are keys
-            if table := section_tables(getattr(part, "inner", part) if name == "system" else part, section):
+            if table := section_tables(_named(part), section):
                 out[name] = table
         if isinstance(scene, Scene):
             out = _short(out, scene)
@@ -132,7 +134,7 @@ def _section(part: Any, section: Section) -> dict:
 def _short(tables: dict, scene: Scene) -> dict:
     """Return tables with a swimmer's parts in place of [system], and once what holds for the whole scene."""
     system, effects = tables.pop("system"), []
-    if isinstance(getattr(scene.system, "inner", scene.system), Swimmer):
+    if isinstance(_named(scene.system), Swimmer):
         tables = {part: system[part] for part in SWIMMER if system[part]} | tables
         effects = tables.get("effects", [])
     else:
@@ -148,8 +150,15 @@ def _short(tables: dict, scene: Scene) -> dict:
     return tables | {"numerics": _numerics(scene)}
 
 
+def _named(part: Any) -> Any:
+    """Return the object inside a system that a scene file can name."""
+    if isinstance(part, Framed):
+        return _named(part.inner)
+    return given(part)
+
+
 def _numerics(scene: Scene) -> dict:
-    parts = [scene.numerics, scene.system.solver]
+    parts = [scene.numerics, solver_of(scene.system)]
     return {key: value for part in parts if part for key, value in _fields(part, type(part)).items()}
 
 

@@ -15,10 +15,10 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from geomech.core.knob import ROUNDING, Knob
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import Cost
 from geomech.run.jobs import runner
-from geomech.study.knob import ROUNDING, Knob
 from geomech.study.question import Allow, Progress, Question
 
 

@@ -27,8 +27,10 @@ from geomech.study import cost, effort, estimate, tables, uncertainty
 from geomech.study.offer import METHODS as METHODS
 from geomech.study.offer import methods, tiers
 from geomech.study.results import Displacements
-from geomech.systems.base import shape_labels
+from geomech.systems.base import refuse_singular, shape_labels
+from geomech.systems.capabilities import at_once, stored
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
+from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
 from geomech.tiers.harmonic import HARMONIC
@@ -63,7 +65,7 @@ class Study(Faced):
         with named(s.name):
             if frame == s.frame:
                 raise ValueError(f"the frame is {frame!r} already: name another")
-            system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else s.system.in_frame(frame)
+            system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
             return Study(s.changed(system=system), self._tables)
 
     methods = property(lambda self: methods(self.scene.system))
@@ -204,8 +206,8 @@ class Study(Faced):
     def even_part(self) -> np.ndarray | None:
         """What of the velocity is even in alphadot, as skin friction makes it (`connection.even_part`): None if nothing."""
         system = self.scene.system
-        if system.stored("connection"):
-            return system.stored("even part")
+        if stored(system, "connection"):
+            return stored(system, "even part")
         build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
         return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
 
@@ -239,7 +241,7 @@ class Study(Faced):
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
         shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
-        in_groups(shapes, every, system.at_once(n.phases))
+        in_groups(shapes, every, at_once(system, n.phases))
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
@@ -248,7 +250,7 @@ class Study(Faced):
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if plan.table and plan.table.amplitudes is not None:
                 a = plan.table.amplitudes
-            system.refuse_singular(gait.cycle(phases, a)[0])
+            refuse_singular(system, gait.cycle(phases, a)[0])
 
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None

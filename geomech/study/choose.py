@@ -15,7 +15,9 @@ from geomech.study import cost, tables, uncertainty
 from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
+from geomech.systems.capabilities import pieces_of, settling, solver_of
 from geomech.tiers.base import solved
+from geomech.tiers.direct import DIRECT
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # that a tolerance asks for
@@ -39,8 +41,8 @@ def cheapest(
     if amplitudes.ndim != 1 or not amplitudes.size:
         raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
     scene.note_turns(gait, amplitudes)
-    if tol <= system.settling:
-        raise SceneError(f"{scene.name}: cycles with these effects repeat to {system.settling:g} only: raise --tol")
+    if tol <= settling(system):
+        raise SceneError(f"{scene.name}: cycles with these effects repeat to {settling(system):g} only: raise --tol")
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
@@ -74,12 +76,12 @@ def cheapest(
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
         found = " and ".join(f"{n} {name}" for name, n in settings.items())
-        finer = "lower [numerics] regularisation and tolerance" if system.solver else "take a finer table"
+        finer = "lower [numerics] regularisation and tolerance" if solver_of(system) else "take a finer table"
         raise SceneError(
             f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
             f"raise --tol, or {finer}"
         )
-    return answer("direct", poses, error, settings)
+    return answer(DIRECT.name, poses, error, settings)
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
@@ -88,17 +90,17 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
     {"phases": ..., "pieces": ... where there are any}."""
     ask(cost.direct(scene, gait, len(amplitudes), phases))
     poses, error, of_pieces = in_groups(scene, gait, amplitudes, phases)
-    error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), getattr(scene.system.solver, "pieces", 0)
+    error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), getattr(solver_of(scene.system), "pieces", 0)
     while (worse := open_[error[open_, 0] > tol]).size:
         coarse_pieces = of_pieces[worse, 0].max() > 0.5 * error[worse, 0].max()
         if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
             break
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        finer_scene = scene.with_numerics(pieces=pieces) if scene.system.cut else scene
+        finer_scene = scene.with_numerics(pieces=pieces) if pieces_of(scene.system) else scene
         ask(cost.direct(finer_scene, gait, len(worse), phases))
         finer, now, left = in_groups(finer_scene, gait, amplitudes[worse], phases)
         stalled = (now + left > 0.9 * error[worse])[:, 0].all() and phases > 1024
         poses[worse], error[worse], of_pieces[worse], open_ = finer, now + left, left, worse
         if stalled:
             break
-    return (poses, error), {"phases": phases, **({"pieces": pieces} if scene.system.cut else {})}
+    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_of(scene.system) else {})}

@@ -21,10 +21,12 @@ from geomech.run.cost import BASE, Cost, assumed
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.systems.base import System
+from geomech.systems.capabilities import at_once, costed, pieces_of, refined, settling, solver_of, stored
+from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
 
-CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, for each of a system's ``evaluations``; assumed
+CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, measured for those that ship, assumed for others
 LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number of it that this sums; measured
 CYCLES = 3  # until they repeat, assumed
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
@@ -50,10 +52,12 @@ def price(jobs: Sequence[Job]) -> Cost:
     with suiting(balances):
         for job in jobs:
             system = job.scene.system
-            if system.solver is None:
-                besides += CLOSED * system.evaluations * job.count
+            if solver_of(system) is None:
+                besides += CLOSED * job.count
             else:
-                seconds += assumed(job.weight * job.count, system.evaluations, system.traits.linear, job.batches)
+                seconds += assumed(
+                    job.weight * job.count, costed(system).evaluations, system.traits.linear, job.batches
+                )
     return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides)
 
 
@@ -104,7 +108,7 @@ def _spread_out(scene: Scene, count: float, memory: float) -> list[Job]:
 
 def frame(scene: Scene) -> list[Job]:
     """The field that a frame is made of which is one itself, as "minimum-perturbation" is."""
-    return connection(scene) if scene.system.carried else []
+    return connection(scene) if isinstance(scene.system, Framed) else []
 
 
 def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize) -> list[Job]:
@@ -124,8 +128,8 @@ def direct(
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, system.at_once(phases))
-    held = group * (60 * system.elements + system.held) if stepping else 0
+    group = min(max(1, count), together, at_once(system, phases))
+    held = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
     solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
@@ -134,12 +138,14 @@ def direct(
         Job(scene, cycles * count * solves(n), groups * (cycles * n if stepping else 1), weight, memory=memory)
         for n, weight in runs
     ]
-    return jobs + (frame(scene) * groups * (len(runs) - 1) if system.carried else [])  # other models have their own
+    return jobs + (
+        frame(scene) * groups * (len(runs) - 1) if isinstance(system, Framed) else []
+    )  # other models have their own
 
 
 def cycles_of(system: System) -> int:
     """Return how many cycles a gait is run for: as it is told, one where no cycle is like another, else an assumption."""
-    return CYCLES if system.settles else (system.traits.steps and system.solver.cycles) or 1
+    return CYCLES if settling(system) else (system.traits.steps and solver_of(system).cycles) or 1
 
 
 def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
@@ -149,8 +155,8 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
     runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
-    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if system.cut else []
-    return runs + ([(quarter, 1.0)] if system.finer() else [])
+    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_of(system) else []
+    return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
 def connection(scene: Scene) -> list[Job]:
@@ -173,7 +179,7 @@ def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
 def of_even_part(scene: Scene) -> list[Job]:
     """What of the velocity is even in alphadot (`Study.even_part`): a look at a few shapes, and at all where it is not odd."""
     system = scene.system
-    if system.stored("connection"):
+    if stored(system, "connection"):
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
     looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
@@ -189,7 +195,7 @@ def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> l
 def of_metric(scene: Scene) -> list[Job]:
     """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics
-    if system.stored("metric"):
+    if stored(system, "metric"):
         return []
     if effort.shared(system):
         return built(scene, effort.shared_table(system, n))
@@ -205,4 +211,4 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if system.cut else [])
+    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_of(system) else [])

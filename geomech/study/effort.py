@@ -25,11 +25,14 @@ from geomech.geometry.metric import Finsler, Metric
 from geomech.scene.model import Scene
 from geomech.study import tables
 from geomech.study.estimate import MOST_PIECES
-from geomech.systems.base import SHAPE_ALONE, System
+from geomech.systems.base import System, kind_of
+from geomech.systems.capabilities import Dissipative, OwnMetric, at_once, capability, driven, pieces_of, power, stored
+from geomech.systems.premises import because, listed
 from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, Table, in_groups
 from geomech.tiers.fitted import axes
 from geomech.tiers.harmonic import HARMONIC
+from rft.premise import ALL, SHAPE_ALONE
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
@@ -39,16 +42,15 @@ EVEN = 1e-6  # of the power: a solver's rounding is below it
 
 def why_none(system: System) -> str:
     """Why a system has no metric, in words that follow its name; "" if it has one."""
-    if blame := system.blame(SHAPE_ALONE):
+    if blame := because(system, SHAPE_ALONE):
         return f"no metric with {blame}: its power does not follow from shape alone"
-    if system.stored("connection"):
-        return "" if system.stored("metric") else "no metric with this table: its file tells no power"
-    if system.cost is not None:
+    if stored(system, "connection"):
+        return "" if stored(system, "metric") else "no metric with this table: its file tells no power"
+    if capability(system, OwnMetric) is not None:
         return ""
     if system.traits.power_degree is None:
-        power = (
-            "its power is of no one degree in the rate" if hasattr(system, "work") else "nothing says what moving costs"
-        )
+        has_power = capability(system, Dissipative) is not None
+        power = "its power is of no one degree in the rate" if has_power else "nothing says what moving costs"
         return f"no metric with {_who(system)}: {power}"
     if not system.traits.linear and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
@@ -57,7 +59,7 @@ def why_none(system: System) -> str:
 
 def _who(system: System) -> str:
     """What of a system is to blame; the whole where no premise is lacking."""
-    return system.blames or f"this {system.kind}"
+    return listed(system, ALL)
 
 
 @lru_cache(maxsize=16)
@@ -67,7 +69,7 @@ def _even(system: System) -> bool:
         return True
     rng = np.random.default_rng(0)
     alpha, alphadot = rng.uniform(-1.0, 1.0, (connection.EVEN_SHAPES, 1, 2)), connection.directions(2, 8)
-    forth, back = (system.power(alpha, sign * alphadot) for sign in (1, -1))
+    forth, back = (power(system, alpha, sign * alphadot) for sign in (1, -1))
     return bool(np.abs(forth - back).max() <= EVEN * np.abs(forth).max())
 
 
@@ -75,11 +77,12 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
     """The metric on the field's grid: quadratic where xi = A alphadot, else a norm. ValueError if it has none."""
     if reason := why_none(system):
         raise ValueError(reason)
-    if own := system.stored("metric"):
+    if own := stored(system, "metric"):
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
-    if system.cost is not None or system.traits.linear:
-        return metric.fit(system.cost or system.power, grid, degree, progress)
+    own = capability(system, OwnMetric)
+    if own is not None or system.traits.linear:
+        return metric.fit(own.squared_speed if own else partial(power, system), grid, degree, progress)
     norm = partial(_norm_of, system)
     count = harmonic.directions(system, numerics)
     return metric.fit_norm(norm, grid, count, degree, progress, highest=HIGHEST)
@@ -87,7 +90,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
 
 def shared(system: System) -> bool:
     """Whether a metric takes the very velocities of the harmonic table."""
-    of_its_own = system.traits.linear or system.cost is not None or system.stored("connection")
+    of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored(system, "connection")
     return not of_its_own and HARMONIC.is_offered(system)
 
 
@@ -130,14 +133,14 @@ class _Driven(connection.Telling):
     """The velocity of a system, which tells the power besides."""
 
     def __init__(self, system: System, powers: list):
-        self.both, self.heard = system.driven, powers.append
+        self.both, self.heard = partial(driven, system), powers.append
 
     def __reduce__(self) -> tuple:
-        return _Driven, (self.both.__self__, [])
+        return _Driven, (self.both.args[0], [])
 
 
 def _norm_of(system: System, alpha, alphadot) -> np.ndarray:
-    return _norm(system.power(alpha, alphadot), system.traits.power_degree)
+    return _norm(power(system, alpha, alphadot), system.traits.power_degree)
 
 
 def _norm(power, degree: float) -> np.ndarray:
@@ -147,9 +150,9 @@ def _norm(power, degree: float) -> np.ndarray:
 def refuse_costless(scene: Scene) -> None:
     """SceneError for a scene of which nothing says what moving costs."""
     system = scene.system
-    if not (hasattr(system, "work") or system.cost is not None or system.stored("metric")):
-        what = "its file does not tell it" if system.stored("connection") else "nothing says what moving costs"
-        raise SceneError(f"{scene.name}: no path length or work with the {system.kind}: {what}")
+    if not any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
+        what = "its file does not tell it" if stored(system, "connection") else "nothing says what moving costs"
+        raise SceneError(f"{scene.name}: no path length or work with the {kind_of(system)}: {what}")
 
 
 def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
@@ -161,7 +164,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     number("phases", phases or 8, 8, 1e6, whole=True)
     phases = phases_of(scene, phases)
-    finer = scene.with_numerics(pieces=min(2 * system.cut, MOST_PIECES)).system if system.cut else None
+    finer = scene.with_numerics(pieces=min(2 * pieces_of(system), MOST_PIECES)).system if pieces_of(system) else None
 
     integral = lambda rates: 2 * np.pi * rates.mean(-1)
 
@@ -181,7 +184,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
-    return dict(zip(names, in_groups(told, amplitudes, system.at_once(phases))[:, :4].T))
+    return dict(zip(names, in_groups(told, amplitudes, at_once(system, phases))[:, :4].T))
 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:
@@ -192,11 +195,12 @@ def phases_of(scene: Scene, phases: int | None = None) -> int:
 def _rates(system: System, alpha, alphadot) -> np.ndarray:
     """(B, 2, N): what path length and work are the integrals of, nan where there is none."""
     degree = system.traits.power_degree
-    if system.cost is not None:  # a metric, of which there is no work
-        square = np.asarray(system.cost(alpha, alphadot))
+    own = capability(system, OwnMetric)
+    if own is not None:  # a metric, of which there is no work
+        square = np.asarray(own.squared_speed(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
     done = system.run(alpha, alphadot, True).work
-    P = system.power(alpha, alphadot) if done is None else done.power / system.length
+    P = power(system, alpha, alphadot) if done is None else done.power / system.length
     return np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
 
 
@@ -220,7 +224,7 @@ def with_effort(result: Result) -> Result:
 
 def units(system: System) -> dict[str, str]:
     """Return the units of what `with_effort` adds."""
-    if system.cost is not None:
+    if capability(system, OwnMetric) is not None:
         return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
     length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"
     work = "axial drag x BL" if system.traits.power_degree == 1 else "axial drag at 1 BL per rad of phase, x BL"

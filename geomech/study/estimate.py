@@ -17,6 +17,7 @@ from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scene.model import Scene
+from geomech.systems.capabilities import at_once, is_closed, own_error, pieces_of, refined
 
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
@@ -51,7 +52,7 @@ def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tup
 
 def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, ...]:
     """(poses, errors of all but the pieces of body, errors of these) of the direct tier; None: the gait's own amplitude."""
-    size = scene.system.at_once(phases)
+    size = at_once(scene.system, phases)
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
@@ -81,11 +82,10 @@ def _direct(
         stepping or not system.traits.smooth,
     )
     error += 2 * np.pi * (np.maximum(run.residual, ROUNDING) * run.speed)[:, None]
-    if finer := system.finer():
-        near = (False, run.xi[..., ::4, :]) if system.starts and not stepping else ()  # without work, from there
-        off = apart(finer.run(*every[1], *near).net, coarse, scene.system.length)
-        error += SEEN * off if system.closed else SEEN_BY_RULES * np.maximum(off, off.max(-1, keepdims=True) / 2)
-    error += np.asarray(run.to_come)[..., None] + system.own_error(*every[2])
+    if finer := refined(system):
+        off = apart(finer.run(*every[1], start=run.xi[..., ::4, :]).net, coarse, scene.system.length)
+        error += SEEN * off if is_closed(system) else SEEN_BY_RULES * np.maximum(off, off.max(-1, keepdims=True) / 2)
+    error += np.asarray(run.to_come)[..., None] + own_error(system, *every[2])
     return full, error, pieces_error(scene, shapes, every[1], coarse)
 
 
@@ -106,13 +106,13 @@ def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
     there. Which pieces the pivots lie in is chance, so the error is of order 2 in the mean only: half of the pieces against a
     quarter, at all phases, shows what that may hide.
     """
-    pieces = scene.system.cut
-    if not pieces:
+    cut = pieces_of(scene.system)
+    if not cut:
         return np.zeros((*coarse.shape[:-1], 2))
     net = lambda n, cycle: scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
     length = scene.system.length
-    doubled = apart(net(2 * pieces, fewer), coarse, length)
-    chance = apart(net(pieces // 2, shapes), net(pieces // 4, shapes), length) / 8
+    doubled = apart(net(2 * cut, fewer), coarse, length)
+    chance = apart(net(cut // 2, shapes), net(cut // 4, shapes), length) / 8
     return 2.0 * np.maximum(doubled, chance)
 
 

@@ -22,7 +22,9 @@ from geomech.scene.write import toml
 from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.study.tables import COMPONENTS
-from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.base import System, length_unit, shape_labels
+from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored
+from geomech.systems.framed import Framed
 
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
 INTERVAL_OF_CCF = "half width of the interval of ccf"
@@ -46,7 +48,9 @@ def save_connection(path: str | Path, study: Study) -> None:
 def attributes(study: Study) -> dict:
     """Return what a scene's connection is, what it rests on, and the scene's text, as attributes of a file."""
     scene = study.scene
-    numerics = repr(scene.numerics) if scene.system.solver is None else f"{scene.numerics}, {scene.system.solver}"
+    numerics = (
+        repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
+    )
     return {
         "title": f"Local connection and curvature constraint function of the scene {scene.name}",
         **about(scene),
@@ -64,7 +68,7 @@ def attributes(study: Study) -> dict:
 def variables(study: Study) -> list[Variable]:
     """Return what a study tells of shape space, without its coordinates."""
     unit = length_unit(study.scene.system)
-    found = of_connection(study.fitted, study.scene.system.stored("A_error"))
+    found = of_connection(study.fitted, stored(study.scene.system, "A_error"))
     if isinstance(study.fitted, Tube):
         found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
@@ -72,11 +76,11 @@ def variables(study: Study) -> list[Variable]:
         found.append(of_ccf(study.curvature, study.curvature_error, what))
     elif len(study.fitted.axes) > 2:
         found += of_pairs(study.two_form, two_form.error(study.fitted))
-    if study.scene.system.carried:
+    if isinstance(study.scene.system, Framed):
         found.append(of_frame(study.scene.system.field.field))
     if not effort.why_none(study.scene.system):
         found += of_metric(
-            study.metric, study.scene.system.cost is None
+            study.metric, capability(study.scene.system, OwnMetric) is None
         )  # before the harmonics, whose velocities it may share
     if (harmonics := study.harmonics) is not None:
         found += of_harmonics(harmonics, unit)
@@ -246,6 +250,12 @@ def _labels(axes, names: Sequence[str]) -> list[tuple[str, str]]:
     return [(name, "rad") for name in names or angles_of(axes)]
 
 
+def recorded(system: System) -> dict:
+    """Return what a system says of itself in the files of its connection."""
+    recorded = capability(system, Recorded)
+    return {} if recorded is None else dict(recorded.about())
+
+
 def about(scene: Scene) -> dict:
     """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
     system = scene.system
@@ -259,7 +269,7 @@ def about(scene: Scene) -> dict:
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
         "length_unit": units_of(length_unit(system)),
-        **system.about(),
+        **recorded(system),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",
         "sign_of_ccf": "CCF = dA + [A, A] with [X, Y] = XY - YX, positive for counter-clockwise loops",

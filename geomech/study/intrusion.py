@@ -8,10 +8,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from geomech.core.knob import ROUNDING, Knob
 from geomech.core.variables import Result, Variable
 from geomech.run.cost import BASE, Cost
 from geomech.scene.intruding import Intruding
-from geomech.study.knob import ROUNDING, Knob
 from geomech.study.question import Allow, Progress, Question
 
 UNITS = {

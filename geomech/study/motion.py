@@ -10,12 +10,15 @@ import numpy as np
 
 from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.core.variables import Result, Variable
+from geomech.geometry.reconstruct import poses, repeated
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study.bench import Study
 from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
-from geomech.systems.base import Premise, length_unit, shape_labels
+from geomech.systems.base import length_unit, shape_labels
+from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
+from rft.premise import Premise
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -46,8 +49,8 @@ class Motion:
     def points(self, rows=slice(None)) -> np.ndarray | None:
         """Ends of the links in the world, (..., links + 1, 2), tail to head, at some of the rows; None for a system that
         has no body to show."""
-        draw = self.scene.system.points
-        return None if draw is None else draw(self.alpha[rows], self.pose[rows])
+        body = capability(self.scene.system, Drawable)
+        return None if body is None else body.points(self.alpha[rows], self.pose[rows])
 
     @property
     def columns(self) -> dict[str, str]:
@@ -140,7 +143,11 @@ def motion(scene: Scene, cycles: int = 1) -> Motion:
     gait, phases = scene.gait, scene.numerics.phases
     with named(scene.name):
         alpha, alphadot = gait.cycle(phases)
-        pose = scene.system.path(alpha, alphadot, int(cycles))
+        stepped = capability(scene.system, Stepped)
+        if stepped is None:
+            pose = repeated(poses(scene.system.run(alpha, alphadot).xi), int(cycles))
+        else:
+            pose = stepped.path(alpha, alphadot, int(cycles))
     phase = 2 * np.pi * np.arange(len(pose)) / phases
     return Motion(scene, phase, alpha[np.arange(len(pose)) % phases], pose, getattr(gait, "frequency", None))
 
@@ -156,14 +163,13 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     checked(cycles)
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
-    if (
-        system.traits.steps and not system.settles
-    ):  # each goes on from the one before; cycles that are alike are run first
+    if system.traits.steps and not settling(system):
+        # Each goes on from the one before; cycles that are alike are run first.
         alike = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
         times = (alike + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
-    width = 2 * (system.elements + 1) + system.joints + 5
+    width = 2 * (costed(system).elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
     words = WORDS * rows * width
     return Cost(found.balances, found.seconds + words, found.memory + memory, found.besides + words)

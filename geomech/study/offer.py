@@ -5,7 +5,7 @@ from __future__ import annotations
 from geomech.systems.base import System
 from geomech.tiers import TIERS
 
-METHODS = tuple(TIERS)  # cheapest look-up first
+METHODS = TIERS  # cheapest look-up first
 
 
 def tiers(system: System) -> tuple[str, ...]:

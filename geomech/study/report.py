@@ -20,7 +20,8 @@ from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems import Swimmer
-from geomech.systems.base import System
+from geomech.systems.base import System, refuse_singular
+from geomech.systems.capabilities import near
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
@@ -116,7 +117,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
     if own:
         size = abs(gait.amplitude)
-        if scene.system.near:
+        if near(scene.system):
             return _near(scene, gait)
         found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in found]
@@ -130,7 +131,7 @@ def _near(scene: Scene, gait: Gait) -> list[float]:
     """Amplitudes about the gait's own, as far as what is known of the system reaches; SceneError where that is nowhere."""
     found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
     with named(scene.name):
-        scene.system.refuse_singular(gait.cycle(scene.numerics.phases)[0])
+        refuse_singular(scene.system, gait.cycle(scene.numerics.phases)[0])
     reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
     return [a for a in found if reached(a)]
 

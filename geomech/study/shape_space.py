@@ -22,6 +22,7 @@ from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
+from geomech.systems.capabilities import stored
 from geomech.tiers.fitted import fits
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -186,7 +187,7 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     if angles is None:
         return at
     extent = scene.numerics.extent
-    if not (scene.system.stored("connection") or all(abs(a) <= extent for a in angles)):
+    if not (stored(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise SceneError(
             f"--slice: the angles must lie within the field's {extent:g} rad: give others, or raise --extent"
         )

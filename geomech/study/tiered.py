@@ -6,19 +6,20 @@ direct tier, far finer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.core.knob import Knob
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
-from geomech.study.knob import Knob
 from geomech.study.offer import tiers
+from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -28,37 +29,11 @@ TRUTH_PHASES = 4096
 TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
-GRIDS = (7, 11, 15, 21, 31, 45, 61)
-NOTHING = "nothing that exact link integrals do not give for less"
-
-KNOBS = (
-    Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer", tier="direct"),
-    Knob("segments", (2, 4, 8, 16, 32, 64), "2; less with pivots in links", NOTHING, "limit", "direct", "loads", "midpoint"),
-    Knob(
-        "nodes", (2, 4, 8, 16, 32, 64), "spectral; about 1 to 2 with pivots in links", NOTHING, "limit", "direct", "loads",
-        "gauss",
-    ),
-    Knob(
-        "regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit", "direct",
-    ),
-    Knob(
-        "pieces", (5, 10, 20, 40, 80), "2 in the mean, scattered by pivots", "effects that vary along long links", "limit",
-        "direct",
-    ),
-    Knob(
-        "curves", (4, 6, 8, 12, 16, 24, 48), "4 if smooth, about 2 across kinks",
-        "every amplitude of one family from one table", tier="adapted",
-    ),
-    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table", tier="harmonic"),
-    Knob(
-        "harmonics", (1, 3, 5, 9, 15, 21), "1 to 2, set by the kinks",
-        "the part of the velocity that is not linear in alphadot", tier="harmonic",
-    ),
-    Knob("grid", GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further", tier="path"),
-    Knob("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit", "path"),
-    Knob("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit", "path"),
-    Knob("grid", GRIDS, "3 or 4 in amplitude, set by the gait", "a map to read, not digits", tier="area"),
-)  # fmt: skip
+KNOBS = tuple(
+    replace(knob, tier=tier.name)
+    for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
+    for knob in tier.knobs
+)  # of the truth first, then of one gait's family, then of fields
 
 
 @dataclass(frozen=True)
@@ -110,14 +85,14 @@ class Settings:
         return self
 
     def knobs(self) -> list[Knob]:
-        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not self.scene.system.closed)]
+        return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
 
     def at(self, knob: Knob | None, value: Any) -> Scene:
         """Return the scene at a setting; of a knob at None as far as it goes, without a knob as the truth has it."""
         scene = self.scene
         if knob is None:
-            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if scene.system.closed else scene
-            finest = finest.with_numerics(pieces=FINE_PIECES) if scene.system.cut else finest
+            finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
             return finest.with_numerics(phases=_truth_phases(scene))
         setting = knob.setting or knob.name
         if value is not None:
@@ -128,7 +103,7 @@ class Settings:
 
     def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
         """Return net poses (B, 3), with tables built anew so that their cost is counted."""
-        tier = knob.tier if knob else "direct"
+        tier = knob.tier if knob else DIRECT.name
         return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
 
     def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
@@ -149,7 +124,7 @@ class Settings:
     def own_error(self) -> float:
         """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
-        return float(self.scene.system.own_error(*shapes)[..., 0].max())
+        return float(own_error(self.scene.system, *shapes)[..., 0].max())
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         return cheapest(lines, tolerance, self.own_error)
@@ -166,14 +141,14 @@ def applies(knob: Knob, scene: Scene) -> bool:
     system, setting = scene.system, knob.setting or knob.name
     if system.traits.linear and setting in ("regularisation", "directions"):
         return False
-    if setting == "regularisation" and system.solver is None:
+    if setting == "regularisation" and solver_of(system) is None:
         return False
     of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (system.stored("connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
         return False
     if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False
-    return setting != "pieces" or system.cut > 0
+    return setting != "pieces" or pieces_of(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:

@@ -20,6 +20,7 @@ from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import System
+from geomech.systems.capabilities import Uncertain, at_once, capability
 from geomech.tiers.base import in_groups
 
 PHASES = 64  # of a cycle: changes of displacement are wanted to a per cent, not displacements
@@ -42,12 +43,12 @@ def root(covariance) -> np.ndarray:
 
 def uncertain(system: System) -> bool:
     """Whether the system has parameters with a covariance."""
-    return getattr(system, "covariance", None) is not None
+    return capability(system, Uncertain) is not None
 
 
 def points(system: System) -> int:
     """Systems that `of_medium` runs."""
-    n = root(system.covariance).shape[1]
+    n = root(capability(system, Uncertain).covariance).shape[1]
     return 1 + 2 * n + n * (n - 1) // 2
 
 
@@ -61,7 +62,7 @@ def sigma_points(scene: Scene) -> tuple[float, list[tuple[System, System]], dict
 
 
 def _points(scene: Scene, reach: float):
-    system = scene.system
+    system = capability(scene.system, Uncertain)
     steps = reach * root(system.covariance).T
     pairs = itertools.combinations(range(len(steps)), 2)
     with named(scene.name):
@@ -113,4 +114,4 @@ def _moved(system: System, gait: Gait, amplitudes) -> np.ndarray:
     run = lambda some: system.run(*gait.cycle(phases, some)).net
     if amplitudes is None:
         return run(None)
-    return in_groups(run, amplitudes, system.at_once(phases))
+    return in_groups(run, amplitudes, at_once(system, phases))

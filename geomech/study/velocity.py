@@ -10,6 +10,7 @@ from geomech.core.errors import named
 from geomech.core.variables import Result, Variable
 from geomech.scene.model import Scene
 from geomech.study.question import Allow, Progress, Question
+from geomech.study.single import single
 from geomech.systems.base import length_unit
 
 
@@ -23,7 +24,7 @@ class Velocity(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         with named(self.scene.name):
-            found = self.scene.system.single(self.alpha, self.alphadot)
+            found = single(self.scene.system, self.alpha, self.alphadot)
         unit = length_unit(self.scene.system)
         xi = Variable("xi", ("component",), np.array(found["xi"]), f"{unit}, {unit}, rad", "per unit time")
         return Result("velocity", (xi,), {"found": found, "units": {"xi": [unit, unit, "rad"]}}, self.scene)

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from geomech.core.errors import SceneError, named
+from geomech.core.knob import Knob
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
@@ -22,7 +23,6 @@ from geomech.run.cost import BASE, Cost
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
-from geomech.study.knob import Knob
 from geomech.study.question import Allow, Progress, Question
 from rft.laws.catalogue import GRAVITY
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine

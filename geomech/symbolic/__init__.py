@@ -1,6 +1,6 @@
 """Connections and curvatures in closed form, as sympy matrices: formulas that simplify, for papers and for `velocity`.
 
-A, alpha = system.symbolic()            # or symbolic.viscous_chain(lengths, ratio), with symbols
+A, alpha = formula(system)              # or symbolic.viscous_chain(lengths, ratio), with symbols
 A = symbolic.simplified(A, alpha)
 print(symbolic.latex(symbolic.ccf(A, alpha)))
 """

@@ -1,6 +1,9 @@
 """Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
 
-from geomech.systems.base import Cycle, Plain, Premise, System, checked_system
+from geomech.core.registry import load_all
+from geomech.geometry.traits import Traits
+from geomech.systems.base import SYSTEMS, Cycle, System, as_system, integrated
+from geomech.systems.capabilities import capability
 from geomech.systems.diff_drive import DifferentialDrive
 from geomech.systems.floating import FloatingChain
 from geomech.systems.ideal_fluid import IdealFluidSwimmer
@@ -8,28 +11,26 @@ from geomech.systems.no_slip import NoSlipSnake
 from geomech.systems.solver import Solver
 from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
+from rft.premise import Premise
 
-KINDS = {
-    "swimmer": Swimmer,
-    "no-slip-snake": NoSlipSnake,
-    "differential-drive": DifferentialDrive,
-    "ideal-fluid-swimmer": IdealFluidSwimmer,
-    "floating-chain": FloatingChain,
-    "table": Table,
-}
+load_all(__name__, __path__)
+KINDS = SYSTEMS
 
 __all__ = [
     "KINDS",
+    "SYSTEMS",
     "Cycle",
     "DifferentialDrive",
     "FloatingChain",
     "IdealFluidSwimmer",
     "NoSlipSnake",
-    "Plain",
     "Premise",
     "Solver",
     "Swimmer",
     "System",
     "Table",
-    "checked_system",
+    "Traits",
+    "as_system",
+    "capability",
+    "integrated",
 ]

@@ -14,12 +14,13 @@ import numpy as np
 
 from geomech.core.errors import choose
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Plain
+from geomech.systems.base import SYSTEMS, integrated
 from rft.checks import Number, check_numbers
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
-class DifferentialDrive(Plain):
+class DifferentialDrive:
     """Two wheels on one axle. alpha_1 is the angle of the left one, alpha_2 of the right one, positive forwards.
 
     frame (-): "mean", midway between the wheels and heading forwards.
@@ -34,6 +35,7 @@ class DifferentialDrive(Plain):
 
     kind = "differential-drive"
     joints = 2
+    run = integrated
     traits = Traits(linear=True, labels=(("left wheel", "rad"), ("right wheel", "rad")))
 
     def __post_init__(self):
@@ -57,3 +59,7 @@ class DifferentialDrive(Plain):
         from geomech.symbolic import connections
 
         return connections.differential_drive(self.wheel_radius, self.track)
+
+    @classmethod
+    def examples(cls) -> dict[str, DifferentialDrive]:
+        return {"differential-drive": cls(0.03, 0.15)}

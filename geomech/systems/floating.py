@@ -10,9 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class FloatingChain(Momentum):
     """Links joined by hinges, with masses and moments of inertia of their own.
@@ -41,6 +43,6 @@ class FloatingChain(Momentum):
         masses = [m / whole for m in masses]
         return masses, [[m, m, k * m * (x / body) ** 2] for m, k, x in zip(masses, about, lengths)]
 
-    @property
-    def because(self) -> str:
-        return "(the velocity at every shape, all shapes at once): momentum is zero, so that nothing coasts"
+    @classmethod
+    def examples(cls) -> dict[str, FloatingChain]:
+        return {"floating-chain": cls((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05))}

@@ -14,9 +14,24 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.coordinates import change_velocity, frame_velocity
 from geomech.geometry.minimum_perturbation import Frame, minimum_perturbation
+from geomech.geometry.reconstruct import poses, repeated
 from geomech.geometry.traits import Traits
-from geomech.systems.base import SHAPE_ALONE, Cycle, System, length_unit
+from geomech.systems.base import Cycle, System, kind_of, length_unit
+from geomech.systems.capabilities import (
+    Diagnosed,
+    Dissipative,
+    Drawable,
+    Refinable,
+    Stepped,
+    Symbolic,
+    Tunable,
+    capability,
+    refined,
+    stored,
+)
+from geomech.systems.premises import refuse
 from rft import se2
+from rft.premise import SHAPE_ALONE
 
 NAME = "minimum-perturbation"
 
@@ -32,21 +47,29 @@ class Framed:
     directions: int
     degree: int
 
-    carried, starts = True, False
-
     def __post_init__(self):
-        self.inner.refuse("minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
+        refuse(self.inner, "minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
         if self.inner.traits.singularity is not None:
             raise ValueError(
-                f"no minimum-perturbation frame of the {self.inner.kind}, which has singular shapes: drop frame"
+                f"no minimum-perturbation frame of the {kind_of(self.inner)}, which has singular shapes: drop frame"
             )
-        if self.inner.stored("connection"):
+        if stored(self.inner, "connection"):
             raise ValueError(f"a table keeps the frame it was made in: drop frame = {NAME!r}, or make the table in it")
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.inner, name)
+    kind = property(lambda self: kind_of(self.inner))
+    joints = property(lambda self: self.inner.joints)
+    length = property(lambda self: self.inner.length)
+    closed = property(lambda self: self.inner.closed)
+    solver = property(lambda self: self.inner.solver)
+    settling = 0.0
+
+    def capability(self, kind: type) -> Any:
+        """Return what the inner system has, carried over to this frame where that makes a difference."""
+        inner = capability(self.inner, kind)
+        if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
+            return self
+        own = (Dissipative, Drawable, Refinable, Diagnosed, Tunable)
+        return None if inner is None or kind is Symbolic else self if kind in own else inner
 
     @property
     def traits(self) -> Traits:
@@ -77,8 +100,8 @@ class Framed:
         """The frame's pose in the inner system's, over shape space."""
         return self._made[0]
 
-    def fitted(self, axes, count: int, degree: int, progress: Callable | None = None) -> Connection:
-        """As `Plain.fitted`; on this frame's own grid, and no other."""
+    def fitted(self, progress: Callable | None = None) -> Connection:
+        """Return the connection, on this frame's own grid."""
         if "_made" not in self.__dict__:
             self.__dict__["_made"] = self._make(progress)
         return self._made[1]
@@ -87,58 +110,56 @@ class Framed:
         """xi (..., 3) in the frame; ValueError outside its grid."""
         return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
 
-    sample = velocity
-
-    def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """As `Plain.driven`: power is the same in every frame."""
-        xi, power = self.inner.driven(alpha, alphadot)
-        return change_velocity(xi, *self.field(alpha, alphadot)), power
-
-    def work(self, alpha, alphadot, xi) -> Any:
-        """As the inner system's, for xi (..., 3) in this frame."""
+    def power(self, alpha, alphadot, xi) -> np.ndarray:
+        # The same in every frame, for xi (..., 3) in this one.
         h, hdot = self.field(alpha, alphadot)
         inner = np.einsum("...ij,...j->...i", se2.adjoint(h), np.asarray(xi, float) - frame_velocity(h, hdot))
-        return self.inner.work(alpha, alphadot, inner)
+        return capability(self.inner, Dissipative).power(alpha, alphadot, inner)
 
-    def single(self, alpha, alphadot) -> dict:
-        found = self.inner.single(alpha, alphadot)
+    def diagnosed(self, alpha, alphadot) -> dict:
+        found = capability(self.inner, Diagnosed).diagnosed(alpha, alphadot)
         return {**found, "xi": change_velocity(found["xi"], *self.field(alpha, alphadot)).tolist()}
 
-    def run(self, alpha, alphadot, work: bool = False) -> Cycle:
-        done = self.inner.run(alpha, alphadot, work)
+    def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
+        """Return the inner system's cycle, carried over; ``start``, of this frame's velocities, is of no use to that."""
+        done = self.inner.run(alpha, alphadot, work) if work else self.inner.run(alpha, alphadot)
         xi = change_velocity(done.xi, *self.field(alpha, alphadot))
         return done._replace(xi=xi, net=self.field.net(done.net, np.asarray(alpha)[..., 0, :]))
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
-        """As `Plain.path`: g h of the inner frame's poses g, seen from the first."""
-        inner = self.inner.path(alpha, alphadot, cycles)
+        """Return g h of the inner frame's poses g, seen from the first."""
+        inner = repeated(poses(self.inner.run(alpha, alphadot).xi), cycles)
         h = self.field.pose(np.concatenate([np.tile(alpha, (cycles, 1)), alpha[:1]]))
         return se2.compose(se2.inverse(h[0]), se2.compose(inner, h))
 
-    @property
-    def points(self) -> Callable | None:
-        inner = self.inner.points
-        if inner is None:
-            return None
-        return lambda alpha, pose: inner(alpha, se2.compose(pose, se2.inverse(self.field.pose(alpha))))
+    def points(self, alpha, pose) -> np.ndarray:
+        place = se2.compose(pose, se2.inverse(self.field.pose(alpha)))
+        return capability(self.inner, Drawable).points(alpha, place)
 
-    def finer(self) -> System | None:
-        inner = self.inner.finer()
+    def refined(self) -> System | None:
+        inner = refined(self.inner)
         return None if inner is None else dataclasses.replace(self, inner=inner)
 
-    def with_solver(self, **changes) -> Framed:
-        return dataclasses.replace(self, inner=self.inner.with_solver(**changes)) if changes else self
-
-    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        raise ValueError(f"no formula in the {NAME} frame, which is a field of numbers: take another frame")
+    def with_solver(self, solver) -> Framed:
+        return dataclasses.replace(self, inner=self.inner.with_solver(solver))
 
     def in_frame(self, frame: str) -> System:
-        return self if frame == NAME else self.inner.in_frame(frame)
+        return self if frame == NAME else in_frame(self.inner, frame)
 
-    @property
-    def costs_as(self) -> str:
-        return f"{NAME} {self.inner.costs_as}"
 
-    def told(self) -> list[str]:
-        first, *rest = self.inner.told()
-        return [f"{first}, seen from its {NAME} frame", *rest]
+def in_frame(system: System, frame: str) -> System:
+    """Return a system seen from another of its frames; ValueError if it has none of that name."""
+    if own := getattr(system, "in_frame", None):
+        return own(frame)
+    if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:
+        return dataclasses.replace(system, frame=frame)
+    raise ValueError(f"the {kind_of(system)} has one frame, {system.traits.frame!r}, and no {frame!r}")
+
+
+def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
+    """Return A (3, joints) as a sympy Matrix and its shape variables (`geomech.symbolic`); ValueError if there is none."""
+    if isinstance(system, Framed):
+        raise ValueError(f"no formula in the {NAME} frame, which is a field of numbers: take another frame")
+    if (symbolic := capability(system, Symbolic)) is None:
+        raise ValueError(f"no formula of the connection of a {kind_of(system)}: 'geomech connection' has its numbers")
+    return symbolic.symbolic()

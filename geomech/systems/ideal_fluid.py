@@ -11,10 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from geomech.systems.base import SYSTEMS
 from geomech.systems.momentum import Momentum
 from rft.checks import Number
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
 class IdealFluidSwimmer(Momentum):
     """Elliptical links joined at their tips.
@@ -50,6 +52,6 @@ class IdealFluidSwimmer(Momentum):
             [m + y**2, m + x**2, k * m * 4 * x**2 + (x**2 - y**2) ** 2 / 8] for m, k, x, y in zip(masses, about, a, b)
         ]
 
-    @property
-    def because(self) -> str:
-        return "(the velocity at every shape, all shapes at once): momentum is zero, so that nothing coasts"
+    @classmethod
+    def examples(cls) -> dict[str, IdealFluidSwimmer]:
+        return {"ideal-fluid-swimmer": cls((0.8, 1.3, 1.0), 0.4, "link-1", 0.2, (1.0, 0.5, 2.0))}

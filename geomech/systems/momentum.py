@@ -18,7 +18,7 @@ import numpy as np
 
 from geomech.core.errors import real_array, short
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Plain
+from geomech.systems.base import integrated
 from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements, Length
@@ -37,7 +37,7 @@ class Linkage(Chain):
 
 
 @dataclass(frozen=True)
-class Momentum(Plain):
+class Momentum:
     """Base of chains without momentum.
 
     lengths (-): relative link lengths, tail to head, all > 0, at least two. frame (-): "mean", centre of mass and
@@ -47,6 +47,8 @@ class Momentum(Plain):
     lengths: tuple[float, ...] = (1.0, 1.0, 1.0)
     length: Length = 1.0
     frame: str = "mean"
+
+    run = integrated
 
     def __post_init__(self):
         check_numbers(self)
@@ -118,7 +120,7 @@ class Momentum(Plain):
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         return self._moving(alpha, alphadot)[2].T.reshape(*shape, 3) * [self.length, self.length, 1.0]
 
-    def cost(self, alpha, alphadot) -> np.ndarray:
+    def squared_speed(self, alpha, alphadot) -> np.ndarray:
         """alphadot^T M alphadot (...,): twice the kinetic energy, in the unit of `inertia` and body lengths."""
         alpha, alphadot, shape = self._flat(alpha, alphadot)
         motion, weights, xi = self._moving(alpha, alphadot)

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from geomech.geometry.traits import Traits
-from geomech.systems.base import Plain
+from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
 from rft.bodies.base import Length
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
-class NoSlipSnake(Plain):
+class NoSlipSnake:
     """Three links, tail to head, with wheels at their centres.
 
     lengths (-): relative. frame (-): "mean", centre of mass and mean heading, or "link-1", "link-2", "link-3", those of
@@ -34,6 +35,7 @@ class NoSlipSnake(Plain):
 
     kind = "no-slip-snake"
     joints = 2
+    run = integrated
 
     def __post_init__(self):
         object.__setattr__(self, "lengths", self._chain.lengths)
@@ -82,3 +84,7 @@ class NoSlipSnake(Plain):
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
         return connections.in_units_of(self.length, A), alpha
+
+    @classmethod
+    def examples(cls) -> dict[str, NoSlipSnake]:
+        return {"no-slip-snake": cls((0.8, 1.3, 1.0), length=0.4, frame="link-1")}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -11,15 +10,16 @@ from typing import Any
 import numpy as np
 
 import rft
-from geomech.core.errors import real_array, short
+from geomech.core.errors import short
+from geomech.core.registry import Registry, classes_with, subclasses
 from geomech.core.work import iterate
-from geomech.geometry.images import Around, around
+from geomech.geometry.images import around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import NONE, SHAPE_ALONE, VALUES_TOGETHER, Cycle, Plain, Premise, refuse_mutable
-from geomech.systems.said import Said
+from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
+from geomech.systems.capabilities import Drawable, Part, Stepped, Uncertain
+from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
-from rft.balance.solver import ELEMENTS_TOGETHER
 from rft.bodies import KINDS as BODIES
 from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
 from rft.contact import Assembly, assemble
@@ -27,16 +27,22 @@ from rft.effects import KINDS as EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.base import is_odd, require_law
 from rft.laws.records import record, rule_for
+from rft.premise import NONE, SHAPE_ALONE, Premise
+from rft.quadrature import QUADRATURE
 from rft.stepping import Row, State, Stepping
 
-PARTS = {"medium": ("law", LAWS), "body": ("kind", BODIES), "effects": ("kind", EFFECTS)}  # of a scene's tables
+PARTS = {  # of a scene's tables
+    "medium": Registry("geomech.media", "law", "a law", classes_with("traction"), LAWS),
+    "body": Registry("geomech.bodies", "kind", "a body", classes_with("motion"), BODIES),
+    "effects": Registry("geomech.effects", "kind", "an effect", subclasses(rft.effects.Effect), EFFECTS),
+}
 RATES = Premise.RATE_INDEPENDENT
-STEPPED_TOGETHER = 1 << 22  # as VALUES_TOGETHER, of time steps, each of which takes its time however few gaits take it
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
-class Swimmer(Said, Plain):
+class Swimmer:
     """A body in a medium, with the effects it is asked to have."""
 
     medium: rft.Medium
@@ -45,8 +51,6 @@ class Swimmer(Said, Plain):
     solver: Solver = field(default=Solver())
 
     kind = "swimmer"
-    together = ELEMENTS_TOGETHER
-    starts = True
 
     def __post_init__(self):
         require_law(self.medium)
@@ -86,7 +90,6 @@ class Swimmer(Said, Plain):
 
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
-    points = property(lambda self: getattr(self.body, "points", None))
     closed = property(lambda self: is_closed(self.medium))
     held = property(lambda self: sum(e.memory_size for e in self.effects))
 
@@ -109,10 +112,37 @@ class Swimmer(Said, Plain):
             frequency=next((e.frequency for e in effects if hasattr(e, "frequency")), None),
         )
 
+    def capability(self, kind: type) -> Swimmer | None:
+        """Return itself if it has the ability, which hangs on its medium, its body and its effects."""
+        medium = self.medium
+        has = {
+            Drawable: hasattr(self.body, "points"),
+            Uncertain: hasattr(medium, "uncertain") and getattr(medium, "covariance", None) is not None,
+            Stepped: self.traits.steps,
+        }
+        return self if has.get(kind, isinstance(self, kind)) else None
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """What breaks premises: the law whose drag is of no one power of the speed, and effects."""
+        law = () if is_rate_independent(self.medium) else (Part("law", name_in(LAWS, self.medium), RATES),)
+        return law + tuple(Part("effect", e.kind, e.breaks) for e in self.effects)
+
+    def about(self) -> dict:
+        exact = self.closed or self.solver.loads != "exact"
+        return {
+            "loads": self.solver.loads if exact else QUADRATURE,
+            "regularisation": float(self.solver.regularisation),
+            "regularisation_unit": "body length rad-1",
+        }
+
+    def points(self, alpha, pose) -> np.ndarray:
+        return self.body.points(alpha, pose)
+
     @property
     def covariance(self) -> tuple | None:
-        """Of the medium's parameters, as measured."""
-        return getattr(self.medium, "covariance", None) if hasattr(self.medium, "uncertain") else None
+        """Covariance of the medium's parameters, as measured."""
+        return self.medium.covariance
 
     def varied(self, step) -> Swimmer:
         """The same in a medium whose uncertain parameters are off by ``step`` (n,); ValueError if that is no medium."""
@@ -162,9 +192,8 @@ class Swimmer(Said, Plain):
     def _assembly(self) -> Assembly:
         return assemble(self.medium, self.body, self.effects, self.solver.loads, self.solver.pieces)
 
-    @property
-    def costs_as(self) -> str:
-        return repr((self.medium, self.body, self.effects, self.solver.loads))
+    def with_solver(self, solver: Solver) -> Swimmer:
+        return dataclasses.replace(self, solver=solver)
 
     def in_frame(self, frame: str) -> Swimmer:
         return dataclasses.replace(self, body=dataclasses.replace(self.body, frame=frame))
@@ -177,22 +206,16 @@ class Swimmer(Said, Plain):
     def solve(self, alpha, alphadot, start=None) -> rft.Solution:
         """Body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (..., 3) where
         that is known; see `rft.body_velocity`. ValueError if shape alone does not settle them."""
-        self.refuse("body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
+        refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
         asked = self._settings("tolerance", "backend")
         return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **asked)
-
-    sample = solve
 
     def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
         """xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did not converge."""
         return self.solve(alpha, alphadot, start).checked().xi
 
-    def single(self, alpha, alphadot) -> dict:
-        alpha, alphadot = (real_array(name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
-        if alpha.ndim > 1 or alphadot.ndim > 1:
-            raise ValueError(f"alpha and alphadot must be those of one shape, got {alpha.shape} and {alphadot.shape}")
+    def diagnosed(self, alpha, alphadot) -> dict:
         s = self.solve(alpha, alphadot)
-        self.note_angles(np.abs(alpha).max())
         if str(s.status) == "unconverged":
             raise ValueError("the force balance did not converge: raise [numerics] regularisation")
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
@@ -206,6 +229,9 @@ class Swimmer(Said, Plain):
             raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
         return connections.in_units_of(self.body.length, A), alpha
+
+    def power(self, alpha, alphadot, xi) -> np.ndarray:
+        return self.work(alpha, alphadot, xi).power / self.length
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
         """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
@@ -229,7 +255,7 @@ class Swimmer(Said, Plain):
         rates = alphadot.reshape(-1, self.joints).T
         speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
-            images = self.images(alpha, alphadot)
+            images = around(alpha, alphadot, self.traits)
             asked = (images.some(x) for x in (alpha, alphadot, start))
             solution = self._of_gaits(speed.size, images.count).solve(*asked).checked()
             xi = images.whole(solution.xi)
@@ -237,12 +263,11 @@ class Swimmer(Said, Plain):
             return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
-        to_come = steps.drift if self.settles else 0.0 * speed
+        to_come = steps.drift if self.settling else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
-    def images(self, alpha, alphadot) -> Around:
-        """Which phases of gaits, as in `run`, are solved where balances are, and how the others follow."""
-        return around(alpha, alphadot, self.traits)
+    def solved(self, alpha, alphadot) -> int:
+        return around(alpha, alphadot, self.traits).count
 
     def _of_gaits(self, count: int, phases: int) -> Swimmer:
         """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
@@ -256,9 +281,7 @@ class Swimmer(Said, Plain):
         return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
-        """Of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
-        if not self.traits.steps:
-            return super().path(alpha, alphadot, cycles)
+        """Return poses of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
         before = (self.solver.cycles or 1) - 1
         if not self.traits.lacks & Premise.SE2_SYMMETRIC:
             steps = self.time_steps(alpha, alphadot, self.solver.cycles).checked()
@@ -268,24 +291,29 @@ class Swimmer(Said, Plain):
         own = steps.path[before * len(alpha) :]
         return rft.se2.compose(rft.se2.inverse(own[:1]), own)
 
-    def at_once(self, phases: int) -> int:
-        batched = [getattr(e, name) for e in self.effects for name in e.batched]
-        if any(map(np.ndim, batched)):
-            return sys.maxsize  # a parameter for each amplitude: they belong together
-        if not self.traits.steps:
-            return max(1, VALUES_TOGETHER // (phases * max(self.joints + 6, 2 * self.elements)))
-        # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-        return max(1, STEPPED_TOGETHER // max(phases * (self.joints + 6), 4 * self.elements + self.held // 8))
+    @property
+    def batched(self) -> bool:
+        """Whether an effect has a parameter for each gait."""
+        return any(np.ndim(getattr(e, name)) for e in self.effects for name in e.batched)
 
-    def finer(self) -> Swimmer | None:
+    def refined(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)
         finer = {} if rule == "exact" else {"loads": "exact" if self.closed else f"{rule}:{min(2 * count, 1000)}"}
         if not self.traits.linear:
             finer["regularisation"] = max(self.solver.regularisation / 10, 1e-12)
-        return self.with_solver(**finer) if finer else None
+        return self.with_solver(dataclasses.replace(self.solver, **finer)) if finer else None
+
+    @classmethod
+    def examples(cls) -> dict[str, Swimmer]:
+        return {"swimmer": cls(MEDIA["glass-0.3mm-loose"], rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3))}
 
 
 def _has_joint_angles(body: rft.Body) -> bool:
     """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""
     plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
     return plain and getattr(body, "modes", None) is None
+
+
+def name_in(kinds: dict, part) -> str:
+    """Return the name of a part in ``kinds``, or that of its class."""
+    return next((name for name, kind in kinds.items() if type(part) is kind), type(part).__name__)

@@ -6,11 +6,10 @@ alphadot as in the scene it came from, and A is its linear part; else xi = A alp
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -19,8 +18,10 @@ from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, trajectory
 from geomech.geometry.traits import Traits
 from geomech.geometry.tube import BEYOND, Tube
+from geomech.geometry.velocity import evaluate
 from geomech.io import tables
-from geomech.systems.base import Plain
+from geomech.systems.base import SYSTEMS, integrated
+from geomech.systems.capabilities import Dissipative, OwnMetric
 from rft.checks import Number, check_numbers
 
 LENGTHS = (
@@ -28,8 +29,9 @@ LENGTHS = (
 )
 
 
+@SYSTEMS.register
 @dataclass(frozen=True)
-class Table(Plain):
+class Table:
     """A file of `geomech connection`, .nc or .mat, or one in sysplotter's layout.
 
     file (-): in a scene from a file relative to that file's folder, else to the current one. sign (-): "+" or "-" for
@@ -57,7 +59,7 @@ class Table(Plain):
     sha256: str = ""
 
     kind = "table"
-    together = 1 << 16
+    run = integrated
 
     def __post_init__(self):
         if not isinstance(self.file, (str, Path)):
@@ -97,28 +99,33 @@ class Table(Plain):
             frame=held.frame, unit=held.unit, labels=tuple((name, "rad") for name in held.shapes), **near,
         )  # fmt: skip
 
-    @property
-    def cost(self) -> Callable | None:
-        """As `Plain.cost`, where the file has a metric that is not one of drag."""
-        told = self.held.metric
-        if told is None or self.held.power_degree is not None:
-            return None
-        return lambda alpha, alphadot: told.norm(alpha, alphadot) ** 2
+    def capability(self, kind: type) -> Table | None:
+        """Return itself if it has the ability: power or a metric of its own where the file tells them."""
+        metric, degree = self.held.metric, self.held.power_degree
+        absent = {Dissipative: metric is None or degree is None, OwnMetric: metric is None or degree is not None}
+        return self if isinstance(self, kind) and not absent.get(kind) else None
+
+    def squared_speed(self, alpha, alphadot) -> np.ndarray:
+        return self.held.metric.norm(alpha, alphadot) ** 2
+
+    def power(self, alpha, alphadot, xi=None) -> np.ndarray:
+        return self.held.metric.norm(alpha, alphadot) ** self.held.power_degree
 
     def _beyond(self, alpha) -> np.ndarray:
         """Return (...), which passes through 0 where the data of a measured gait end."""
         return 1 - self.tube.reach(alpha)
-
-    def refuse_singular(self, alpha) -> None:
-        if self.tube is not None:
-            self.tube.checked(alpha)
 
     def in_frame(self, frame: str) -> Table:
         raise ValueError(
             f"a table has the frame it was made in, {self.held.frame!r}: make it anew in the frame {frame!r}"
         )
 
-    def stored(self, name: str):
+    def refuse_singular(self, alpha) -> None:
+        """ValueError for shapes that the data of a measured gait do not reach, and how far off they are."""
+        if self.tube is not None:
+            self.tube.checked(alpha)
+
+    def table(self, name: str) -> Any:
         held = self.held
         own = {"connection": held.connection, "harmonics": held.harmonics, "even part": held.even}
         return self.A_error if name == "A_error" else {**own, "metric": held.metric}.get(name)
@@ -135,18 +142,12 @@ class Table(Plain):
         """xi (..., 3) looked up; ValueError outside the table's grid."""
         return self.held.table.velocity(alpha, alphadot)
 
-    def driven(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """As `Plain.driven`, where the file tells what moving costs."""
-        if self.held.metric is None or self.held.power_degree is None:
-            raise ValueError(f"no power with this table: {self.file} does not tell it; make it anew from its scene")
-        return self.velocity(alpha, alphadot), self.held.metric.norm(alpha, alphadot) ** self.held.power_degree
-
-    def single(self, alpha, alphadot) -> dict:
-        """As `Plain.single`; residual: length of the vector of what the fit leaves, rms over directions, None if unknown."""
-        told = super().single(alpha, alphadot)
-        shapes = np.asarray(alpha, float), np.asarray(alphadot, float)
-        left = np.linalg.norm(self._times(self.held.table.residual, *shapes)) if self.held.told else None
-        return {**told, "status": "looked up", "residual": left if left is None else float(left)}
+    def diagnosed(self, alpha, alphadot) -> dict:
+        """Return {"xi", "status", "residual"}: the length of the vector of what the fit leaves, rms over directions, None if
+        that is unknown."""
+        left = np.linalg.norm(self._times(self.held.table.residual, alpha, alphadot)) if self.held.told else None
+        xi = evaluate(self.velocity, alpha, alphadot).tolist()
+        return {"xi": xi, "status": "looked up", "residual": left if left is None else float(left)}
 
     def _times(self, values, alpha, alphadot) -> np.ndarray:
         """(..., 3): values (3, N_1, ...) at a shape times |alphadot|; near one gait they are the same everywhere."""
@@ -188,39 +189,13 @@ class Table(Plain):
     @property
     def assumed(self) -> tuple[str, ...]:
         """What the file leaves open, and how it is taken, in notes."""
-        return tuple(f"{self.file}: {line}" for line in self._open)
+        return tuple(f"{self.file}: {line}" for line in self.left_open)
 
     @property
-    def _open(self) -> tuple[str, ...]:
+    def left_open(self) -> tuple[str, ...]:
         """The lines of `assumed`, without the file's name."""
         return self.held.said if self.held.sized or self.body_length is not None else (*self.held.said, LENGTHS)
 
-    def told(self) -> list[str]:
-        held = self.held
-        lines = [f"table ({self.file}: {held.connection!r})"]
-        if self.tube is not None:
-            lines.append(f"known near a measured gait alone; errors are those of {self.tube.known.level:.3g} of cases")
-        elif held.harmonics:
-            lines.append(
-                f"with the odd harmonics of xi in the direction of alphadot to {held.highest}: {held.harmonics!r}"
-            )
-        else:
-            lines.append("A alone: xi = A alphadot" + ", and what the fit left is part of every error" * held.told)
-        if held.even is not None:
-            lines.append("xi is not odd in alphadot: what is even is part of every error")
-        if held.A_error is not None and self.tube is None:
-            lines.append("its file tells intervals of A: they are part of every error")
-        if not held.told:
-            lines.append("the file does not tell what its fit left: errors are those of the grid alone")
-        lines.append(
-            f"stored as {tables.SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}"
-        )
-        return [
-            *lines,
-            *self._open,
-            "its field has the grid of the file; [numerics] grid, extent and directions say nothing",
-        ]
-
-    @property
-    def because(self) -> str:
-        return "(the velocity at every shape, looked up)"
+    @classmethod
+    def examples(cls) -> dict[str, Table]:
+        return {}  # of a file

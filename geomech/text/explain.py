@@ -8,9 +8,11 @@ from geomech.core.errors import plain
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
-from geomech.systems.base import ALL
+from geomech.systems.premises import listed
+from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved
+from rft.premise import ALL
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -25,11 +27,11 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     if hasattr(scene, "told"):  # of bodies in grains, whose modules a swimmer does without
         return plain("\n".join(scene.told()))
     system = checked_scene(scene).system
-    first, *told = system.told()
+    first, *told = described(system)
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
     lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
-    lines.append(f"engine: {system.engine} {system.because}")
+    lines.append(f"engine: {engine(system)}")
     phases = scene.numerics.phases
     if (count := solved(system, scene.gait, phases)) < phases:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
@@ -42,7 +44,7 @@ def _lost(system) -> list[str]:
     """A line of the results that are not to be had for each reason there is."""
     reasons: dict[str, list[str]] = {}
     if system.traits.lacks & ALL:
-        first = reasons[f"{system.blames} takes away what they rest on"] = ["connection", "CCF"]
+        first = reasons[f"{listed(system, ALL)} takes away what they rest on"] = ["connection", "CCF"]
         first += ["velocity at a single shape"] if system.traits.steps else []
     elif system.joints < 2:
         reasons["a loop of one joint encloses no area"] = ["CCF maps"]
@@ -65,7 +67,7 @@ def _listed(lost: list[str]) -> str:
 def _why(tier, system) -> str:
     """Why a tier says nothing of a system."""
     if system.traits.lacks & tier.rests_on:
-        return f"{system.blames} takes away what they rest on"
+        return f"{listed(system, ALL)} takes away what they rest on"
     if system.joints not in tier.joints:
         return _joints(system, tier.joints)
     return (

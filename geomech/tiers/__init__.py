@@ -2,11 +2,12 @@
 
 from geomech.tiers.adapted import ADAPTED
 from geomech.tiers.area import AREA
-from geomech.tiers.base import Numerics, Plan, Table, Tier
+from geomech.tiers.base import TIERS, Numerics, Plan, Table, Tier
 from geomech.tiers.direct import DIRECT
 from geomech.tiers.harmonic import HARMONIC
 from geomech.tiers.path import PATH
 
-TIERS = {tier.name: tier for tier in (AREA, ADAPTED, PATH, HARMONIC, DIRECT)}  # cheapest look-up first
+for _tier in (AREA, ADAPTED, PATH, HARMONIC, DIRECT):  # cheapest look-up first
+    TIERS.register(_tier)
 
 __all__ = ["TIERS", "Numerics", "Plan", "Table", "Tier"]

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 
 from geomech.core.errors import real_array
+from geomech.core.knob import Knob
 from geomech.geometry import family
 from geomech.geometry.family import Family
-from geomech.systems.base import SHAPE_ALONE
 from geomech.tiers.base import Plan, Table, Tier, solved
+from rft.premise import SHAPE_ALONE
 
 
 def table(system, numerics, gait, amplitudes) -> Table:
@@ -53,4 +54,12 @@ ADAPTED = Tier(
     rests_on=SHAPE_ALONE,
     result="adapted tier",
     common=False,  # its table serves one family of gaits
+    knobs=(
+        Knob(
+            "curves",
+            (4, 6, 8, 12, 16, 24, 48),
+            "4 if smooth, about 2 across kinks",
+            "every amplitude of one family from one table",
+        ),
+    ),
 )

@@ -12,9 +12,14 @@ from typing import Annotated, Any
 import numpy as np
 
 from geomech.core.errors import real_array
+from geomech.core.knob import Knob
+from geomech.core.registry import Registry
 from geomech.gaits import Gait
-from geomech.systems.base import ALL, Premise, System
+from geomech.systems.base import System, kind_of
+from geomech.systems.capabilities import costed, near
+from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers
+from rft.premise import ALL, Premise
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ class Tier:
     amplitudes). rests_on: premises without which it says nothing, and no ``result`` exists. joints: shape variables that it
     takes, in words ``takes``, with ``instead`` for other bodies; offered: those for which it is chosen unless others are
     named. regular: there must be no singular shapes. common: a plain study takes it.
-    markers: their colour, that of the line if left out.
+    markers: their colour, that of the line if left out. knobs: settings that an error study sweeps.
     """
 
     name: str
@@ -123,20 +128,26 @@ class Tier:
     regular: bool = False
     common: bool = True
     markers: str = ""
+    knobs: tuple[Knob, ...] = ()
 
     @property
     def colour(self) -> str:
         """Of its markers and error bars."""
         return self.markers or self.style["color"]
 
+    @property
+    def home(self) -> str:
+        """Module of its plan."""
+        return self.plan.__module__
+
     def refuse(self, system: System) -> None:
         """ValueError if it says nothing of this system."""
-        system.refuse(self.result, self.rests_on, "use the direct tier")
+        refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
             raise ValueError(f"the {self.name} tier {self.takes}, this body has {system.joints}: {self.instead}")
         if self.meets_singular_shapes(system):
-            near = getattr(system, "near", "")
-            why = f"A is known near {near} alone" if near else f"the {system.kind} has singular shapes"
+            gait = near(system)
+            why = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
             raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
 
     def meets_singular_shapes(self, system: System) -> bool:
@@ -153,11 +164,14 @@ class Tier:
         return system.joints in self.offered and self.is_possible(system)
 
 
+TIERS = Registry("geomech.tiers", "name", "a tier", lambda part: isinstance(part, Tier))  # cheapest look-up first
+
+
 def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return system.images(*gait.cycle(phases, gait.amplitude or 1.0)).count
+    return costed(system).solved(*gait.cycle(phases, gait.amplitude or 1.0))
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

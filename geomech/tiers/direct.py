@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from geomech.core.errors import number
+from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
-from geomech.systems.base import NONE
+from geomech.systems.capabilities import at_once
 from geomech.tiers.base import Plan, Tier, in_groups, solved
+from rft.premise import NONE
+
+COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
+NOTHING = "nothing that exact link integrals do not give for less"
 
 
 def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -> np.ndarray:
@@ -42,7 +47,7 @@ def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
     """The system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
     phases = numerics.phases
     run = lambda some: system.run(*gait.cycle(phases, some)).net
-    predict = lambda table, some: run(None) if some is None else in_groups(run, some, system.at_once(phases))
+    predict = lambda table, some: run(None) if some is None else in_groups(run, some, at_once(system, phases))
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 
@@ -54,4 +59,25 @@ DIRECT = Tier(
     _plan,
     rests_on=NONE,
     markers="black",
+    knobs=(
+        Knob("phases", (16, 32, 64, 128, 256, 512), "spectral if smooth, else 2", "the true answer"),
+        Knob("segments", COUNTS, "2; less with pivots in links", NOTHING, "limit", setting="loads", rule="midpoint"),
+        Knob(
+            "nodes",
+            COUNTS,
+            "spectral; about 1 to 2 with pivots in links",
+            NOTHING,
+            "limit",
+            setting="loads",
+            rule="gauss",
+        ),
+        Knob("regularisation", (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), "1", "links that really stand still", "limit"),
+        Knob(
+            "pieces",
+            (5, 10, 20, 40, 80),
+            "2 in the mean, scattered by pivots",
+            "effects that vary along long links",
+            "limit",
+        ),
+    ),
 )

@@ -15,19 +15,24 @@ from geomech.geometry.images import images, mirrored, to_solve
 from geomech.geometry.plane import Plane, looked_up, shapes_of
 from geomech.geometry.plane import plane as fit_plane
 from geomech.geometry.traits import Traits
-from geomech.systems.base import ALL, System, length_unit, shape_labels
+from geomech.systems import premises
+from geomech.systems.base import Given, System, length_unit, shape_labels
+from geomech.systems.capabilities import stored
+from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
+from rft.premise import ALL
 
 INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
 
 LARGEST_GRID = 2_000_000  # shapes; a finer field is a slip of the pen
 FIELD = 30_000  # shapes of four and more joints: tiers do without a larger field
+GRIDS = 7, 11, 15, 21, 31, 45, 61  # that an error study tries
 DEPENDS_ON = ("grid", "extent", "directions", "interpolation")  # of [numerics]
 
 
 def refuse(system: System) -> None:
     """ValueError if the system has no connection."""
-    system.refuse("connection or CCF", ALL, "use the direct tier")
+    premises.refuse(system, "connection or CCF", ALL, "use the direct tier")
 
 
 def directions(system: System, numerics: Numerics) -> int:
@@ -38,7 +43,7 @@ def directions(system: System, numerics: Numerics) -> int:
 def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
     """Return the axes of the field; ValueError if there is none, or one too large."""
     refuse(system)
-    if own := system.stored("connection"):
+    if own := stored(system, "connection"):
         return own.axes
     d, n = system.joints, numerics.grid
     if n**d > LARGEST_GRID:
@@ -57,7 +62,7 @@ def fits(joints: int) -> int:
 def is_too_large(system: System, numerics: Numerics) -> bool:
     """Return whether tiers do without the field of so many shapes, and solve for A at those of the gait and of the surfaces
     that it spans."""
-    return system.joints > 3 and not system.stored("connection") and numerics.grid**system.joints > FIELD
+    return system.joints > 3 and not stored(system, "connection") and numerics.grid**system.joints > FIELD
 
 
 def table(system: System, numerics: Numerics) -> Table:
@@ -66,7 +71,7 @@ def table(system: System, numerics: Numerics) -> Table:
     return Table(
         "connection",
         key(numerics, DEPENDS_ON),
-        solved_shapes(system.inner if system.carried else system, numerics, count) * count,
+        solved_shapes(system.inner if isinstance(system, Framed) else system, numerics, count) * count,
         (d + 3) * 3 * numerics.grid**d,
         partial(_build, system, numerics),
         partial(axes, system, numerics),
@@ -79,9 +84,13 @@ def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
 
 
 def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
-    if own := system.stored("connection"):
+    if own := stored(system, "connection"):
         return own if own.length else replace(own, unit=length_unit(system), length=system.length)
-    return system.fitted(axes(system, numerics), directions(system, numerics), numerics.interpolation, progress)
+    if isinstance(system, Framed):
+        return system.fitted(progress)
+    count, known = directions(system, numerics), {"traits": system.traits, "trusted": not isinstance(system, Given)}
+    known |= {"unit": length_unit(system), "length": system.length}
+    return connection.fit(system.velocity, axes(system, numerics), count, numerics.interpolation, progress, **known)
 
 
 def at_shapes(system: System, numerics: Numerics) -> Callable:
@@ -99,7 +108,7 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
 
     ValueError if there is no connection, or if the plane lies outside the field."""
     refuse(system)
-    if own := system.stored("connection"):
+    if own := stored(system, "connection"):
         return looked_up(own, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
@@ -110,7 +119,7 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
 
 def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int], at) -> int:
     """Return the velocities that `plane` takes."""
-    if system.stored("connection"):
+    if stored(system, "connection"):
         return 0
     axis, count = connection.grid(1, numerics.grid, numerics.extent)[0], directions(system, numerics)
     alpha = shapes_of((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
@@ -120,7 +129,7 @@ def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int],
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
     """Return the number of shapes of the field that are solved, each for ``count`` directions of alphadot; 0 of one that is
     stored."""
-    if system.stored("connection"):
+    if stored(system, "connection"):
         return 0
     return _solved_shapes(system.joints, numerics.grid, count, system.traits.halved, system.traits.reversible)
 

@@ -7,8 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from geomech.core.knob import Knob
 from geomech.geometry import harmonics
 from geomech.geometry.harmonics import Harmonics
+from geomech.systems.capabilities import stored
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
 from geomech.tiers.direct import itself
@@ -55,7 +57,7 @@ def _axes(system, numerics) -> tuple[np.ndarray, ...]:
 
 
 def _build(system, numerics, progress: Callable | None) -> Harmonics:
-    if own := system.stored("harmonics"):
+    if own := stored(system, "harmonics"):
         return own
     count, degree = directions(system, numerics), numerics.interpolation
     known = {"highest": highest(system, numerics), "traits": system.traits}
@@ -81,4 +83,13 @@ HARMONIC = Tier(
     takes="takes two to five joints, and of more there are too many harmonics",
     instead="use path, adapted or direct",
     regular=True,
+    knobs=(
+        Knob("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "any gait inside the field from one table"),
+        Knob(
+            "harmonics",
+            (1, 3, 5, 9, 15, 21),
+            "1 to 2, set by the kinks",
+            "the part of the velocity that is not linear in alphadot",
+        ),
+    ),
 )

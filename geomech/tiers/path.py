@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, Velocity
 from geomech.tiers import fitted
@@ -29,4 +30,15 @@ def _plan(system, numerics, gait, amplitudes) -> Plan:
     return Plan(predict, fitted.table(system, numerics), read=read)
 
 
-PATH = Tier("path", "path integral of A", {"color": "#0072B2", "linestyle": "-."}, _plan, offered=range(1, 6))
+PATH = Tier(
+    "path",
+    "path integral of A",
+    {"color": "#0072B2", "linestyle": "-."},
+    _plan,
+    offered=range(1, 6),
+    knobs=(
+        Knob("grid", fitted.GRIDS, "4 if smooth, 1 to 2 across kinks", "the limit of linearity, no further"),
+        Knob("directions", (2, 4, 8, 16, 32, 64), "2, harmonics folding back", "a steadier fit", "limit"),
+        Knob("interpolation", (1, 2, 3, 5), "degree + 1 if smooth", "little where links stick", "limit"),
+    ),
+)

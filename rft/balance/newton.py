@@ -78,9 +78,9 @@ class Descent(NamedTuple):
 class Limits(NamedTuple):
     """Required accuracy, and limits of the steps.
 
-    rounding: of the last level. residual: of a solution. largest_step: of the body's mean place and heading; no body moves
-    that fast. least_damping: a step with so little is accepted though the residual grows. damping_growth: factor of the
-    damping after an accepted step."""
+    rounding: of the last level. residual: largest of a solution. largest_step: change of the velocity of the body's mean
+    place and of its rotation rate; no body moves that fast. least_damping: damping at which a step is accepted though the
+    residual grows. damping_growth: factor of the damping after an accepted step."""
 
     rounding: float
     residual: float

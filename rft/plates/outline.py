@@ -47,7 +47,7 @@ class Outline:
 
     @property
     def closed(self) -> bool:
-        """Whether the last point is the first."""
+        """True if the last point is the first."""
         return len(self.points) > 3 and bool((np.asarray(self.points[0]) == np.asarray(self.points[-1])).all())
 
     @property

@@ -31,7 +31,8 @@ class Machine(NamedTuple):
 
 
 def machine(robot: Robot, elements: int, planar: bool = False) -> Machine:
-    """Return the machine of a robot with so many elements. planar: whether a robot of the vertical plane stays in it."""
+    """Return the machine of a robot. elements: number of elements, or of edges, of its surfaces. planar: whether a robot of
+    the vertical plane stays in it."""
     if isinstance(robot, Mjcf):
         surfaces = robot.surfaces(elements)
         root = int(robot.model.body_rootid[surfaces[0].body])

@@ -138,7 +138,7 @@ class Simulation:
         start: Start | None = None,
         progress: Callable | None = None,
     ) -> Walk:
-        """Return a walk of at most so many strides. duration: s, of the walk; after a stride that repeats the last one, the
+        """Return a walk of at most ``most`` strides. duration: s, of the walk; after a stride that repeats the last one, the
         rest consists of its repetitions."""
         body = self.body
         if start is not None:
@@ -265,7 +265,7 @@ class Simulation:
         return np.array(numbers)
 
     def unwound(self, strides: int) -> np.ndarray:
-        """Return qpos less the full turns that the clock has driven hinges by in so many strides."""
+        """Return qpos less the full turns of hinges that the clock drives in ``strides`` strides."""
         model, qpos = self.body.model, self.body.data.qpos.copy()
         for actuator in self.machine.driven if strides else ():
             joint, gear = model.actuator_trnid[actuator, 0], model.actuator_gear[actuator, 0]

@@ -120,7 +120,7 @@ class Robot:
         return None
 
     def check(self, elements: int) -> None:
-        """Raise ValueError unless the robot's surfaces can have so many elements."""
+        """Raise ValueError unless the robot's surfaces can have ``elements`` elements."""
         self.leg(elements)
 
     def _check(self) -> None:

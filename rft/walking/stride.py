@@ -206,8 +206,8 @@ def from_rest(strides: Strides, durations: np.ndarray, progress: Callable = lamb
 def remaining_change(change, before, cycles) -> np.ndarray:
     """Return the change (B,) of the starts of cycles that may still come, from the last change and the one before, (n, B).
 
-    It is the sum of a geometric series with the ratio of the two, but at most the last change in each of so many ``cycles``
-    (B,), and at least one."""
+    It is the sum of a geometric series with the ratio of the two, but at most ``cycles`` (B,) times the last change, and at
+    least the last change."""
     now, then = np.abs(change).max(0), np.abs(before).max(0)
     shrinks = now < then
     series = np.where(shrinks, now / np.where(shrinks, 1 - now / np.where(shrinks, then, 1.0), 1.0), np.inf)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from geomech.core.errors import plain
+from geomech.core.registry import Registry, functions_with
 from geomech.geometry.connection import Connection
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
@@ -20,6 +21,7 @@ LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; 
 LARGEST_ENTRY = 1e9  # of A, body lengths or m or rad per rad
 SIGNS = {"+": "xi = + A alphadot", "-": "xi = - A alphadot"}
 ORDERS = ("ndgrid", "meshgrid")
+FORMATS = Registry("geomech.formats", "suffix", "a file format", functions_with("suffix"))
 ROWS = ("x", "y", "theta")
 ROUNDING = 1e-9  # of the largest velocity: a displacement below it has no sign
 

@@ -17,6 +17,7 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.io.tables import matlab
 from geomech.io.tables.base import (
+    FORMATS,
     LARGEST_ANGLE,
     ORDERS,
     SIGNS,
@@ -37,6 +38,7 @@ ABOUT, RESIDUAL, ERROR = "geomech_about", "geomech_fit_residual", "geomech_A_err
 SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 
+@FORMATS.register(suffix=".mat")
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
     found = _variables(raw)

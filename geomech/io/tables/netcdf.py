@@ -14,6 +14,7 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.tube import Known, Loop, Tube
 from geomech.io.tables.base import (
+    FORMATS,
     ROWS,
     SIGNS,
     Stored,
@@ -33,6 +34,7 @@ ANGLES = ("rad", "radian", "radians")
 SHAPE = "shape variable "  # before the name of one that is no angle between links
 
 
+@FORMATS.register(suffix=".nc")
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from geomech.core.errors import SceneError, choose, short
 from geomech.io.files import read, why
-from geomech.io.tables.base import ORDERS, SIGNS, Stored
+from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
 
 LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
 
@@ -17,14 +17,11 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
 
     sign: "+" or "-" for xi = + or - A alphadot; if left out as the file says, or made out (`detected_sign`). order:
     "ndgrid" or "meshgrid", the way arrays of a .mat file run; if left out as alpha1 and alpha2 in it run."""
-    from geomech.io.tables import mat, netcdf
-
-    readers = {".nc": netcdf.parse, ".mat": mat.parse}
     if not isinstance(path, (str, Path)):
         raise SceneError(f"a table is a .nc or .mat file, got {short(path)}")
     path = Path(path)
-    if path.suffix.lower() not in readers:
-        raise SceneError(f"cannot read the table {path}: end the name in {' or '.join(readers)}")
+    if path.suffix.lower() not in FORMATS:
+        raise SceneError(f"cannot read the table {path}: end the name in {' or '.join(FORMATS)}")
     for what, word, known in (("sign", sign, SIGNS), ("order", order, ORDERS)):
         if word != "":
             choose(what, word, known)
@@ -33,6 +30,6 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     except (OSError, ValueError) as error:
         raise SceneError(f"cannot read the table {path}: {why(error)}") from None
     try:
-        return readers[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
+        return FORMATS[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
     except ValueError as error:
         raise SceneError(f"the table {path} {error}") from None

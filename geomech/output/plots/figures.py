@@ -14,15 +14,12 @@ from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.plane import Plane, Seen
 from geomech.geometry.two_form import TwoForm
-from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest, vector_field
+from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest
 from geomech.output.plots.style import blank, figure, quantity, styled
 from geomech.output.plots.styles import (
     CCF_STYLES,
     CONNECTION_STYLES,
     MINUS_SIGN,
-    ccf_contours,
-    ccf_surface,
-    streamlines,
 )
 
 SHADOW = "dashed: the gait, seen along the joints that are held here"
@@ -35,7 +32,7 @@ def connection_figure(
 ):  # fmt: skip
     """All three rows of A side by side, as arrows ("quiver") or "streamlines". beside: the connection in another body frame,
     drawn below on the same scales. names: of the two frames."""
-    draw = {"quiver": vector_field, "streamlines": streamlines}[choose("style", style, CONNECTION_STYLES)]
+    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     rows = [connection] if beside is None else [connection, beside]
     fig, axes = figure(10.8, 3.0 + 2.7 * (len(rows) - 1), 3, len(rows), layout="compressed")
     for component in range(3):
@@ -114,7 +111,7 @@ def planes_figure(
 def plane_connection_figure(planes: Sequence[Plane], *, labels: Labels | None = None, style: str = "quiver"):
     """The rows of A on planes of shape space, a row a pair of joints, as `connection_figure`: of the two that move. labels: as
     for `planes_figure`."""
-    draw = {"quiver": vector_field, "streamlines": streamlines}[choose("style", style, CONNECTION_STYLES)]
+    draw = CONNECTION_STYLES[choose("style", style, CONNECTION_STYLES)]
     labels = labels or _angles(planes)
     fig, axes = figure(10.8, 3.0 + 2.7 * (len(planes) - 1), 3, len(planes), layout="compressed")
     for one, row in zip(planes, axes):
@@ -137,20 +134,21 @@ def told_at(plane: Plane, labels: Labels) -> str:
 
 def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):
     """Maps of the three components, a line of them for each row. same: on the same scales."""
-    if choose("style", style, CCF_STYLES) == "surface":
+    draw = CCF_STYLES[choose("style", style, CCF_STYLES)]
+    solid = getattr(draw, "projection", "") == "3d"
+    if solid:
         fig = blank(11.8, 3.6 * len(rows))
         axes = fig.subplots(len(rows), 3, squeeze=False, subplot_kw={"projection": "3d"})
         fig.get_layout_engine().set(w_pad=0.25)
     else:
         fig, axes = figure(10.8, 3.2 + 2.75 * (len(rows) - 1), 3, len(rows), layout="compressed")
-    draw = {"map": ccf_map, "contours": ccf_contours, "surface": ccf_surface}[style]
     more = {"metric": metric} if style == "map" else {}
     for component in range(len(TITLES)):
         top = max(largest(r.field.values[component]) for r in rows) if same and len(rows) > 1 else None
         for r, ax in zip(rows, axes[:, component]):
             draw(r.field, component, r.gaits, ax=ax, error=r.error, labels=r.labels, top=top, **more)
             for shadow in r.shadows:
-                if style == "surface":
+                if solid:
                     ax.plot(*shadow.shape(PHASES).T, ax.get_zlim()[0], "--", color="black", lw=1.0)
                 else:
                     draw_gait(shadow, ax, within=r.field.axes, line="--")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from geomech.core.registry import Registry, functions_with
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -15,6 +16,7 @@ from geomech.output.plots.maps import (
     TITLES,
     Labels,
     ccf_label,
+    ccf_map,
     ccf_name,
     draw_gait,
     drawable,
@@ -23,9 +25,16 @@ from geomech.output.plots.maps import (
     row_told,
     shape_space,
     unit_of,
+    vector_field,
 )
 from geomech.output.plots.style import axes_of, quantity, styled
 
+CONNECTION_STYLES = Registry(
+    "geomech.connection_styles", "style", "a way to draw a connection", functions_with("draws", "connection")
+)
+CCF_STYLES = Registry("geomech.ccf_styles", "style", "a way to draw a CCF", functions_with("draws", "ccf"))
+CONNECTION_STYLES.register(vector_field, style="quiver")
+CCF_STYLES.register(ccf_map, style="map")
 LINES = 61  # points an axis that streamlines are drawn on
 LEVELS = 6  # contours of either sign
 AREA = 240  # points an axis on which a gait's area is shaded
@@ -34,6 +43,7 @@ _WAYS = ("ahead", "backwards"), ("to the left", "to the right"), ("turns left", 
 PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards, or to either side
 
 
+@CONNECTION_STYLES.register(style="streamlines")
 @styled
 def streamlines(
     connection: Connection, component: int = 0, *, ax=None, labels: Labels = ANGLES, top: float | None = None
@@ -60,6 +70,7 @@ def streamlines(
     return row_told(ax, lines.lines, component, connection, labels)
 
 
+@CCF_STYLES.register(style="contours")
 @styled
 def ccf_contours(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
@@ -127,6 +138,7 @@ def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.cumsum(crossed[::-1], 0)[::-1][1:]
 
 
+@CCF_STYLES.register(style="surface", projection="3d")
 @styled
 def ccf_surface(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
@@ -185,6 +197,4 @@ def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[in
     return {s for s in (1, -1) if (s * density > 0).any()}
 
 
-CONNECTION_STYLES = ("quiver", "streamlines")
-CCF_STYLES = ("map", "contours", "surface")
 __all__ = ["CCF_STYLES", "CONNECTION_STYLES", "ccf_contours", "ccf_surface", "streamlines", "unit_of", "winding"]

@@ -1,0 +1,30 @@
+"""The body velocity for one shape and its rate of change, with how well it is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geomech.core.errors import real_array, short
+from geomech.geometry.velocity import evaluate
+from geomech.systems.base import System, note_angles
+from geomech.systems.capabilities import Diagnosed, capability
+
+
+def single(system: System, alpha, alphadot) -> dict:
+    """Return {"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
+    alpha, alphadot = (_one(system, name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
+    note_angles(system, np.abs(alpha).max())
+    traits = system.traits
+    if traits.singularity is not None and not traits.singularity(alpha):
+        raise ValueError(f"the shape is singular: {traits.singular}: move a joint")
+    if (diagnosed := capability(system, Diagnosed)) is not None:
+        return diagnosed.diagnosed(alpha, alphadot)
+    return {"xi": evaluate(system.velocity, alpha, alphadot).tolist(), "status": "exact", "residual": 0.0}
+
+
+def _one(system: System, name: str, x) -> np.ndarray:
+    """Return x as finite numbers (joints,); ValueError naming it."""
+    x = real_array(name, x)
+    if x.shape != (system.joints,) or not np.isfinite(x).all():
+        raise ValueError(f"{name} must be {system.joints} finite numbers for this system, got {short(x.tolist())}")
+    return x

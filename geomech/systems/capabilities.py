@@ -1,0 +1,265 @@
+"""Abilities that only some systems have. Each is a protocol with few readers; `capability` asks a system for one.
+
+A class has an ability by having its members. Where it depends on values, as power and covariance of a swimmer do, or on a
+system inside, the class has a method ``capability(kind)`` that returns the object with the ability, or None.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from geomech.systems.base import System, kind_of
+from rft.premise import Premise
+
+T = TypeVar("T")
+# Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
+# no less time each, and the first of a long request is soon done, which tells how long the others take.
+VALUES_TOGETHER = 1 << 20
+STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its time however few gaits take it
+
+
+def capability(system: System, kind: type[T]) -> T | None:
+    """Return the object with which a system has an ability, a protocol of this module; None if it has not."""
+    if own := getattr(system, "capability", None):
+        return own(kind)
+    return system if isinstance(system, kind) else None
+
+
+@runtime_checkable
+class Refinable(Protocol):
+    """A velocity that is computed nearly; read by `geomech.study.estimate` to see by how much."""
+
+    closed: bool  # whether the refined one has exact integrals over elements, else a finer rule
+
+    def refined(self) -> System | None:
+        """Return the system with a velocity closer to the exact one, None where it is exact; its `run` takes ``start``,
+        velocities nearby (..., N, 3)."""
+
+
+@runtime_checkable
+class Subdivided(Protocol):
+    """A body that effects which vary along an element cut into pieces; read by estimates of the error that leaves."""
+
+    cut: int  # pieces to a body length; 0 without such effects
+
+
+@runtime_checkable
+class Dissipative(Protocol):
+    """A body that does work against its medium; read by `geomech.study.effort` and `geomech.optimise`."""
+
+    def power(self, alpha, alphadot, xi) -> np.ndarray:
+        """Return the rate of work (...) at shapes, rates (..., d) and the velocity (..., 3) that they lead to, in axial drags
+        of the whole body times body lengths a unit of time."""
+
+
+@runtime_checkable
+class OwnMetric(Protocol):
+    """A shape space whose metric M is not one of drag but, say, of kinetic energy; read by `geomech.study.effort`."""
+
+    def squared_speed(self, alpha, alphadot) -> np.ndarray:
+        """Return alphadot^T M(alpha) alphadot (...) at shapes and rates (..., d)."""
+
+
+@runtime_checkable
+class Drawable(Protocol):
+    """A body to draw; read by `geomech.study.motion`."""
+
+    def points(self, alpha, pose) -> np.ndarray:
+        """Return the ends of the links (..., links + 1, 2) in the world, tail to head, at shapes (..., d) and poses of the
+        frame (..., 3)."""
+
+
+@runtime_checkable
+class Tabulated(Protocol):
+    """A velocity that is looked up in tables of its own; read wherever a table would be computed."""
+
+    near: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
+
+    def table(self, name: str) -> Any:
+        """Return the table "connection", "harmonics", "metric", "even part" or "A_error"; None without it."""
+
+    def own_error(self, alpha, alphadot) -> np.ndarray:
+        """Return (..., 2), body lengths and rad: what the tables leave of the net pose of cycles (..., N, d)."""
+
+
+@runtime_checkable
+class Uncertain(Protocol):
+    """Parameters that are not known for certain; read by `geomech.study.uncertainty`."""
+
+    covariance: Any  # (n, n)
+
+    def varied(self, step) -> System:
+        """Return the system with parameters off by ``step`` (n,); ValueError if that is none."""
+
+
+@runtime_checkable
+class Stepped(Protocol):
+    """Cycles that are not all alike; read by `geomech.study.motion` and `choose`."""
+
+    settling: float  # change of displacement at which cycles count as repeating, body lengths or rad; 0 if they are not run on
+
+    def path(self, alpha, alphadot, cycles: int) -> np.ndarray:
+        """Return poses (cycles N + 1, 3) of the frame, seen from the first, of a cycle (N, d) run so many times."""
+
+
+@runtime_checkable
+class Costed(Protocol):
+    """A velocity that takes a balance of forces; read by `geomech.study.cost`."""
+
+    elements: int  # straight parts of the body
+    evaluations: int  # places at which forces are evaluated for one velocity
+    held: int  # numbers that time stepping remembers for each sample
+    batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
+
+    def solved(self, alpha, alphadot) -> int:
+        """Return at how many phases of cycles (..., N, d) a balance is solved: the others are images of these."""
+
+
+@runtime_checkable
+class Tunable(Protocol):
+    """[numerics] of its own; read by `geomech.scene`."""
+
+    solver: Any  # a dataclass
+
+    def with_solver(self, solver) -> System:
+        """Return the system with another solver."""
+
+
+class Part(NamedTuple):
+    """A part that breaks premises. role: "law" or "effect"; name: of its kind."""
+
+    role: str
+    name: str
+    breaks: Premise
+
+
+@runtime_checkable
+class Composite(Protocol):
+    """A system whose parts break premises; read by `geomech.systems.premises`."""
+
+    parts: tuple[Part, ...]
+
+
+@runtime_checkable
+class Diagnosed(Protocol):
+    """A velocity that comes with a status and a residual; read by `geomech velocity`."""
+
+    def diagnosed(self, alpha, alphadot) -> dict:
+        """Return {"xi", "status", "residual"}, and more, for one shape and rate (d,)."""
+
+
+@runtime_checkable
+class Symbolic(Protocol):
+    """A connection with a formula; read by `geomech symbolic`."""
+
+    def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
+        """Return A (3, d) as a sympy Matrix, and its shape variables."""
+
+
+@runtime_checkable
+class Recorded(Protocol):
+    """Attributes for a file of its connection; read by `geomech.output`."""
+
+    def about(self) -> Mapping[str, Any]:
+        """Return them by name."""
+
+
+def stored(system: System, name: str) -> Any:
+    """Return the table of that name that a system looks up; None where tables are computed."""
+    tabulated = capability(system, Tabulated)
+    return None if tabulated is None else tabulated.table(name)
+
+
+def pieces_of(system: System) -> int:
+    """Return the pieces to a body length that effects which vary along elements see; 0 without such effects."""
+    subdivided = capability(system, Subdivided)
+    return 0 if subdivided is None else subdivided.cut
+
+
+def refined(system: System) -> System | None:
+    """Return the system with its velocity computed more exactly, None where it is exact."""
+    refinable = capability(system, Refinable)
+    return None if refinable is None else refinable.refined()
+
+
+def power(system: System, alpha, alphadot) -> np.ndarray:
+    """Return the power (...) of a dissipative system at shapes and rates (..., d), as `Dissipative` has it."""
+    return driven(system, alpha, alphadot)[1]
+
+
+def driven(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+    """Return xi (..., 3) and power (...) of the same solutions; ValueError for a system that says no power."""
+    dissipative = capability(system, Dissipative)
+    if dissipative is None:
+        raise ValueError(f"no power with the {kind_of(system)}: nothing says what a change of shape costs it")
+    xi = system.velocity(alpha, alphadot)
+    return xi, dissipative.power(alpha, alphadot, xi)
+
+
+def settling(system: System) -> float:
+    """Return the change of displacement at which cycles count as repeating; 0 where they are not run until they do."""
+    stepped = capability(system, Stepped)
+    return 0.0 if stepped is None else stepped.settling
+
+
+def solver_of(system: System) -> Any:
+    """Return the system's own part of [numerics], a dataclass; None without one."""
+    tunable = capability(system, Tunable)
+    return None if tunable is None else tunable.solver
+
+
+def with_solver(system: System, changes: Mapping[str, Any]) -> System:
+    """Return a system with some of its own [numerics] changed."""
+    return system.with_solver(replace(system.solver, **changes)) if changes else system
+
+
+def at_once(system: System, phases: int) -> int:
+    """Return how many amplitudes of a gait are run side by side, at least one: more take more memory and no less time."""
+    cost = costed(system)
+    if cost.batched:
+        return sys.maxsize
+    if not system.traits.steps:
+        return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * cost.elements)))
+    # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
+    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.held // 8))
+
+
+def near(system: System) -> str:
+    """Return the one gait near which alone a system is known, in words; "" where it is known everywhere."""
+    tabulated = capability(system, Tabulated)
+    return "" if tabulated is None else tabulated.near
+
+
+def own_error(system: System, alpha, alphadot) -> np.ndarray:
+    """Return (..., 2), body lengths and rad: what tables leave of the net pose of cycles (..., N, d); 0 without tables."""
+    tabulated = capability(system, Tabulated)
+    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.own_error(alpha, alphadot)
+
+
+def is_closed(system: System) -> bool:
+    """Return whether a system computes its velocity nearly, and `refined` has exact integrals."""
+    refinable = capability(system, Refinable)
+    return refinable is not None and refinable.closed
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """The cost of a system that solves no balance."""
+
+    system: System
+    elements = evaluations = 1
+    held = 0
+    batched = False
+
+    def solved(self, alpha, alphadot) -> int:
+        return np.shape(alpha)[-2]
+
+
+def costed(system: System) -> Costed:
+    """Return what a system's velocity costs."""
+    return capability(system, Costed) or ClosedForm(system)

@@ -1,0 +1,41 @@
+"""Who lacks the premises of a result, and the one sentence that refuses it."""
+
+from __future__ import annotations
+
+from geomech.systems.base import System, kind_of
+from geomech.systems.capabilities import Composite, Part, capability
+from rft.premise import Premise, negated
+
+CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
+
+
+def broken(system: System, premises: Premise) -> list[Part]:
+    """Return the parts of a system that break one of some premises; the whole system where it has no parts."""
+    composite = capability(system, Composite)
+    parts = [Part("", kind_of(system), system.traits.lacks)] if composite is None else composite.parts
+    return [part for part in parts if part.breaks & premises]
+
+
+def because(system: System, premises: Premise) -> str:
+    """Return the first part that breaks one of some premises, to follow "no connection with"; "" if none does."""
+    for part in broken(system, premises):
+        if part.role == "law":
+            return f"the law {part.name}, whose drag is of no one power of the speed"
+        return f"{_named(part)}, which is {negated(part.breaks)}"
+    return ""
+
+
+def listed(system: System, premises: Premise) -> str:
+    """Return all parts that break one of some premises, by name; the whole system where none does."""
+    names = [_named(part).removeprefix("the effect ") for part in broken(system, premises)]
+    return ", ".join(names) or f"the {kind_of(system)}"
+
+
+def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
+    """ValueError, one line, if there is no such result because a premise of it does not hold."""
+    if parts := broken(system, premises):
+        raise ValueError(f"no {what} with {because(system, premises)}: {instead}{CURES.get(parts[0].role, '')}")
+
+
+def _named(part: Part) -> str:
+    return f"the {part.role} {part.name}" if part.role else f"the {part.name}"

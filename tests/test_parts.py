@@ -1,0 +1,252 @@
+"""Parts of one's own: one of each family in a folder, one file and one decorator each, used by commands and from Python."""
+
+import json
+
+import numpy as np
+import pytest
+from test_cli import geomech
+
+import geomech as library
+from geomech.core.errors import SceneError, VelocityWarning
+from geomech.core.registry import REGISTRIES
+from geomech.gaits import Circle, Ellipse
+from geomech.geometry.traits import Traits
+from geomech.io import tables
+from geomech.optimise import optimise
+from geomech.output import plots
+from geomech.scene import Numerics, Scene, kinds, parse
+from geomech.study.bench import Study
+from geomech.study.single import single
+from geomech.systems.base import Cycle, integrated
+from geomech.text.explain import explain
+
+HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
+FILES = {
+    "law": """
+@geomech.register
+@dataclass(frozen=True)
+class Treacle:
+    thickness: float = 2.5
+    law = "treacle"
+
+    def traction(self, v_t, v_n, rounding=0.0):
+        return v_t, self.thickness * v_n
+""",
+    "body": """
+import rft
+
+@geomech.register
+@dataclass(frozen=True)
+class Knee:
+    angle: float = 0.2
+    kind, length, joints = "knee", 1.0, 2
+
+    def motion(self, alpha, alphadot):
+        return rft.Chain((1, 2, 1)).motion(alpha + self.angle, alphadot)
+""",
+    "effect": """
+from rft.effects import Effect
+
+@geomech.register
+@dataclass(frozen=True)
+class Waxed(Effect):
+    by: float = 0.5
+    kind, limit, cost, odd = "waxed", "by = 1", "one multiplication", True
+
+    def apply(self, problem, site=None, past=None):
+        return problem._replace(sides=problem.sides.with_factors(self.by, self.by, 1.0))
+""",
+    "gait": """
+from geomech.gaits import Gait
+
+@geomech.register
+@dataclass(frozen=True, kw_only=True)
+class Egg(Gait):
+    waist: float = 0.1
+    kind, harmonics = "egg", 2
+
+    def unit(self, t):
+        t = np.asarray(t, float)
+        return np.stack([np.cos(t), np.sin(t) + self.waist * np.sin(2 * t)], -1)
+
+    def unit_rate(self, t):
+        t = np.asarray(t, float)
+        return np.stack([-np.sin(t), np.cos(t) + 2 * self.waist * np.cos(2 * t)], -1)
+""",
+    "system": """
+from geomech.systems import Traits, integrated
+
+@geomech.register
+@dataclass(frozen=True)
+class Trike:
+    base: float = 0.4
+    kind = "trike"
+    joints = 2
+    length = 1.0
+    traits = Traits(linear=True)
+    run = integrated
+
+    def velocity(self, alpha, alphadot):
+        v = alphadot[..., 0]
+        return np.stack([v, 0 * v, v * np.tan(0.3 * np.tanh(alpha[..., 1])) / self.base], -1)
+""",
+    "function": """
+@geomech.register(joints=2, kind="skate")
+def skate(alpha, alphadot, grip=0.5):
+    v = np.cos(alpha[..., 0]) * alphadot[..., 1]
+    return np.stack([v, grip * alpha[..., 1] * alphadot[..., 0], alphadot[..., 0] - v], -1)
+""",
+    "tier": """
+from geomech.geometry.curvature import ccf
+from geomech.tiers import Plan, Tier, fitted
+from rft import se2
+
+def plan(system, numerics, gait, amplitudes):
+    def predict(table, some):
+        area = np.pi * np.asarray(gait.amplitude if some is None else some)[..., None] ** 2
+        return se2.exp(area * ccf(table)(gait.middle))
+    return Plan(predict, fitted.table(system, numerics))
+
+geomech.register(Tier("leading", "area times the CCF in the middle", {"color": "C4"}, plan, joints=range(2, 3)))
+""",
+    "plot": """
+@geomech.plots.CCF_STYLES.register(style="dots")
+def dots(field, component=0, gaits=(), *, ax=None, error=None, labels=(), top=None):
+    x, y = np.meshgrid(*field.axes, indexing="ij")
+    return ax.scatter(x, y, c=field.values[component])
+""",
+    "format": """
+import json
+from geomech.geometry.connection import Connection
+from geomech.io.tables import FORMATS, Stored
+
+@FORMATS.register(suffix=".json")
+def parse(raw, sign, order, sha256):
+    told = json.loads(raw)
+    axes, A = tuple(np.array(a) for a in told["axes"]), np.array(told["A"])
+    left = np.zeros(A[:, 0].shape)
+    return Stored(Connection(axes, A, left, left + 1.0, unit="m", length=0.5), length=0.5, unit="m", sha256=sha256)
+""",
+}
+SWIMMER = '[medium]\nlaw = "treacle"\n[body]\nkind = "knee"\n[[effects]]\nkind = "waxed"\n'
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """One of each in a folder, and registries as before afterwards."""
+    for name, text in FILES.items():
+        (tmp_path / f"own_{name}.py").write_text(HEAD + text)
+    end = '[gait]\nkind = "egg"\namplitude = 0.4\n[numerics]\ngrid = 7\nextent = 1.5\nphases = 32\n'
+    (tmp_path / "swims.toml").write_text(SWIMMER + end)
+    for kind in ("trike", "skate"):
+        (tmp_path / f"{kind}.toml").write_text(f'[system]\nkind = "{kind}"\n{end}')
+    axis = np.linspace(-2, 2, 9)
+    A = np.zeros((3, 2, 9, 9))
+    A[0, 1] = np.sin(axis)[:, None]
+    (tmp_path / "own.json").write_text(json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()}))
+    (tmp_path / "table.toml").write_text(f'[system]\nkind = "table"\nfile = "own.json"\n{end}')
+    monkeypatch.chdir(tmp_path)
+    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
+    for name in ("_code", "_files"):
+        monkeypatch.setattr(kinds, name, {})
+    yield tmp_path
+    for group, registry in REGISTRIES.items():
+        registry.restore(before[group])
+
+
+PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]
+
+
+@pytest.mark.parametrize("name", ["swims", "trike", "skate", "table"])
+def test_commands_use_one_of_each(name):
+    argv = ["displacement", f"{name}.toml", "--amplitudes", "0.2,0.4", "--methods", "leading,path,direct", "--json"]
+    code, _, err = geomech(*argv)
+    assert code == 2 and "unknown" in err  # a scene alone runs no code
+    code, out, err = geomech(*argv, *PLUGINS)
+    assert code == 0, err
+    found = json.loads(out)
+    assert np.isfinite([found["leading"], found["direct"]]).all()
+    code, out, err = geomech("ccf", f"{name}.toml", "--style", "dots", "--plot", "ccf.png", *PLUGINS)
+    assert code == 0, err
+    code, out, err = geomech("explain", f"{name}.toml", *PLUGINS)
+    assert code == 0 and "egg gait" in out, err
+
+
+def test_what_was_loaded_is_in_its_registry_and_in_scenes(folder):
+    for name in FILES:
+        assert kinds.load_file(folder / f"own_{name}.py")
+    for group, name in (
+        ("media", "treacle"), ("bodies", "knee"), ("effects", "waxed"), ("gaits", "egg"), ("systems", "trike"),
+        ("systems", "skate"), ("tiers", "leading"), ("ccf_styles", "dots"), ("formats", ".json"),
+    ):  # fmt: skip
+        registry = REGISTRIES[f"geomech.{group}"]
+        assert name in registry and name not in registry.built_in
+    for name in ("swims", "trike", "skate"):
+        scene = library.load(folder / f"{name}.toml")
+        again = library.toml(scene.changed(text="", numerics=Numerics(grid=8, phases=32)))
+        assert library.toml(parse(again)) == again
+        study = Study(scene)
+        assert np.isfinite(study.study([0.3], study.methods)["direct"]).all() and "leading" in study.tiers
+    assert library.load(folder / "skate.toml").changed(grip=0.7).system.given.grip == 0.7
+    assert tables.load(folder / "own.json").length == 0.5
+
+
+class Cart:
+    """Five members and nothing else."""
+
+    joints, length, traits = 2, 0.5, Traits(linear=True, joint_angles=True)
+
+    def velocity(self, alpha, alphadot):
+        return np.stack([np.sin(alpha[..., 0]) * alphadot[..., 1], 0 * alpha[..., 0], 0.2 * alphadot[..., 0]], -1)
+
+    def run(self, alpha, alphadot, work=False) -> Cycle:
+        return integrated(self, alpha, alphadot)
+
+
+def sled(alpha, alphadot):
+    """As the cart, in body lengths."""
+    return Cart().velocity(alpha, alphadot)
+
+
+@pytest.mark.parametrize("system", [Cart(), sled])
+def test_five_members_and_functions_go_through_everything(system, tmp_path):
+    """Study, every tier, errors, frames, the optimiser, plots and words; no base class and no name."""
+    scene = Scene(system, Circle(amplitude=0.5, centre=(0.1, 0.2)), Numerics(grid=9, extent=1.5, phases=64))
+    study = Study(scene)
+    assert study.tiers[-1] == "direct" and {"area", "adapted", "path"} <= {*study.tiers}
+    table = study.study([0.3, 0.5], study.tiers)
+    truth = np.array(table["direct"])
+    assert np.abs(truth[:, 0]).min() > 0.01
+    for tier in study.tiers:
+        found = np.hypot(*(np.array(table[tier]) - truth).T[:2])
+        assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
+    framed = study.in_frame("minimum-perturbation")
+    assert framed.displacement("direct", None, [0.5]).shape == (1, 3)
+    with pytest.raises(SceneError, match="has one frame, 'mean'"):
+        study.in_frame("link-1")
+    found = optimise(scene, harmonics=1, within=1.2)
+    assert found.value > np.hypot(*truth[-1, :2])
+    plots.save(plots.displacement_figure({"circle": table}, [scene.gait]), tmp_path / "a.png")
+    plots.save(plots.ccf_figure(study.curvature), tmp_path / "b.png")
+    assert single(scene.system, [0.1, 0.2], [1.0, 0.0])["status"] == "exact"
+    assert explain(scene).startswith(f"scene: {getattr(system, '__name__', 'Cart')}, circle gait")
+    assert study.cost([0.3], study.tiers).balances > 0
+
+
+def test_a_function_says_what_it_does_not_take():
+    with pytest.raises(SceneError, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"):
+        Scene(lambda alpha: alpha, Circle())
+    with pytest.warns(VelocityWarning, match="not odd"):
+        _ = Study(Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))).fitted
+    one = lambda a, u: [a[0] * u[1], 0.0, u[0]]  # of a single shape
+    many = lambda a, u: np.stack([a[..., 0] * u[..., 1], 0 * u[..., 0], u[..., 0]], -1)
+    nets = [Scene(f, Ellipse(), Numerics(phases=16)).cycle().net for f in (one, many)]
+    np.testing.assert_allclose(*nets, rtol=1e-14)
+
+
+@pytest.mark.parametrize("group", ["geomech.gaits", "geomech.systems", "geomech.tiers", "geomech.formats"])
+def test_every_file_of_a_folder_is_registered(group):
+    """Each has examples, or needs no parameters."""
+    registry = REGISTRIES[group]
+    assert len(registry) == len(registry.built_in) > 1
+    assert {*registry} == {getattr(part, registry.key) for part in registry.values()}
