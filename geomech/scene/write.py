@@ -7,7 +7,6 @@ import json
 import math
 import textwrap
 import tomllib
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -123,7 +122,7 @@ def _section(part: Any, section: Section) -> dict:
         is_one = type(part) is getattr(variant.kind, "makes", variant.kind)
         if is_one and not (variant.file and not variant.file.keys):
             inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
-            return {**variant.named, **_fields(part, variant.kind, inner), **inner}
+            return {**variant.named, **_fields(part, variant.kind), **inner}
         if is_one or isinstance(section, Keys):
             raise ValueError(
                 f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
@@ -163,9 +162,9 @@ def _numerics(scene: Scene) -> dict:
     return {key: value for part in parts if part for key, value in _fields(part, type(part)).items()}
 
 
-def _fields(part: Any, kind: type, but: Collection[str] = ()) -> dict:
-    """Return the fields of a class, as a file has them, that are told at construction and have a value."""
-    names = [f.name for f in dataclasses.fields(kind) if f.init and f.name not in {*but, "solver"}]
+def _fields(part: Any, kind: type) -> dict:
+    """Return the keys of a class, as a file has them, that a part has a value for."""
+    names = [f.name for f in dataclasses.fields(kind) if f.init and f.name != "solver"]
     return {name: _plain(value) for name in names if (value := getattr(part, name, None)) is not None}
 
 
