@@ -9,7 +9,8 @@ from figures import main
 from geomech.gaits import Butterfly, Circle
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import METHODS, Study
+from geomech.study.bench import Study
+from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}
 AMPLITUDES = {"circle": np.linspace(0.125, 2.25, 18), "butterfly": np.linspace(0.1, 1.3, 13)}
@@ -19,7 +20,7 @@ def compute(scene: str = "three-link-glass", amplitudes: dict | None = None) -> 
     """Return a table for each gait, as `Study.study` gives it."""
     loaded, amplitudes = load(scene), amplitudes or AMPLITUDES
     study = Study(loaded)
-    tables = {name: study.study(a, METHODS, GAITS[name]) for name, a in amplitudes.items()}
+    tables = {name: study.study(a, [*TIERS], GAITS[name]) for name, a in amplitudes.items()}
     return {"tables": tables}
 
 

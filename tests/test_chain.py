@@ -76,7 +76,7 @@ def test_carried_and_wrench_are_transposes():
     np.testing.assert_allclose(total(net.force), wrench(force), rtol=1e-12)
     for column, unit in zip(net[1:4], np.eye(3)):
         np.testing.assert_allclose(total(column), 0.7 * tangent(to_element(motion, *unit)), rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(total(net.drift), 0.7 * tangent(v), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(total(net.by_speed), 0.7 * tangent(v), rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize(

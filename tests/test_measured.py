@@ -32,6 +32,7 @@ from geomech.output import mat
 from geomech.scene import Scene, load
 from geomech.study import fields
 from geomech.study.bench import Study
+from geomech.study.single import single
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.text import measured as told
@@ -664,7 +665,7 @@ def test_a_tube_between_the_points_of_its_grid_is_looked_up_all_the_same(usual, 
     study = Study(Scene(Table(tmp_path / "thin.nc"), thin.gait))
     assert np.isnan(study.fitted.A).all()
     np.testing.assert_allclose(study.displacement("direct"), thin.displacement[0], rtol=1e-9)
-    assert study.scene.system.single(thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])["residual"] is None
+    assert single(study.scene.system, thin.known.loop.shape(np.array(1.0)), [1.0, 0.0])["residual"] is None
 
 
 def test_damaged_fields_are_refused(field, tmp_path):

@@ -1,6 +1,7 @@
 """Parts of one's own: one of each family in a folder, one file and one decorator each, used by commands and from Python."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -146,12 +147,16 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "own.json").write_text(json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()}))
     (tmp_path / "table.toml").write_text(f'[system]\nkind = "table"\nfile = "own.json"\n{end}')
     monkeypatch.chdir(tmp_path)
+    modules = {*sys.modules}
     before = {group: dict(registry) for group, registry in REGISTRIES.items()}
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
     yield tmp_path
     for group, registry in REGISTRIES.items():
         registry.restore(before[group])
+    for name in {*sys.modules} - modules:
+        if name.startswith(kinds.PLUGIN):
+            del sys.modules[name]
 
 
 PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]

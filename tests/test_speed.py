@@ -68,7 +68,7 @@ def test_the_gaits_frequency_is_that_of_effects_which_need_one():
     [
         (CHAIN + "[physical]\nfrequency = 2", r"\[gait\] frequency = 2.5, but \[physical\] frequency = 2: keep one"),
         (CHAIN + GRAINS + "frequency = 3", r"\[\[effects\]\] frequency = 3, but \[gait\] frequency = 2.5: keep one"),
-        (CHAIN.replace("2.5", "-1"), r"\[gait\] frequency must be a number from 0 to 10000, got -1"),
+        (CHAIN.replace("2.5", "-1"), r"\[gait\] frequency must be a number from 0 to 10000 Hz, got -1"),
         (CHAIN.replace("2.5", '"fast"'), r"\[gait\] Expected `float \| null`, got `str`"),
         (CHAIN.replace("2.5", "nan"), r"\[gait\] frequency must be a number"),
     ],
@@ -156,7 +156,7 @@ def test_sweeps_give_it(tmp_path):
         np.testing.assert_allclose(data.speed, np.hypot(data.displacement[:, 0], data.displacement[:, 1]) * 2.5)
     run, seen = Swimmer.run, []
     with mock.patch.object(
-        Swimmer, "run", lambda self, alpha, *rest: seen.append(len(alpha)) or run(self, alpha, *rest)
+        Swimmer, "run", lambda self, alpha, *rest, **more: seen.append(len(alpha)) or run(self, alpha, *rest, **more)
     ):
         plain = sweep.sweep(scenes.parse(CHAIN), {"gait.frequency": [1.0, 2.0, 4.0], "gait.amplitude": [0.5, 1.0]})
         each = len(seen), sum(seen)

@@ -476,7 +476,9 @@ def test_estimates_hold_what_is_left_of_the_way(monkeypatch):
     scene = scene.with_numerics(cycles=1)
     of_steps = estimate.direct(scene, HEAVY, a, 64)[1]
     monkeypatch.setattr(
-        Swimmer, "run", lambda *args, run=Swimmer.run: (c := run(*args))._replace(to_come=c.to_come + 0.125)
+        Swimmer,
+        "run",
+        lambda *args, run=Swimmer.run, **more: (c := run(*args, **more))._replace(to_come=c.to_come + 0.125),
     )
     np.testing.assert_allclose(estimate.direct(scene, HEAVY, a, 64)[1], of_steps + 0.125, rtol=1e-6)
 

@@ -82,7 +82,9 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
 
 def _note(scene: Any) -> None:
     """Say what is likely not meant, once a command."""
-    for line in getattr(getattr(scene, "system", None), "notes", ()):  # an intruder scene has no system
+    from geomech.text.system import notes
+
+    for line in notes(scene.system) if hasattr(scene, "system") else ():  # an intruder scene has no system
         warnings.warn(f"{scene.name}: {line}", Note, stacklevel=4)
 
 

@@ -39,7 +39,7 @@ def register(part: Any = None, /, **members: Any) -> Any:
     members: of a function ``velocity(alpha, alphadot)`` that is a system: its ``joints``, and ``kind``, ``length`` and
     ``traits`` if they are not its name, 1 and `Traits()`. Its other parameters are keys of a scene. ValueError for what is
     no part, no frozen dataclass where a class, or has a name that is taken."""
-    if part is None:
+    if part is None and members:
         return lambda function: register(function, **members)
     for name, value in members.items():
         setattr(part, name, value)

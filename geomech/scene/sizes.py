@@ -40,7 +40,8 @@ class Sizes:
             self.given["frequency"], self.places["frequency"] = frequency, "[gait] frequency"
 
     def _check(self, place: str, key: str, value) -> None:
-        if key in self.given and self.given[key] != value:
+        given = self.given.get(key, value)
+        if given is not value and given != value:  # a nan is left to the bounds of its own section
             raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")
 
     def fill(self, place: str, table: dict, kind: type) -> dict:

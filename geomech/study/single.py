@@ -26,5 +26,8 @@ def _one(system: System, name: str, x) -> np.ndarray:
     """Return x as finite numbers (joints,); ValueError naming it."""
     x = real_array(name, x)
     if x.shape != (system.joints,) or not np.isfinite(x).all():
-        raise ValueError(f"{name} must be {system.joints} finite numbers for this system, got {short(x.tolist())}")
+        count = "" if x.shape == (system.joints,) else f"{x.size}: "
+        raise ValueError(
+            f"{name} must be {system.joints} finite numbers for this system, got {count}{short(x.tolist())}"
+        )
     return x

@@ -6,6 +6,8 @@ iteration."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from rft.balance.backend import compiles
@@ -106,7 +108,7 @@ def packed(steps: Step) -> np.ndarray:
     return np.stack([*pose, *twist, *sums], -1)
 
 
-def select(values, rows):
+def select(values: Any, rows: Any) -> Any:
     """Return these rows of all arrays in nested tuples."""
     if not isinstance(values, tuple):
         return values[rows]
