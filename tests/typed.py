@@ -19,6 +19,7 @@ from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.sweep import sweep
 from geomech.systems import NoSlipSnake, Swimmer
+from geomech.systems.base import integrated
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
@@ -48,6 +49,7 @@ class Cart:
     joints = 2
     length = 1.0
     traits = Traits(linear=True)
+    run = integrated
 
     def velocity(self, alpha: Array, alphadot: Array) -> Array:
         return np.stack([alphadot[..., 0], 0 * alphadot[..., 0], 0 * alphadot[..., 0]], -1)
