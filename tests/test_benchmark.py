@@ -44,7 +44,7 @@ def test_against_a_loop_of_fsolve():
     alpha, alphadot = (x.reshape(-1, 2) for x in field_samples())
     some = np.random.default_rng(0).choice(len(alpha), 100, replace=False)
     gait = Circle().cycle(64)
-    alike = {"mirror": True, "reversible": Swimmer(GLASS, MIDDLE).reversible}
+    alike = {"traits": Swimmer(GLASS, MIDDLE).traits}
     field = lambda how, threads, **known: connection.fit(
         lambda a, d: body_velocity(GLASS, MIDDLE, a, d, backend=how, threads=threads).xi,
         connection.grid(2),
