@@ -12,6 +12,7 @@ from geomech.core.errors import SceneError
 from geomech.run import cost as run_cost
 from geomech.run import jobs
 from geomech.study import sweep
+from geomech.study.bench import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
 from rft.threads import run_shares
@@ -92,6 +93,14 @@ def test_what_is_decided_next_is_not_told_by_what_was_to_be_before(clock):
     run_cost.decide(run_cost.Cost(10, 1e-3, 1e8), lambda told: judged.append("second"))
     clock.solve(1.0, count=99)
     assert judged == ["second"]
+
+
+def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
+    """As NumPy takes a batch's time for it; for the choice of the back end alone."""
+    marched = scenes.load("sandfish-transient")
+    found = Study(marched).cost([0.2], ["direct"])
+    assert found.steps > 500 and found.as_balances == found.balances + 200 * found.steps > 100_000 > found.balances
+    assert Study(scenes.load("three-link-glass")).cost([0.2], ["direct"]).steps == 0
 
 
 @pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 700.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])

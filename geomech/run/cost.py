@@ -28,6 +28,7 @@ LOADING = 20.0  # times what is usual: a batch that takes longer has loaded or c
 BALANCE = {"numpy": 5e-6, "numba": 1.2e-6}
 LINEAR = 0.1
 BATCH = {"numpy": 2e-3, "numba": 5e-4}
+STEP = 200  # balances of large batches that take NumPy as long as one batch, however small
 
 
 class TooLong(SceneError):
@@ -35,12 +36,14 @@ class TooLong(SceneError):
 
 
 class Cost(NamedTuple):
-    """balances: of force. seconds: of computing, ``besides`` of which are of other work. memory: bytes at the peak."""
+    """balances: of force. seconds: of computing, ``besides`` of which are of other work. memory: bytes at the peak. steps: of
+    time, in which balances are solved one after the other."""
 
     balances: int
     seconds: float
     memory: float
     besides: float = 0.0
+    steps: float = 0.0
 
     def __str__(self) -> str:
         balances = f"{self.balances:,} force balances"
@@ -49,7 +52,7 @@ class Cost(NamedTuple):
     @property
     def as_balances(self) -> float:
         """Balances that take NumPy about as long, for the choice of a back end."""
-        return self.balances
+        return self.balances + STEP * self.steps
 
     @property
     def small(self) -> bool:

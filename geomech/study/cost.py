@@ -49,7 +49,8 @@ class Job(NamedTuple):
 def price(jobs: Sequence[Job]) -> Cost:
     """Return the cost of jobs that are done one after the other."""
     balances, seconds, besides = math.ceil(sum(job.count for job in jobs)), 0.0, sum(job.besides for job in jobs)
-    with suiting(balances):
+    steps = sum(job.batches for job in jobs if job.scene.system.traits.steps)
+    with suiting(Cost(balances, 0.0, 0.0, steps=steps).as_balances):
         for job in jobs:
             system = job.scene.system
             if solver_of(system) is None:
@@ -58,7 +59,7 @@ def price(jobs: Sequence[Job]) -> Cost:
                 seconds += assumed(
                     job.weight * job.count, costed(system).evaluations, system.traits.linear, job.batches
                 )
-    return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides)
+    return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides, steps)
 
 
 def study(

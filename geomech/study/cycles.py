@@ -64,10 +64,10 @@ class Cycles:
         some = [at(points[k]) for k in {0, points.total // 2, points.total - 1}]
         asked = [(s, s.gait, total, s.numerics.phases) for s in some]
         jobs = [direct(*one, together) + of_medium(*one[:3], together) for one in asked]
-        balances, seconds, _, besides = np.mean(list(map(price, jobs)), 0).tolist()
+        balances, seconds, _, besides, steps = np.mean(list(map(price, jobs)), 0).tolist()
         held = [direct(s, s.gait, min(total, SAMPLES_TOGETHER), s.numerics.phases)[0].memory for s in some]
         making = MAKING * points.total
-        return Cost(round(balances), seconds + making, max(held) + HELD * total, besides + making)
+        return Cost(round(balances), seconds + making, max(held) + HELD * total, besides + making, steps)
 
     def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
         """Return net poses with their errors, the body's length, and frequency and speed where there is a frequency."""

@@ -123,8 +123,8 @@ class Picture(Question):
     def cost(self) -> Cost:
         costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
         costs += [self.drawing] if self.drawing else []
-        balances, seconds, memory, besides = zip(*costs)
-        return Cost(sum(balances), sum(seconds), max(memory), sum(besides))
+        balances, seconds, memory, besides, steps = zip(*costs)
+        return Cost(sum(balances), sum(seconds), max(memory), sum(besides), sum(steps))
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         found = of_motion(motion(self.scene, self.cycles))
@@ -172,4 +172,4 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     width = 2 * (costed(system).elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
     words = WORDS * rows * width
-    return Cost(found.balances, found.seconds + words, found.memory + memory, found.besides + words)
+    return found._replace(seconds=found.seconds + words, memory=found.memory + memory, besides=found.besides + words)
