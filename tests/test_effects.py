@@ -31,6 +31,7 @@ from rft.effects import KINDS, batched_effect, engine
 from rft.link import quadratic_load
 from rft.premise import ALL, negated
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
 
