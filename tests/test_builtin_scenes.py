@@ -10,6 +10,7 @@ from geomech import scene as scenes
 from geomech.study.bench import Study
 from rft import CATALOGUE
 
+pytestmark = pytest.mark.usefixtures("fastest")
 # Net (x, y, theta) of a cycle of the scene's own gait by the direct tier at the scene's own numerics.
 PINNED = {
     "butterfly-glass": (0.267792218, 0.0, 0.0),

@@ -29,6 +29,7 @@ from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
 from rft.effects import SkinFriction
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))
 ODD = Chain((0.7, 1.4, 0.9), length=0.3, frame="link-1")
 

@@ -14,6 +14,7 @@ from geomech.study.bench import Study
 from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GOOD = """
 [medium]
 law = "granular"

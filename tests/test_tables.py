@@ -35,6 +35,7 @@ from geomech.text.explain import explain
 from geomech.text.system import described
 from rft.laws import CATALOGUE
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
 UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
