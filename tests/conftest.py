@@ -86,6 +86,14 @@ def compiled_code():
         pytest.skip("numba is not installed")
 
 
+@pytest.fixture(scope="module")
+def fastest():
+    """Has "auto" take compiled code where it is installed, for marches: tests/test_backend.py compares their digits with
+    those of NumPy."""
+    with backend.preferring(backend.fastest()):
+        yield
+
+
 @pytest.fixture(params=["numpy", "numba"])
 def solved_by(request):
     """Runs a test twice: "auto" is NumPy, and compiled code."""

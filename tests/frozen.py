@@ -81,9 +81,15 @@ def place() -> Iterator[pathlib.Path]:
     """A copy of data/frozen, in which commands run."""
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         here = pathlib.Path(shutil.copytree(FOLDER, folder, dirs_exist_ok=True))
-        (here / "folder").mkdir()
+        for name in ("folder", "folder.nc", "folder.png"):
+            (here / name).mkdir()
         (here / "loop").symlink_to("loop")
         yield here
+
+
+def files() -> dict[pathlib.Path, int]:
+    """When each file below the folder where we are was written."""
+    return {p: p.stat().st_mtime_ns for p in pathlib.Path().rglob("*") if p.is_file()}
 
 
 # commands.txt
@@ -93,7 +99,7 @@ def ran(line: str) -> list[str]:
     """A command in the folder where we are, or several with " ; " between them, and what came of it, as lines."""
     if " ; " in line:
         return [told for part in line.split(" ; ") for told in ran(part)]
-    before = {p: p.stat().st_mtime_ns for p in pathlib.Path().rglob("*") if p.is_file()}
+    before = files()
     code, out, err = geomech(*shlex.split(line))
     told = []
     if line.endswith("--help"):
@@ -104,7 +110,7 @@ def ran(line: str) -> list[str]:
         except ValueError:
             told += [f"| {x}" for x in masked(out).splitlines() if x.strip()]
     told += [f"! {x}" for x in masked(err).splitlines() if x.startswith(("error:", "note:"))]
-    for file in sorted(p for p in pathlib.Path().rglob("*") if p.is_file() and before.get(p) != p.stat().st_mtime_ns):
+    for file in sorted(file for file, time in files().items() if before.get(file) != time):
         told += [f"> {file}", *of_file(file)]
     return [*told, f"exit {code}"]
 
@@ -228,17 +234,29 @@ def refused(section: str, case: str) -> tuple[str, str]:
             return kind.__name__, str(error)
         return "nothing", ""
     if section == "geomech":
-        code, _, err = geomech(*shlex.split(case))
-    else:
-        command, _, name = section.partition(" | ")
-        file = pathlib.Path(name or next(word for word in command.split() if (FOLDER / word).is_file()))
-        before = file.read_bytes()
-        try:
-            file.write_bytes(edited(before, case))
-            code, _, err = geomech(*shlex.split(command))
-        finally:
-            file.write_bytes(before)
-    return code, " ".join(line for line in masked(err).splitlines() if line.startswith("error: "))
+        return ended(case)
+    command, _, name = section.partition(" | ")
+    file = pathlib.Path(name or next(word for word in command.split() if (FOLDER / word).is_file()))
+    before = file.read_bytes()
+    try:
+        file.write_bytes(edited(before, case))
+        return ended(command)
+    finally:
+        file.write_bytes(before)
+
+
+def ended(line: str) -> tuple[str, str]:
+    """(exit code, message) of a command; with the code what a refusal should not do beside its one line."""
+    before = files()
+    code, out, err = geomech(*shlex.split(line))
+    message = " ".join(x for x in masked(err).splitlines() if x.startswith("error: "))
+    amiss = {
+        "prints": out,
+        "says more": err.count("\n") != 1,
+        "says too much": len(err) > 600,
+        "writes": files() != before,
+    }
+    return " and ".join([code, *(what for what, found in amiss.items() if found)]), message
 
 
 def named(message: str, given: str) -> list[str]:

@@ -14,6 +14,8 @@ from geomech.text import accuracy as text
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity
 
+pytestmark = pytest.mark.usefixtures("fastest")
+
 
 @pytest.fixture(scope="module")
 def glass():

@@ -10,6 +10,7 @@ import resource
 import subprocess
 import sys
 import types
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -358,9 +359,7 @@ def test_parameters_of_a_law_are_no_part_of_its_code():
 
 
 LAW = """
-import numpy as np, sys
 from dataclasses import dataclass
-from rft import Chain, body_velocity
 from rft.vectors import formula, sqrt
 
 FACTOR = {factor}
@@ -375,39 +374,36 @@ class Own:
     def traction(self, v_t, v_n, rounding=0.0):
         R = sqrt(v_t * v_t + v_n * v_n + rounding * rounding)
         return v_t / R, factor(v_n / R)
-
-print(*map(repr, body_velocity(Own(), Chain(), (0.4, -0.7), (1.0, 0.3), loads="gauss:4", backend="numba").xi.tolist()))
 """
 
 
 @pytest.mark.usefixtures("compiled_code")
-def test_compiled_code_on_disk_is_that_of_the_formulas(tmp_path):
-    """A changed constant, in a function that the law calls, gives the new answer; going back finds the old code;
-    damaged files are compiled anew; a folder that cannot be written costs nothing but time."""
-    where = tmp_path / "cache"
+def test_code_on_disk_is_that_of_the_formulas():
+    """A changed constant, in a function that the law calls, is another file; going back finds the old one."""
+    from rft.balance.compiled import kernel, net_kernel
 
-    def run(factor, folder=where):
-        file = tmp_path / "law.py"
-        file.write_text(LAW.format(factor=factor))
-        env = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-        done = subprocess.run([sys.executable, file], capture_output=True, text=True, env=env)
-        assert done.returncode == 0, done.stderr
-        return done.stdout, "compiling" in done.stderr
+    def paths(factor):
+        own = types.ModuleType("own")
+        with mock.patch.dict(sys.modules, own=own):
+            exec(LAW.format(factor=factor), vars(own))
+        return [make(type(record(own.Own())))._cache.path for make in (kernel, net_kernel)]
 
-    two, compiled = run(2.0)
-    assert compiled
-    three, compiled = run(3.0)
-    assert compiled and three != two
-    assert run(2.0) == (two, False)
-    (tmp_path / "file").write_text("")
-    assert run(2.0, tmp_path / "file") == (two, True)
+    two, three = paths(2.0), paths(3.0)
+    assert len({*two, *three}) == 4
+    assert paths(2.0) == two
 
 
 @pytest.mark.usefixtures("compiled_code")
 def test_made_beforehand():
+    from rft.balance.compiled import kernel
+
     done = subprocess.run([sys.executable, "-m", "rft"], capture_output=True, text=True, env=os.environ)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("compiled code is kept in ")
+    kernel.cache_clear()
+    body_velocity(GLASS, BODY, (0.4, -0.7), (1.0, 0.3), backend="numba")
+    stats = kernel(type(record(GLASS))).stats
+    assert (sum(stats.cache_hits.values()), sum(stats.cache_misses.values())) == (1, 0)
 
 
 def test_importing_loads_no_compiler():
@@ -520,6 +516,14 @@ def test_code_that_cannot_be_kept_is_used_all_the_same(small, monkeypatch):
         with pytest.warns(Note) as notes:
             assert not loaded()
     assert sum("cannot be renamed (No space left on device): remove it" in str(x.message) for x in notes) == 1
+
+
+def test_a_folder_that_cannot_be_made_costs_only_time(small, tmp_path, monkeypatch):
+    loaded, _ = small
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "file"))
+    with pytest.warns(Note, match="not kept in .*file"):
+        assert [loaded() for _ in range(2)] == [False, False]
 
 
 @pytest.mark.soak

@@ -32,6 +32,7 @@ from rft.effects import batched_effect, engine
 from rft.link import quadratic_load
 from rft.premise import ALL, negated
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
 

@@ -18,6 +18,7 @@ from geomech.systems.capabilities import driven
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
 from rft.balance.listening import listening
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.7), Granular(C=1.8, gamma0=np.radians(13.8))
 UNEVEN = Chain((0.7, 1.4, 0.9), length=0.3)
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.5, centre=(0.2, -0.1))

@@ -3,6 +3,7 @@
 import signal
 import sys
 
+import frozen
 import numpy as np
 import pytest
 
@@ -86,8 +87,12 @@ def ended(tmp_path, monkeypatch, capsys):
         signal.signal(number, handler)
 
 
-def test_every_command_has_its_row():
-    assert {command.name or command.callback.__name__ for command in cli.app.registered_commands} == set(COMMANDS)
+def test_every_command_has_its_row_its_help_and_refusals():
+    commands = {command.name or command.callback.__name__ for command in cli.app.registered_commands}
+    assert commands == set(COMMANDS)
+    assert {f"{name} --help" for name in commands} <= set(frozen.read_commands())
+    refused = [section if section != "geomech" else case for section, case in frozen.read_refusals()]
+    assert {line.split()[0] for line in refused if "--fast" in line} == commands
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name not in SLOW])
@@ -99,13 +104,6 @@ def test_what_goes_well_ends_with_0(name, ended):
     assert files == {word for word in COMMANDS[name] if word.startswith("out")}
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_help_ends_with_0(name, ended):
-    code, out, err, files = ended(name, "--help")
-    assert (code, err, files) == (0, "", set())
-    assert name in out
-
-
 def refused(told, said):
     code, out, err, files = told
     assert (code, out, files) == (2, "", set())
@@ -115,47 +113,6 @@ def refused(told, said):
     assert len(lines) == 1
     assert lines[0].startswith("error: ")
     assert said in lines[0]
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_what_the_user_can_mend_ends_with_2(name, ended):
-    refused(ended(*arguments(name), "--fast"), "No such option: --fast")
-    if name in ("scenes", "keys"):
-        refused(ended("scenes", "--show", "three-link-glas"), "did you mean 'three-link-glass'")
-        refused(ended("keys", "gaits"), "did you mean 'gait'")
-        return
-    what = {"calibrate": "drag", "stress": "medium"}.get(name, "scene")
-    unknown = f"{what}: 'nothing' is unknown" if name != "fit" else "cannot read 'nothing'"
-    refused(ended(name, "nothing", *COMMANDS[name]), unknown)
-    may_do_without = (
-        "run",
-        "accuracy",
-        "connection",
-        "displacement",
-        "fit",
-        "calibrate",
-        "stress",
-        "intrude",
-        "optimize",
-        "walk",
-    )
-    for k in range(0, len(COMMANDS[name]), 2):
-        option = COMMANDS[name][k]
-        if option in ("-o", "--plot", "--harmonics", "--animate") and name in may_do_without:
-            continue  # may be left out, or has a second option beside it
-        if option == "--cycles":
-            refused(
-                ended(name, "small.toml", *COMMANDS[name], "--cycles", "0"), "--cycles must be a whole number from 1"
-            )
-            continue
-        if option == "--over":
-            refused(ended(name, "small.toml", "-o", "out.nc"), "Missing option '--over'")
-            continue
-        rest = COMMANDS[name][:k] + COMMANDS[name][k + 2 :]
-        refused(
-            ended(name, *SUBJECT.get(name, ["small.toml"]), *rest),
-            "Missing option '-o' / '--output'" if option == "-o" else option,
-        )
 
 
 def failing(monkeypatch, how):

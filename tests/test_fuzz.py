@@ -9,7 +9,7 @@ import pytest
 from geomech import scene as scenes
 from geomech.study.bench import Study
 
-pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
+pytestmark = [pytest.mark.usefixtures("fastest"), pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")]
 
 VALUES = [
     "nan", "inf", "-inf", "0", "-0.0", "-1", "1e308", "-1e308", "1e-320", "1e6", "999999999999999999999999", "true",

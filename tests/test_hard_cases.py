@@ -52,12 +52,6 @@ STRANGE_BODIES = {
     "kilometre": Chain(length=1e3),
     "twelve": Chain((1,) * 12, frame="link-7"),
 }
-CROSSED = [
-    (name, medium)
-    for name, body in (BODIES | STRANGE_BODIES).items()
-    for medium in MEDIA
-    if medium in CLOSED or body.joints < 5  # quadrature takes its time
-]
 
 
 def hard(joints):
@@ -67,17 +61,17 @@ def hard(joints):
 
 
 @pytest.mark.usefixtures("solved_by")
-@pytest.mark.parametrize(("body", "medium"), CROSSED)
-def test_hard_cases(body, medium):
+@pytest.mark.parametrize("body", BODIES | STRANGE_BODIES)
+def test_hard_cases(body):
     body = (BODIES | STRANGE_BODIES)[body]
     cases, alpha, alphadot = hard(body.joints)
-    solution = body_velocity(MEDIA[medium], body, alpha, alphadot)
-    speed = np.linalg.norm(alphadot, axis=-1)
-    bad = (solution.status == "unconverged") | ~(solution.residual < 1e-9)
-    assert not bad.any(), set(cases[bad])
-    # No body moves faster than its joints drive it.
-    bad = (np.abs(solution.xi) > 3 * speed[:, None] * [body.length, body.length, 1] + 1e-300).any(-1)
-    assert not bad.any(), set(cases[bad])
+    fastest = 3 * np.linalg.norm(alphadot, axis=-1, keepdims=True) * [body.length, body.length, 1] + 1e-300
+    for name in MEDIA if body.joints < 5 else CLOSED:  # quadrature takes its time
+        solution = body_velocity(MEDIA[name], body, alpha, alphadot)
+        bad = (solution.status == "unconverged") | ~(solution.residual < 1e-9)
+        assert not bad.any(), (name, set(cases[bad]))
+        bad = (np.abs(solution.xi) > fastest).any(-1)  # no body moves faster than its joints drive it
+        assert not bad.any(), (name, set(cases[bad]))
 
 
 @pytest.mark.usefixtures("solved_by")

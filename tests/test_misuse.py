@@ -178,26 +178,6 @@ def test_what_degrees_were_swept_is_in_rad(tmp_path):
         np.testing.assert_allclose(data.gait_tilt, np.radians([30, 60]))
 
 
-@pytest.mark.parametrize(
-    ("args", "said"),
-    [
-        (["displacement", "butterfly-glass", "--amplitudes", "30deg"], "but the amplitude of a butterfly is none"),
-        (["displacement", "sandfish-loose", "--amplitudes", "30deg"], "but the amplitude of a sine is none"),
-        (["displacement", "three-link-viscous", "--amplitudes", "30degrees"], "such as 0.5,0.3 or 30deg,20deg"),
-        (["velocity", "three-link-viscous", "--alpha", "deg,1", "--alphadot", "1,0"], "'deg,1' is not a list"),
-        (["connection", "three-link-viscous", "-o", "c.nc", "--extent", "wide"], "'wide' is no angle"),
-        (["sweep", "three-link-viscous", "-o", "s.nc", "--over", "medium.ratio=2deg"], "but this is no angle"),
-        (["sweep", "three-link-viscous", "-o", "s.nc", "--over", "gait.centre_deg=2deg"], "takes degrees as they are"),
-    ],
-)
-def test_degrees_of_what_is_no_angle_are_refused(args, said, tmp_path):
-    code, out, err = geomech(*args, cwd=tmp_path)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith("error: ")
-    assert said in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_circle_in_a_scene_may_be_told_in_degrees():
     assert scenes.parse(PLAIN + "amplitude_deg = 30").gait.amplitude == pytest.approx(math.pi / 6)
 

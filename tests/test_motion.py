@@ -34,6 +34,7 @@ from rft import (
     time_steps,
 )
 
+pytestmark = pytest.mark.usefixtures("fastest")
 SAND = Granular(1.8, 0.24)
 
 

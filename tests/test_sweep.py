@@ -11,6 +11,7 @@ from geomech.study import cycles, estimate, sweep
 from geomech.study.bench import Study
 from rft import CATALOGUE, Granular
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
 
 

@@ -39,6 +39,7 @@ from rft.contact import assemble
 from rft.se2 import compose, exp
 from rft.stepping import Stepping
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
 

@@ -22,6 +22,7 @@ from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))  # moves along, sideways and turns
 BODY = Chain((1, 1.4, 0.8), length=0.3, frame="link-1")
 COVARIANCE = ((0.012, -0.0012), (-0.0012, 0.0004))  # correlated

@@ -30,6 +30,7 @@ from rft.walking.robot import intervals
 from rft.walking.sdirk import EFFORT, Effort
 from rft.walking.stride import Walk, cycles_to_settle, from_rest, remaining_change
 
+pytestmark = pytest.mark.usefixtures("fastest")
 SAND = StressMap(zeta=0.3, grazing=math.radians(5))
 ROBOT = Rhex(0.2, 0.15, 0.03, 0.06, CLeg(0.025, 0.012, 0.6), (-0.05, 0.06), hip_height=-0.004, axle=0.002)
 QUICK = Fineness(steps=16, elements=8, duration=2.0)
