@@ -74,21 +74,30 @@ def tiers():
             yield f"tier, {name}, {tier}", study.displacement(tier, None, amplitudes)
 
 
-def marches():
-    """Every effect, and every two that differ in kind, strong enough to matter."""
+def march(names):
+    """Net pose, velocities, power and moments of a march under effects strong enough to matter."""
     body, gait = (
         rft.Chain((1, 1.4, 0.8), frame="link-2"),
         geomech.gaits.Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2)),
     )
-    kind = lambda name: name.partition(",")[0]
-    pairs = [(a, b) for a, b in itertools.combinations(EFFECTS, 2) if kind(a) != kind(b)]
-    for names in [(name,) for name in EFFECTS] + pairs:
-        effects = [EFFECTS[name][0](0.05) for name in names]
-        found = rft.time_steps(
-            MEDIA["glass-0.3mm-loose"], body, *gait.cycle(8), effects=effects, cycles=2, with_work=True, **SOLVED
-        )
-        moments = found.work.bending_moment[[2, 6]].ravel()
-        yield f"march, {' + '.join(names)}", [*found.displacement, *found.xi[3], *found.work.power[[2, 6]], *moments]
+    effects = [EFFECTS[name][0](0.05) for name in names]
+    found = rft.time_steps(
+        MEDIA["glass-0.3mm-loose"], body, *gait.cycle(8), effects=effects, cycles=2, with_work=True, **SOLVED
+    )
+    return [*found.displacement, *found.xi[3], *found.work.power[[2, 6]], *found.work.bending_moment[[2, 6]].ravel()]
+
+
+def marches():
+    """Every effect."""
+    for name in EFFECTS:
+        yield f"march, {name}", march([name])
+
+
+def pairs():
+    """Every two effects that differ in kind."""
+    for pair in itertools.combinations(EFFECTS, 2):
+        if len({name.partition(",")[0] for name in pair}) == 2:
+            yield f"pair, {' + '.join(pair)}", march(pair)
 
 
 def command(*args: str) -> str:
@@ -224,6 +233,7 @@ PARTS = {
     commands: ("connection", "sweep", "command"),
     tiers: ("tier",),
     marches: ("march",),
+    pairs: ("pair",),
     intrusions: ("intrusion",),
     solids: ("solid",),
     walks: ("walk,",),

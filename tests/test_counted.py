@@ -8,6 +8,7 @@ from geomech.study.bench import Study
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")
 SLOPING = scenes.parse(

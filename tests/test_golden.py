@@ -13,7 +13,7 @@ import pytest
         (golden.velocities, 150),
         (golden.commands, 15),
         (golden.tiers, 30),
-        (golden.marches, 50),
+        (golden.marches, 12),
         (golden.intrusions, 100),
         (golden.solids, 20),
         (golden.walks, 4),
@@ -29,6 +29,11 @@ def test_nothing_changed_that_nobody_meant_to_change(part, least):
             f"{len(moved)} of {len(new)} numbers are not as recorded, {len(missing)} of them new: if that is meant, "
             f"python tests/golden.py --write\n{golden.table(old, new)}"
         )
+
+
+@pytest.mark.usefixtures("fastest")
+def test_nor_of_effects_in_pairs():
+    test_nothing_changed_that_nobody_meant_to_change(golden.pairs, 40)
 
 
 @pytest.mark.parametrize(

@@ -60,9 +60,9 @@ def hard(joints):
     return np.repeat(list(HARD), [len(alpha) for alpha, _ in problems]), *(np.concatenate(x) for x in zip(*problems))
 
 
-@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("body", BODIES | STRANGE_BODIES)
 def test_hard_cases(body):
+    """By NumPy; compiled code has the same answers and statuses (tests/test_backend.py)."""
     body = (BODIES | STRANGE_BODIES)[body]
     cases, alpha, alphadot = hard(body.joints)
     fastest = 3 * np.linalg.norm(alphadot, axis=-1, keepdims=True) * [body.length, body.length, 1] + 1e-300

@@ -39,11 +39,15 @@ REQUESTS = {  # with the name of the output
 }
 
 
+def scenes_in(folder):
+    (folder / "sandfish.toml").write_text(SANDFISH)
+    (folder / "glass.toml").write_text(scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n")
+    return folder
+
+
 @pytest.fixture
 def place(tmp_path):
-    (tmp_path / "sandfish.toml").write_text(SANDFISH)
-    (tmp_path / "glass.toml").write_text(scenes.load("three-link-glass").text + "[numerics]\nphases = 32\n")
-    return tmp_path
+    return scenes_in(tmp_path)
 
 
 def begun(args, out, cwd, workers, **options):
@@ -139,8 +143,14 @@ def quiet(name, place):
         (place / out).unlink()
 
 
-def test_kills_and_interrupts_change_no_digit(place):
-    assert tortured("sweep", place, quiet("sweep", place), 4, 0)
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The sweep that nobody disturbs."""
+    return quiet("sweep", scenes_in(tmp_path_factory.mktemp("quiet")))
+
+
+def test_kills_and_interrupts_change_no_digit(place, whole):
+    assert tortured("sweep", place, whole, 4, 0)
 
 
 @pytest.mark.soak
@@ -151,10 +161,10 @@ def test_torture(name, seed, place):
     tortured(name, place, quiet(name, place), 14, seed)
 
 
-def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place):
+def test_a_rival_is_refused_and_a_full_disk_is_no_obstacle(place, whole):
     """A limit on the size of files stands for the disk: room for the output, and not for what is kept."""
     args, out = REQUESTS["sweep"]
-    whole, size = quiet("sweep", place), 16_000
+    size = 16_000
     assert len(whole) < size
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
     first = begun(args, out, place, 2, preexec_fn=limit)
