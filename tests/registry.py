@@ -1,4 +1,4 @@
-"""Everything the property tests run over. A new medium, body or gait is added here, in one line."""
+"""Everything the property tests run over: the examples of all parts, and shapes, stresses and robots."""
 
 import math
 import pathlib
@@ -8,29 +8,12 @@ import numpy as np
 from geomech.gaits import GAITS as kinds_of_gaits
 from geomech.systems import SYSTEMS as kinds_of_systems
 from geomech.systems import Table
-from rft import (
-    Backbone,
-    BodyInertia,
-    Chain,
-    ConstantCurvature,
-    Coulomb,
-    DepthProfile,
-    DisturbedGround,
-    EndCaps,
-    GrainInertia,
-    Granular,
-    Serpenoid,
-    SkinFriction,
-    TowedSled,
-    Transient,
-    Viscous,
-)
-from rft import Slope as Incline
-from rft.ground import Aeration, Slope
-from rft.ground import DisturbedGround as DisturbedPlaces
+from rft.bodies import BODIES as kinds_of_bodies
+from rft.effects import EFFECTS as kinds_of_effects
+from rft.ground import GROUND_EFFECTS as kinds_of_ground_effects
+from rft.ground import Aeration
 from rft.ground import GrainInertia as GrainPressure
-from rft.laws import CATALOGUE, is_closed
-from rft.laws import Table as Measured
+from rft.laws import CATALOGUE, LAWS, is_closed
 from rft.meshes import Cylinder, Leg, Screw, Sphere
 from rft.plates import (
     VERTICAL,
@@ -49,34 +32,13 @@ from rft.plates import (
 from rft.walking import Rhex, Roller, Tripod, Walker
 
 DATA = pathlib.Path(__file__).parent / "data"
-_PSI = np.linspace(0.0, math.pi / 2, 12)  # rad
 
-MEDIA = {
-    **{name: entry.medium for name, entry in CATALOGUE.items()},
-    "sharp": Granular(C=1.8, gamma0=math.radians(0.1)),
-    "blunt": Granular(C=1.8, gamma0=math.radians(89.9)),
-    "no-extra": Granular(C=0.0, gamma0=0.3),
-    "strong": Granular(C=1e3, gamma0=0.24),
-    "viscous-1": Viscous(1.0),
-    "viscous-slippery": Viscous(1e4),
-    "measured": Measured(_PSI, *Granular(C=1.4, gamma0=0.25).traction(np.cos(_PSI), np.sin(_PSI))),
-}
+MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()} | LAWS.examples()
 CLOSED = {k: m for k, m in MEDIA.items() if is_closed(m)}  # exact integrals over a link
 LINEAR = {k: m for k, m in CLOSED.items() if not m.dry}
 DRY = {k: m for k, m in MEDIA.items() if k not in LINEAR}
 
-BODIES = {
-    "two": Chain((1, 2)),
-    "three": Chain((1, 1, 1)),
-    "three-middle": Chain((1, 1, 1), frame="link-2"),
-    "uneven": Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3),
-    "five": Chain((1,) * 5),
-    "modes": Chain((0.8, 1.3, 1.0, 0.7), 0.3, "link-2", modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))),
-    "serpenoid": Serpenoid(elements=24, waves=1.5),
-    "arcs": ConstantCurvature(elements=12, sections=3, frame="link-4"),
-    "backbone": Backbone(elements=9, length=0.1),
-}
-
+BODIES = kinds_of_bodies.examples()
 GAITS = kinds_of_gaits.examples()
 SYSTEMS = kinds_of_systems.examples() | {"table": Table(DATA / "uneven.nc")}  # of the swimmer; the file has its scene
 
@@ -125,28 +87,16 @@ SOLIDS = {
     "leg": Leg(radius=0.03, width=0.02, thickness=0.004, relative_curvature=-0.6),
 }
 
-# name: (effect of a parameter that goes to zero, the order at which the plain scene comes back)
-EFFECTS = {
-    "skin-friction": (lambda x: SkinFriction(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2), 1),
-    "end-caps": (lambda x: EndCaps(radius=0.1 * x, tail=4.0), 1),
-    "towed-sled": (lambda x: TowedSled(pull=x, distance=0.3), 1),
-    "depth-profile": (lambda x: DepthProfile(along=(1, 1 + x)), 1),
-    "depth-profile, slope": (lambda x: DepthProfile(slope=x, towards=1.0), 1),
-    "slope": (lambda x: Incline(angle=x, towards=2.0, repose=0.6, weight=0.3), 1),
-    "grain-inertia": (lambda x: GrainInertia(frequency=x, length=0.7, depth=0.07, strength=1.5), 2),
-    "grain-inertia, strength": (lambda x: GrainInertia(frequency=1.2, length=0.4, depth=0.07, strength=x), 1),
-    "body-inertia": (lambda x: BodyInertia(mass=x, frequency=0.6, length=0.8, drag=1.3), 1),
-    "body-inertia, frequency": (lambda x: BodyInertia(mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3), 2),
-    "transient": (lambda x: Transient(travel=2 * x), 1),
-    "disturbed-ground": (lambda x: DisturbedGround(radius=0.05, weakening=x), 1),
-}
+ORDERS = {"grain-inertia, strength": 1, "body-inertia, frequency": 2}  # other than that of the class
 
-# Of the vertical plane, likewise.
-GROUND_EFFECTS = {
-    "aeration": (lambda x: Aeration(air_speed=0.03 * x, fluidisation=0.03), 1),
-    "grain-inertia": (lambda x: GrainPressure(strength=2 * x, density=700.0), 1),
-    "slope": (lambda x: Slope(angle=x, repose=0.6), 1),
-    "disturbed-ground": (lambda x: DisturbedPlaces(places=(0.0, -0.1), radius=0.05, weakening=x), 1),
-}
 
-assert Coulomb in {type(m) for m in MEDIA.values()}
+def vanishing(kinds):
+    """Return functions of x whose effects vanish as x goes to 0, with the order at which they do, by name."""
+    return {
+        name: (lambda x, kind=kind, name=name: kind.examples(x)[name], ORDERS.get(name, kind.order))
+        for kind in kinds.values()
+        for name in kind.examples()
+    }
+
+
+EFFECTS, GROUND_EFFECTS = vanishing(kinds_of_effects), vanishing(kinds_of_ground_effects)

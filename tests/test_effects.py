@@ -27,7 +27,8 @@ from rft import (
     time_steps,
 )
 from rft.contact import assemble
-from rft.effects import KINDS, batched_effect, engine
+from rft.effects import EFFECTS as KINDS
+from rft.effects import batched_effect, engine
 from rft.link import quadratic_load
 from rft.premise import ALL, negated
 

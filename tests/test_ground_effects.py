@@ -12,7 +12,8 @@ from registry import GROUND_EFFECTS, OUTLINES, STRESSES
 from figures import ground_effects
 from geomech import scene as scenes
 from geomech.text.explain import explain
-from rft.ground import KINDS, Aeration, DisturbedGround, GrainInertia, Slope, ground_of
+from rft.ground import GROUND_EFFECTS as KINDS
+from rft.ground import Aeration, DisturbedGround, GrainInertia, Slope, ground_of
 from rft.meshes import Spatial, bearing, shapes, wrench
 from rft.plates import Plate, Polygon, loads
 

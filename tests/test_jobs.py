@@ -523,9 +523,7 @@ def test_edited_code_resumes_nothing(tmp_path, fine, monkeypatch):
     """That of a law in a file of one's own, which a stopped command has used."""
     for name in ("_code", "_files"):
         monkeypatch.setattr(kinds, name, {})
-    laws = LAWS
-    monkeypatch.setitem(laws, "power-of-jobs", None)  # which is undone at the end
-    del laws["power-of-jobs"]
+    monkeypatch.setattr(LAWS, "_parts", dict(LAWS))
     text = VISCOUS.text.replace('law = "viscous"', 'law = "power-of-jobs"').replace("ratio = 2.0", "power = 1.0")
     (tmp_path / "s.toml").write_text(text)
     args = ["connection", "s.toml", "--grid", "7", "-o", "f.nc", "--plugin", "power.py"]

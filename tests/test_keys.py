@@ -124,7 +124,6 @@ def test_the_command_prints_them_all_or_a_section(capsys):
 
 
 def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
-    family = LAWS
     monkeypatch.setattr(kinds, "_code", {})
     section = (ROOT / "geomech" / "scene" / "README.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"
@@ -136,7 +135,7 @@ def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
         made = json.loads(run(capsys, "keys", "--json-schema", "--plugin", str(path))[1])
         assert {"const": "power"} in [x["properties"].get("law") for x in made["$defs"]["gaits"]["medium"]["oneOf"]]
     finally:
-        family.pop("power", None)
+        LAWS.restore({name: law for name, law in LAWS.items() if name != "power"})
 
 
 @pytest.fixture(scope="module")

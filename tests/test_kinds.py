@@ -15,8 +15,8 @@ import pytest
 from registry import EFFECTS
 
 from geomech import cli
+from geomech.core.entry_points import offered
 from geomech.core.errors import SceneError
-from geomech.core.registry import REGISTRIES
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
@@ -32,6 +32,7 @@ from geomech.text.system import notes
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent
+from rft.registry import REGISTRIES
 
 PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
@@ -393,7 +394,7 @@ def test_a_package_offers_a_law_that_is_loaded_when_asked_for(package):
     package("raise RuntimeError('loaded unasked')", "other", dist="broken")
     assert load("three-link-viscous")
     assert "sands_laws" not in sys.modules
-    assert "thick" in REGISTRIES["geomech.media"].offered()
+    assert "thick" in offered(REGISTRIES["geomech.media"])
     scene = parse(SCENE)
     assert type(scene.system.medium).__module__ == "sands_laws"
     assert parse(toml(scene)) == scene

@@ -1,6 +1,9 @@
 """Parts of one's own: one of each family in a folder, one file and one decorator each, used by commands and from Python."""
 
 import json
+import pathlib
+import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -9,7 +12,6 @@ from test_cli import geomech
 
 import geomech as library
 from geomech.core.errors import SceneError, VelocityWarning
-from geomech.core.registry import REGISTRIES
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry.traits import Traits
 from geomech.io import tables
@@ -20,6 +22,7 @@ from geomech.study.bench import Study
 from geomech.study.single import single
 from geomech.systems.base import Cycle, integrated
 from geomech.text.explain import explain
+from rft.registry import REGISTRIES
 
 HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
 FILES = {
@@ -249,9 +252,116 @@ def test_a_function_says_what_it_does_not_take():
     np.testing.assert_allclose(*nets, rtol=1e-14)
 
 
-@pytest.mark.parametrize("group", ["geomech.gaits", "geomech.systems", "geomech.tiers", "geomech.formats"])
+GROUPS = ["media", "bodies", "effects", "ground_effects", "gaits", "systems", "tiers", "formats"]
+
+
+@pytest.mark.parametrize("group", [f"geomech.{group}" for group in GROUPS])
 def test_every_file_of_a_folder_is_registered(group):
     """Each has examples, or needs no parameters."""
     registry = REGISTRIES[group]
     assert len(registry) == len(registry.built_in) > 1
     assert {*registry} == {getattr(part, registry.key) for part in registry.values()}
+
+
+ADDED = {
+    "laws/treacle.py": """
+from rft.laws.base import LAWS
+
+@LAWS.register
+@dataclass(frozen=True)
+class Treacle:
+    thickness: float = 2.5
+    law = "treacle"
+
+    def traction(self, v_t, v_n, rounding=0.0):
+        return v_t, self.thickness * v_n
+""",
+    "bodies/knee.py": """
+from rft.bodies.base import BODIES
+from rft.bodies.chain import Chain
+
+@BODIES.register
+@dataclass(frozen=True)
+class Knee:
+    angle: float = 0.2
+    kind, length, joints = "knee", 1.0, 2
+
+    def motion(self, alpha, alphadot):
+        return Chain((1, 2, 1)).motion(alpha + self.angle, alphadot)
+""",
+    "effects/tired.py": """
+from rft.effects.base import EFFECTS, Effect
+from rft.premise import Premise
+
+@EFFECTS.register
+@dataclass(frozen=True)
+class Tired(Effect):
+    loss: float = 0.5
+    kind, limit, breaks = "tired", "loss = 0", Premise.MEMORYLESS
+
+    @classmethod
+    def examples(cls, x=0.3):
+        return {"tired": cls(loss=x)}
+
+    def begin(self, problem, site):
+        return np.zeros(problem.sides.elements.c.shape)  # of steps in the past
+
+    def apply(self, problem, site, state):
+        return problem._replace(sides=problem.sides.with_factors(1.0, 1.0 / (1.0 + self.loss * state), 1.0))
+
+    def after(self, problem, site, state, v):
+        return state + 0.1
+""",
+    "ground/frost.py": """
+from rft.ground.base import GROUND_EFFECTS, GroundEffect
+
+@GROUND_EFFECTS.register
+@dataclass(frozen=True)
+class Frost(GroundEffect):
+    gain: float = 0.5
+    kind, limit = "frost", "gain = 0"
+
+    @classmethod
+    def examples(cls, x=0.3):
+        return {"frost": cls(gain=x)}
+
+    def apply(self, ground):
+        return ground._replace(strength=ground.strength * (1.0 + self.gain))
+""",
+}
+LAWS_OF_FAMILIES = """
+import sys
+sys.path[:0] = [sys.argv[1], sys.argv[2]]
+import numpy as np
+import rft
+from registry import BODIES, EFFECTS, GROUND_EFFECTS, MEDIA
+from rft.ground import ground_of
+from rft.laws.base import require_drag
+
+assert rft.__file__.startswith(sys.argv[1])
+require_drag(MEDIA["treacle"])
+body = BODIES["knee"]
+xi = rft.body_velocity(MEDIA["treacle"], body, [0.3, -0.5], [1.0, 0.4]).checked().xi
+np.testing.assert_allclose(rft.body_velocity(rft.Viscous(2.5), body, [0.3, -0.5], [1.0, 0.4]).xi, xi, rtol=1e-7)
+t = 2 * np.pi * np.arange(8) / 8
+loop = np.stack([np.cos(t), np.sin(t)], -1), np.stack([-np.sin(t), np.cos(t)], -1)
+net = lambda *effects: rft.time_steps(MEDIA["glass-0.3mm-loose"], body, *loop, effects=effects, cycles=2).displacement
+make, order = EFFECTS["tired"]
+far, near = (np.abs(net(make(x)) - net()).max() for x in (1e-2, 1e-3))
+assert far > 1e-5 and abs(np.log10(far / near) - order) < 0.1, (far, near)
+make, order = GROUND_EFFECTS["frost"]
+far, near = (ground_of([make(x)]).strength - ground_of([]).strength for x in (1e-2, 1e-3))
+assert far > 0 and abs(np.log10(far / near) - order) < 0.1
+"""
+
+
+def test_a_file_in_its_folder_is_found_and_held_to_the_laws_of_its_family(tmp_path):
+    """A law, a body, an effect with a past and one on the ground; the registry of the tests has them without a line more."""
+    here = pathlib.Path(__file__).parent
+    for package in ("rft", "geomech"):
+        shutil.copytree(here.parent / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, text in ADDED.items():
+        (tmp_path / "rft" / name).write_text("from dataclasses import dataclass\nimport numpy as np\n" + text)
+    command = [sys.executable, "-c", LAWS_OF_FAMILIES, str(tmp_path), str(here)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr

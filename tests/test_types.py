@@ -215,7 +215,7 @@ TAKEN = {
     *itertools.product(("alpha", "alphadot", "shape"), ["array"]), *itertools.product(["times"], ("empty", "list")),
     ("effects", "empty"), ("progress", "None"), ("progress", "function"), ("a list", "list"), ("rate", "array"),
     *itertools.product(["family's amplitudes"], ("empty", "deep", "many")), ("rate", "deep"),
-    ("family's amplitudes", "array"),
+    ("family's amplitudes", "array"), ("part", "class"),  # a body that is registered already
 }  # fmt: skip
 
 

@@ -1,11 +1,11 @@
 """Gaits: closed curves in shape space, one file each."""
 
-from geomech.core.registry import load_all
 from geomech.gaits.centreline import Centreline
 from geomech.gaits.fourier import Butterfly, Circle, Ellipse, Fourier
 from geomech.gaits.points import Points
 from geomech.gaits.waves import Sine, Wave
 from geomech.geometry.gait import GAITS, Gait
+from rft.registry import load_all
 
 load_all(__name__, __path__)
 KINDS = GAITS

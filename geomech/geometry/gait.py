@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from geomech.core.errors import is_whole, real_array, short
-from geomech.core.registry import Registry, subclasses
 from rft.checks import Number, check_numbers
+from rft.registry import Registry, subclasses
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
 FASTEST = 1e4  # Hz, as of the effects that have a frequency

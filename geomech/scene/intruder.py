@@ -14,8 +14,7 @@ from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import StressKeys
 from rft.checks import Number
-from rft.ground import KINDS as EFFECTS
-from rft.ground import GroundEffect
+from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Shape, loads
 from rft.plates.loads import ORDER
 
@@ -57,7 +56,7 @@ class IntruderScene(Intruding):
     elements: Annotated[
         int, Within("numerics", owner="an intruder scene"), Number(1, 5000, "-", ELEMENTS, whole=True)
     ] = 100
-    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)

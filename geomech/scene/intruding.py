@@ -11,7 +11,7 @@ import numpy as np
 from geomech.core.errors import named, short
 from geomech.core.summary import part
 from rft.checks import check_numbers
-from rft.ground import KINDS, GroundEffect, checked_effects, weight
+from rft.ground import GROUND_EFFECTS, GroundEffect, checked_effects, weight
 from rft.premise import negated
 
 
@@ -71,7 +71,7 @@ class Intruding:
         medium, body, motion = (part(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
         lines = [f"{self.name}: {body} of {self.count:,} {self.parts}", f"motion: {motion}", f"medium: {medium}"]
         lines += self.effects_told()
-        off = [kind for kind in KINDS if kind not in [e.kind for e in self.effects]]
+        off = [kind for kind in GROUND_EFFECTS if kind not in [e.kind for e in self.effects]]
         return [*lines, "off, not evaluated: " + (", ".join(off) or "none")]
 
     def effects_told(self) -> list[str]:

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from geomech.core.entry_points import unloaded
 from geomech.core.errors import choose
-from geomech.core.registry import Registry
 from geomech.scene.intruder import IntruderScene
 from geomech.scene.key import Key, first_sentence
 from geomech.scene.model import Scene
@@ -17,6 +17,7 @@ from geomech.scene.solid import MeshScene
 from geomech.scene.swimming import solvers
 from geomech.scene.walker import WalkerScene
 from geomech.tiers.base import Numerics
+from rft.registry import Registry
 
 SCENES = {"gaits": Scene, "outlines": IntruderScene, "meshes": MeshScene, "walkers": WalkerScene}
 WORDS = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
@@ -79,7 +80,7 @@ def _part(name: str, section: Section, variant: Variant) -> Part:
 def _of_packages(section: Section) -> Iterator[Part]:
     """Yield what installed packages offer."""
     if (registry := registry_of(section)) is not None:
-        new, refused = registry.unloaded()
+        new, refused = unloaded(registry)
         for name, package in new.items():
             yield Part(f'{section.key} = "{name}"', f"Of {package}, which is loaded when a scene asks for it.", [])
         for name, package in refused.items():

@@ -2,7 +2,7 @@
 
 They come in by `register`, by a file that the person at the keyboard names (`--plugin FILE.py`, `load_file`), or by an
 installed package, whose entry point of that name in the group of a registry is loaded when somebody first asks for it
-(`geomech.core.registry`). What a scene file says never runs code by itself.
+(`geomech.core.entry_points`). What a scene file says never runs code by itself.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any, TypeVar
 
 from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.core.errors import SceneError, short
-from geomech.core.registry import REGISTRIES, Registry, home, place
 from geomech.io.files import read_text
 from geomech.systems.functions import class_of
+from rft.registry import REGISTRIES, Registry, home, place
 
 LARGEST = 1_000_000  # bytes of a file of one's own
 PLUGIN = "geomech_plugin_"  # begins the names of modules made of such files

@@ -12,12 +12,13 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from geomech.core.entry_points import choose_part
 from geomech.core.errors import SceneError, UnitWarning, choose, named, short
-from geomech.core.registry import Registry
 from geomech.scene import slips
 from geomech.scene.key import Key, spellings, words_of
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
+from rft.registry import Registry
 
 FILES = ("file", "mjcf")  # keys that name a file, looked for from the folder of the scene's
 Built = TypeVar("Built")
@@ -115,7 +116,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
 
 
 def _choose(place: str, word: object, kinds: Mapping[str, Any]) -> str:
-    return kinds.choose(place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
+    return choose_part(kinds, place, word) if isinstance(kinds, Registry) else choose(place, word, kinds)
 
 
 def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, dict]:

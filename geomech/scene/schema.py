@@ -8,6 +8,7 @@ import math
 from collections.abc import Collection, Iterator
 from typing import Any
 
+from geomech.core.entry_points import unloaded
 from geomech.scene.key import Key, first_sentence, keys_of
 from geomech.scene.keys import SCENES, all_variants, registry_of
 from geomech.scene.sections import Alternatives, Declared, Each, OneOf, Section, Variant, file_sections, keys_in
@@ -64,7 +65,7 @@ def _section(section: Section | Key) -> dict[str, Any]:
         return one
     kinds = [_variant(each, _shared(each) if section.sized else (), section.short) for each in all_variants(section)]
     if (registry := registry_of(section)) is not None:  # the keys of what packages offer are known when it is loaded
-        for other in registry.unloaded()[0]:
+        for other in unloaded(registry)[0]:
             kinds.append({"type": "object", "properties": {section.key: {"const": other}}, "required": [section.key]})
     one = {"anyOf" if len(section.implied) > 1 else "oneOf": kinds}
     return {"type": "array", "items": one} if isinstance(section, Each) else one

@@ -15,8 +15,7 @@ from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
 from geomech.scene.stress import MatchedKeys
 from rft.checks import Number
-from rft.ground import KINDS as EFFECTS
-from rft.ground import GroundEffect
+from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.meshes import (
     MOTIONS,
     SOLIDS,
@@ -78,7 +77,7 @@ class MeshScene(Intruding):
         Within("numerics", owner="an intruder scene of a mesh"),
         Number(1, 2_000_000, "-", TRIANGLES, whole=True),
     ] = 5000
-    effects: Annotated[tuple[GroundEffect, ...], Each(EFFECTS, owner="an intruder scene")] = ()
+    effects: Annotated[tuple[GroundEffect, ...], Each(GROUND_EFFECTS, owner="an intruder scene")] = ()
     name: str = "scene"
     text: str = field(default="", repr=False, compare=False)
     files: tuple[str, ...] = field(default=(), repr=False, compare=False)

@@ -12,13 +12,12 @@ from geomech.scene.intruder import OUTLINES
 from geomech.scene.intruding import of_effects
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.stress import SpatialKeys, StressKeys
-from rft.ground import KINDS as EFFECTS
-from rft.ground import GroundEffect
+from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.meshes import Screw, Spatial
 from rft.plates import PlateStress
 from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
-KINDS = {kind: effect for kind, effect in EFFECTS.items() if effect.walks}
+KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
 LAWS = {"planar": StressKeys, "3d": SpatialKeys}
 OF_THREE = {"xi_n", "density", "internal_friction", "surface_friction"}  # keys of a [medium] of three dimensions alone
 LEGS = {"legs": OUTLINES}

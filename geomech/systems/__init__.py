@@ -1,6 +1,5 @@
 """Systems, one file each: whatever has a velocity(alpha, alphadot) and says what it lacks."""
 
-from geomech.core.registry import load_all
 from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, Cycle, System, as_system, integrated
 from geomech.systems.capabilities import capability
@@ -12,6 +11,7 @@ from geomech.systems.solver import Solver
 from geomech.systems.swimmer import Swimmer
 from geomech.systems.table import Table
 from rft.premise import Premise
+from rft.registry import load_all
 
 load_all(__name__, __path__)
 KINDS = SYSTEMS

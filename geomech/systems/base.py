@@ -12,10 +12,10 @@ import numpy as np
 
 from geomech.core import summary
 from geomech.core.errors import check_angle, number, short
-from geomech.core.registry import Registry, classes_with
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import evaluate, in_batches
+from rft.registry import Registry, classes_with
 
 MEMBERS = ("joints", "length", "traits", "velocity", "run")
 

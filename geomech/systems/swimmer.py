@@ -11,7 +11,6 @@ import numpy as np
 
 import rft
 from geomech.core.errors import short
-from geomech.core.registry import Registry, classes_with, subclasses
 from geomech.core.work import iterate
 from geomech.geometry.images import around
 from geomech.geometry.reconstruct import displacement, poses, repeated
@@ -20,10 +19,10 @@ from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
 from geomech.systems.capabilities import Drawable, Part, Stepped, Uncertain
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
-from rft.bodies import KINDS as BODIES
+from rft.bodies import BODIES
 from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
 from rft.contact import Assembly, assemble
-from rft.effects import KINDS as EFFECTS
+from rft.effects import EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.base import is_odd, require_law
 from rft.laws.records import record, rule_for
@@ -31,11 +30,7 @@ from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
 from rft.stepping import Row, State, Stepping
 
-PARTS = {  # of a scene's tables
-    "medium": Registry("geomech.media", "law", "a law", classes_with("traction"), LAWS),
-    "body": Registry("geomech.bodies", "kind", "a body", classes_with("motion"), BODIES),
-    "effects": Registry("geomech.effects", "kind", "an effect", subclasses(rft.effects.Effect), EFFECTS),
-}
+PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
 RATES = Premise.RATE_INDEPENDENT
 MEDIA = {name: entry.medium for name, entry in CATALOGUE.items()}  # by the name a scene may give
 

@@ -11,9 +11,8 @@ from geomech.systems import Swimmer, Table
 from geomech.systems.base import Given, System, kind_of
 from geomech.systems.framed import NAME, Framed
 from geomech.systems.swimmer import name_in
-from rft.bodies import KINDS as BODIES
-from rft.effects import ENGINES
-from rft.effects import KINDS as EFFECTS
+from rft.bodies import BODIES
+from rft.effects import EFFECTS, ENGINES
 from rft.effects import engine as engine_of
 from rft.laws import LAWS
 from rft.laws.records import is_compilable, record

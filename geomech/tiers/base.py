@@ -13,13 +13,13 @@ import numpy as np
 
 from geomech.core.errors import real_array
 from geomech.core.knob import Knob
-from geomech.core.registry import Registry
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import costed, near
 from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers
 from rft.premise import ALL, Premise
+from rft.registry import Registry
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,10 @@
 """Bodies, one a file."""
 
 from rft.bodies.backbone import Backbone, ConstantCurvature, Serpenoid
-from rft.bodies.base import Body, Elements
+from rft.bodies.base import BODIES, Body, Elements
 from rft.bodies.chain import Chain
+from rft.registry import load_all
 
-KINDS = {"chain": Chain, "backbone": Backbone, "serpenoid": Serpenoid, "constant-curvature": ConstantCurvature}
+load_all(__name__, __path__)
 
-__all__ = ["KINDS", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Serpenoid"]
+__all__ = ["BODIES", "Backbone", "Body", "Chain", "ConstantCurvature", "Elements", "Serpenoid"]

@@ -11,11 +11,12 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import Elements, Length, numbered_labels
+from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
 from rft.checks import Number, check_numbers, formatted, require
 
 
+@BODIES.register
 @dataclass(frozen=True)
 class Backbone:
     """A body of equal elements whose shape variables are the bends at the ``elements`` - 1 points between them, for
@@ -27,6 +28,7 @@ class Backbone:
     elements: Annotated[int, Number(3, 2000, "-", "elements of the body, 3 to 2000", whole=True)] = 100
     length: Length = 1.0
     frame: str = "mean"
+    kind = "backbone"
 
     def __post_init__(self):
         check_numbers(self)
@@ -66,7 +68,12 @@ class Backbone:
         """Return the ends of the elements in the world, (..., elements + 1, 2), as `Chain.points` does."""
         return self.chain.points(alpha if self.bends is None else np.asarray(alpha, float) @ self.bends.T, pose)
 
+    @classmethod
+    def examples(cls) -> dict[str, Backbone]:
+        return {"backbone": cls(elements=9, length=0.1)}
 
+
+@BODIES.register
 @dataclass(frozen=True)
 class Serpenoid(Backbone):
     """A backbone of two curvature modes: curvature times length = alpha_1 cos(2 pi waves s) + alpha_2 sin(2 pi waves s),
@@ -77,6 +84,7 @@ class Serpenoid(Backbone):
     """
 
     waves: Annotated[float, Number(0, 500, "-", "waves on the body, > 0 and at most elements / 4")] = 1.0
+    kind = "serpenoid"
 
     def __post_init__(self):
         super().__post_init__()
@@ -96,12 +104,18 @@ class Serpenoid(Backbone):
         phase = 2 * np.pi * self.waves * np.arange(1, self.elements) / self.elements
         return np.stack([np.cos(phase), np.sin(phase)], -1) / self.elements
 
+    @classmethod
+    def examples(cls) -> dict[str, Backbone]:
+        return {"serpenoid": cls(elements=24, waves=1.5)}
 
+
+@BODIES.register
 @dataclass(frozen=True)
 class ConstantCurvature(Backbone):
     """A backbone of sections of equal length, each an arc; alpha_k is the angle through which section k bends (rad)."""
 
     sections: Annotated[int, Number(1, 2000, "-", "arcs, a divisor of elements", whole=True)] = 2
+    kind = "constant-curvature"
 
     def __post_init__(self):
         super().__post_init__()
@@ -122,3 +136,7 @@ class ConstantCurvature(Backbone):
         per = self.elements // self.sections
         owner = np.repeat(np.eye(self.sections), per, axis=0)
         return (owner[:-1] + owner[1:]) / (2 * per)
+
+    @classmethod
+    def examples(cls) -> dict[str, Backbone]:
+        return {"arcs": cls(elements=12, sections=3, frame="link-4")}

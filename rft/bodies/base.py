@@ -9,6 +9,9 @@ import numpy as np
 
 from rft.checks import Number, formatted, require
 from rft.laws.base import cached_if_immutable
+from rft.registry import Registry, classes_with
+
+BODIES = Registry("geomech.bodies", "kind", "a body", classes_with("motion"))
 
 Length = Annotated[
     float, Number(1e-15, 1e15, "m", "length of the body, in the unit wanted for displacement; 1 for body lengths")

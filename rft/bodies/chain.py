@@ -10,12 +10,13 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.bodies.base import Elements, Length, numbered_labels
+from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.modes import checked_modes, mode_rows
 from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.se2 import rotated
 
 
+@BODIES.register
 @dataclass(frozen=True)
 class Chain:
     """n straight links, tail to head; alpha_k is the heading of link k+1 minus that of link k, counter-clockwise.
@@ -35,6 +36,7 @@ class Chain:
     waves: Annotated[float | None, Number(1e-6, 1e6, "-", "waves on the body, of serpenoid modes, 1 if left out")] = (
         None
     )
+    kind = "chain"
 
     def __post_init__(self):
         lengths = real_array("lengths", self.lengths)
@@ -159,3 +161,14 @@ class Chain:
         x, y, theta = np.moveaxis(pose[..., None], -2, 0)
         dx, dy = rotated(theta, ends.real, ends.imag)
         return np.stack([x + dx, y + dy], -1)
+
+    @classmethod
+    def examples(cls) -> dict[str, Chain]:
+        return {
+            "two": cls((1, 2)),
+            "three": cls((1, 1, 1)),
+            "three-middle": cls((1, 1, 1), frame="link-2"),
+            "uneven": cls((0.7, 1.4, 0.9), frame="link-1", length=0.3),
+            "five": cls((1,) * 5),
+            "modes": cls((0.8, 1.3, 1.0, 0.7), 0.3, "link-2", modes=((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))),
+        }

@@ -1,6 +1,6 @@
 """Effects beyond the plain force law, one a file; only those that a scene lists are computed."""
 
-from rft.effects.base import ENGINES, Effect, Site, batched_effect, broken_premises, engine, stepwise_effects
+from rft.effects.base import EFFECTS, ENGINES, Effect, Site, batched_effect, broken_premises, engine, stepwise_effects
 from rft.effects.body_inertia import BodyInertia
 from rft.effects.depth import DepthProfile
 from rft.effects.disturbed import DisturbedGround
@@ -10,13 +10,13 @@ from rft.effects.skin import SkinFriction
 from rft.effects.slope import Slope
 from rft.effects.towed import TowedSled
 from rft.effects.transient import Transient
+from rft.registry import load_all
 
-ALL = (SkinFriction, EndCaps, TowedSled, DepthProfile, Slope, GrainInertia, BodyInertia, Transient, DisturbedGround)
-KINDS = {effect.kind: effect for effect in ALL}
+load_all(__name__, __path__)
 
 __all__ = [
+    "EFFECTS",
     "ENGINES",
-    "KINDS",
     "BodyInertia",
     "DepthProfile",
     "DisturbedGround",

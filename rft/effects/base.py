@@ -13,6 +13,7 @@ import numpy as np
 from rft.checks import formatted, require
 from rft.contact import Problem
 from rft.premise import NONE, SHAPE_ALONE, Premise
+from rft.registry import Registry, subclasses
 
 # Engines and what they solve, the cheapest first.
 ENGINES = {
@@ -78,6 +79,11 @@ class Effect:
     def check(self, medium) -> None:
         """Raise ValueError for a medium that the effect does not take."""
 
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Self]:
+        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish as x goes to 0."""
+        return {cls.kind: cls()}
+
     def apply(self, problem: Problem, site: Site | None, state: Any) -> Problem:
         """Return the problem with this effect; site and state are None unless the effect breaks a premise of
         `rft.premise.SHAPE_ALONE`."""
@@ -116,6 +122,9 @@ class Effect:
         new = object.__new__(type(self))
         new.__dict__.update({**self.__dict__, **values})
         return new
+
+
+EFFECTS = Registry("geomech.effects", "kind", "an effect", subclasses(Effect))
 
 
 def stepwise_effects(effects: Sequence[Effect]) -> list[Effect]:

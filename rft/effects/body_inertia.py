@@ -10,11 +10,12 @@ import numpy as np
 from rft.balance.newton import to_element
 from rft.checks import Number, check_numbers, require
 from rft.contact import Problem
-from rft.effects.base import Effect, Site
+from rft.effects.base import EFFECTS, Effect, Site
 from rft.momentum import MomentumRate, element_momenta, frame_to_ground, ground_to_frame
 from rft.premise import Premise
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class BodyInertia(Effect):
     """Mass of the body, uniform along its length: d(momentum)/dt = force of the medium, and likewise for the moment.
@@ -68,3 +69,10 @@ class BodyInertia(Effect):
         loss = site.dt / (self.inertia + site.dt) * drag
         older = last + e.half / e.half.sum(0) * loss[:, None]
         return state + np.stack([frame_to_ground(site.pose, older), frame_to_ground(site.pose, last)])
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, BodyInertia]:
+        return {
+            "body-inertia": cls(mass=x, frequency=0.6, length=0.8, drag=1.3),
+            "body-inertia, frequency": cls(mass=0.7, frequency=0.6 * x, length=0.8, drag=1.3),
+        }

@@ -9,10 +9,11 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, formatted, real_array, require
 from rft.contact import Contact, Problem
-from rft.effects.base import Effect, Site
+from rft.effects.base import EFFECTS, Effect, Site
 from rft.premise import NONE, Premise
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class DepthProfile(Effect):
     """Drag in proportion to depth, 2 k rho g r |z| of Eq. 2; depths are over the reference depth of the medium's drag.
@@ -65,3 +66,7 @@ class DepthProfile(Effect):
         if not (depth > 0).all(where=contact.buried > 0):
             raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
         return depth
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, DepthProfile]:
+        return {"depth-profile": cls(along=(1, 1 + x)), "depth-profile, slope": cls(slope=x, towards=1.0)}

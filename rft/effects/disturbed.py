@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
-from rft.effects.base import Effect, Site
+from rft.effects.base import EFFECTS, Effect, Site
 from rft.premise import Premise
 
 # The map of the ground is a square that moves with the body, in tiles of cells.
@@ -19,6 +19,7 @@ TILE = 32  # cells along a side of a tile; a step copies only the tiles that it 
 LOOK_AHEAD = 2.0  # radii from the body's axis to the ground that an element is about to meet
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class DisturbedGround(Effect):
     """Drag across times 1 - weakening x disturbance of the ground on the side that an element moves to.
@@ -116,6 +117,10 @@ class DisturbedGround(Effect):
         for k, x in zip(touched, value):
             new[k] = x.copy()
         return Tiles(tuple(new), owner)
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, DisturbedGround]:
+        return {"disturbed-ground": cls(radius=0.05, weakening=x)}
 
 
 class Tiles(NamedTuple):

@@ -10,11 +10,12 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
-from rft.effects.base import Effect
+from rft.effects.base import EFFECTS, Effect
 from rft.laws.granular import Granular
 from rft.link import dry_point
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class EndCaps(Effect):
     """Flat or rounded ends: axial force e pi r^2 C_S sin(atan(cot gamma0 cos psi)), lateral e pi r^2 C_F sin psi.
@@ -51,6 +52,10 @@ class EndCaps(Effect):
         load = dry_point(*(np.asarray(v, float) for v in (v_t, v_n)), rounding, np.array(cap_terms(medium)))
         factor = (self.head + self.tail) * math.pi * self.radius / 2
         return factor * load.t, factor * load.n
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, EndCaps]:
+        return {"end-caps": cls(radius=0.1 * x, tail=4.0)}
 
 
 def cap_terms(medium: Granular) -> list[tuple[float, float, float]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, require
 from rft.contact import Problem
-from rft.effects.base import Effect
+from rft.effects.base import EFFECTS, Effect
 from rft.laws.base import is_linear
 from rft.laws.catalogue import GRAVITY
 from rft.premise import Premise
@@ -17,6 +17,7 @@ from rft.premise import Premise
 ASSUMED_K = 2.5  # k of Eq. 2 for loosely packed 0.3 mm glass (Zhang and Goldman 2014); assumed where k is unknown
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class GrainInertia(Effect):
     """A normal stress strength x rho v_n^2 on the body's width 2 r, added to Eqs. 2-3 (paper Sec. IV C).
@@ -59,3 +60,10 @@ class GrainInertia(Effect):
         strength = self.strength * speed_per_rad**2 / ((ASSUMED_K if k is None else k) * GRAVITY * self.depth)
         # The flux of momentum does not depend on the pressure of the ground, so the factors of the drag leave it alone.
         return problem._replace(quadratic_drag=problem.quadratic_drag + np.atleast_2d(strength))
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:
+        return {
+            "grain-inertia": cls(frequency=x, length=0.7, depth=0.07, strength=1.5),
+            "grain-inertia, strength": cls(frequency=1.2, length=0.4, depth=0.07, strength=x),
+        }

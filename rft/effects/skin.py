@@ -7,9 +7,10 @@ from typing import Annotated
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
-from rft.effects.base import Effect
+from rft.effects.base import EFFECTS, Effect
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class SkinFriction(Effect):
     """Axial drag times forward / reference where an element slides towards its head, backward / reference where it
@@ -41,3 +42,7 @@ class SkinFriction(Effect):
     def apply(self, problem: Problem, site=None, state=None) -> Problem:
         factors = self.forward / self.reference, self.backward / self.reference, 1.0
         return problem._replace(sides=problem.sides.with_factors(*factors))
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, SkinFriction]:
+        return {"skin-friction": cls(0.2 * (1 - x), 0.2 * (1 - 2 * x), 0.2)}

@@ -10,13 +10,14 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, require
 from rft.contact import Problem
-from rft.effects.base import Effect, Site
+from rft.effects.base import EFFECTS, Effect, Site
 from rft.laws.base import is_linear
 from rft.laws.catalogue import REPOSE
 from rft.link import Incline
 from rft.premise import Premise
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class Slope(Effect):
     """A plane surface that rises by an angle, and a body that moves along it at a fixed depth.
@@ -77,3 +78,7 @@ class Slope(Effect):
         weight = self.weight * sin * problem.axial_drag
 
         return problem._replace(sides=inclined(problem.sides, weight), points=inclined(problem.points, 0.0))
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Slope]:
+        return {"slope": cls(angle=x, towards=2.0, repose=0.6, weight=0.3)}

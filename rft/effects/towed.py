@@ -9,11 +9,12 @@ import numpy as np
 
 from rft.checks import Number, check_numbers, require
 from rft.contact import Contact, Problem
-from rft.effects.base import Effect
+from rft.effects.base import EFFECTS, Effect
 from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class TowedSled(Effect):
     """Isotropic Coulomb friction at the end of a stiff bar that continues the tail link.
@@ -45,3 +46,7 @@ class TowedSled(Effect):
         point = e.attached_points([0], -(e.half[:1] + self.distance), np.ones((1, 1)))
         sled = Contact(point, np.zeros((1, 1)), np.zeros((1, 1))).with_factors(self.pull, self.pull, self.pull)
         return problem.with_points(sled, Coulomb().dry)
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, TowedSled]:
+        return {"towed-sled": cls(pull=x, distance=0.3)}

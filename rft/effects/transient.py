@@ -10,7 +10,7 @@ import numpy as np
 
 from rft.checks import Number, check_numbers
 from rft.contact import Problem
-from rft.effects.base import Effect, Site
+from rft.effects.base import EFFECTS, Effect, Site
 from rft.link import decay, find_pivot
 from rft.premise import Premise
 
@@ -19,6 +19,7 @@ SIGN = np.array([1.0, -1.0])[:, None, None]  # of v_n towards the left and the r
 E_FOLDINGS = 3.0  # of a share over the travel: exp(-3) = 5 % of the steady drag is then missing
 
 
+@EFFECTS.register
 @dataclass(frozen=True)
 class Transient(Effect):
     """Drag across that builds up on reversal: each side of each element has a developed share of it, 0 to 1.
@@ -67,6 +68,10 @@ class Transient(Effect):
     def rate(self) -> np.ndarray:
         """E-foldings of a share per body length of travel; infinite where travel = 0."""
         return np.where(np.asarray(self.travel) > 0, E_FOLDINGS / np.maximum(self.travel, SHORTEST), np.inf)
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Transient]:
+        return {"transient": cls(travel=2 * x)}
 
 
 def part_velocities(v_n: np.ndarray, v_w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers, require
-from rft.ground.base import Ground, GroundEffect
+from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 
 
+@GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class Aeration(GroundEffect):
     """The strength is 1 - air_speed / fluidisation times that of still ground; the stress map keeps its shape.
@@ -37,3 +38,7 @@ class Aeration(GroundEffect):
     @property
     def assumes(self) -> str:
         return "that strength falls to nothing at fluidisation, at all angles alike"
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Aeration]:
+        return {"aeration": cls(air_speed=0.03 * x, fluidisation=0.03)}

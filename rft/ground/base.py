@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from rft.checks import formatted, require
 from rft.premise import NONE
+from rft.registry import Registry, subclasses
 from rft.vectors import absolute, formula, maximum, minimum, sqrt, where
 
 UNDISTURBED = np.zeros((0, 3))
@@ -77,6 +78,11 @@ class GroundEffect:
     cost = ""
     walks = False
 
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Self]:
+        """Return effects by name, the one of ``order`` by ``kind`` alone, that vanish as x goes to 0."""
+        return {cls.kind: cls()}
+
     def apply(self, ground: Ground) -> Ground:
         """Return the ground with this effect."""
         raise NotImplementedError
@@ -89,6 +95,9 @@ class GroundEffect:
     def assumes(self) -> str:
         """Assumptions of the effect beyond what the scene states; empty by default."""
         return ""
+
+
+GROUND_EFFECTS = Registry("geomech.ground_effects", "kind", "an effect on the ground", subclasses(GroundEffect))
 
 
 def ground_of(effects: Sequence[GroundEffect], ground: Ground | None = None) -> Ground:

@@ -8,12 +8,13 @@ from typing import Annotated
 import numpy as np
 
 from rft.checks import Number, check_numbers, formatted, real_array, require
-from rft.ground.base import Ground, GroundEffect
+from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 from rft.premise import Premise
 
 MOST_PLACES = 1000
 
 
+@GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class DisturbedGround(GroundEffect):
     """The strength is 1 - weakening x disturbance times that of fresh ground, at all depths. Disturbance is 1 up to half
@@ -50,3 +51,7 @@ class DisturbedGround(GroundEffect):
     @property
     def assumes(self) -> str:
         return "its form and numbers, and that the motion itself disturbs nothing"
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, DisturbedGround]:
+        return {"disturbed-ground": cls(places=(0.0, -0.1), radius=0.05, weakening=x)}

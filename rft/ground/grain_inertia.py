@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers
-from rft.ground.base import Ground, GroundEffect
+from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 from rft.premise import Premise
 
 POPPY_SEEDS = 638.0  # kg/m^3, loosely packed; Agarwal et al. (2021)
 
 
+@GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class GrainInertia(GroundEffect):
     """A stress of strength x density x v_n^2 against the normal of leading faces, at any depth, where v_n is the speed of
@@ -45,3 +46,7 @@ class GrainInertia(GroundEffect):
             "density": f"{POPPY_SEEDS:g} kg/m^3, of loose poppy seeds",
         }
         return ", ".join(descriptions[name] for name, is_default in defaults.items() if is_default)
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, GrainInertia]:
+        return {"grain-inertia": cls(strength=2 * x, density=700.0)}

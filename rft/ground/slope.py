@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers, require
-from rft.ground.base import Ground, GroundEffect
+from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 from rft.laws.catalogue import GRAVITY, REPOSE
 
 
+@GROUND_EFFECTS.register
 @dataclass(frozen=True)
 class Slope(GroundEffect):
     """The surface rises towards +x; x runs along it, z away from it, depth along z.
@@ -57,3 +58,7 @@ class Slope(GroundEffect):
     def assumes(self) -> str:
         default = f"an angle of repose of {math.degrees(REPOSE):.1f} degrees, from half the drag downhill at 20, and "
         return f"{default if self.repose == REPOSE else ''}that only what moves downhill meets weaker ground"
+
+    @classmethod
+    def examples(cls, x: float = 0.3) -> dict[str, Slope]:
+        return {"slope": cls(angle=x, repose=0.6)}

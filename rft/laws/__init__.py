@@ -1,14 +1,15 @@
 """Force laws, one a file, and the catalogue of named media."""
 
-from rft.laws.base import Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
+from rft.laws.base import LAWS, Medium, TermLaw, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.catalogue import CATALOGUE
 from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular
 from rft.laws.surface import Surface
 from rft.laws.table import Table
 from rft.laws.viscous import Viscous
+from rft.registry import load_all
 
-LAWS = {"granular": Granular, "surface": Surface, "viscous": Viscous, "coulomb": Coulomb, "table": Table}
+load_all(__name__, __path__)
 
 __all__ = [
     "CATALOGUE",

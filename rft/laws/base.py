@@ -9,7 +9,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from rft.checks import formatted, require
+from rft.registry import Registry, classes_with
 from rft.vectors import formula, sqrt, where
+
+LAWS = Registry("geomech.media", "law", "a law", classes_with("traction"))
 
 
 class Medium(Protocol):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rft.laws.base import TermLaw
+from rft.laws.base import LAWS, TermLaw
 
 
+@LAWS.register
 @dataclass(frozen=True)
 class Coulomb(TermLaw):
     """Isotropic friction: f_t = v.t, f_n = v.n with v the unit velocity, in units of the yield force.
@@ -14,3 +15,4 @@ class Coulomb(TermLaw):
     The law is that of `Granular` with C = 0."""
 
     dry = ((1.0, 1.0, 1.0),)
+    law = "coulomb"

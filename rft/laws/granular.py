@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers, checked_covariance, require
-from rft.laws.base import TermLaw
+from rft.laws.base import LAWS, TermLaw
 
 
+@LAWS.register
 @dataclass(frozen=True)
 class Granular(TermLaw):
     """Resistive force per unit length of a slender body in dry grains, opposing the velocity.
@@ -28,6 +29,7 @@ class Granular(TermLaw):
     gamma0: Annotated[float, Number(-1e6, 1e6, "rad", "angle at which it saturates, strictly between 0 and pi/2")]
     k: Annotated[float | None, Number(1e-3, 1e3, "-", "pressure across over the weight of the grains above")] = None
     covariance: tuple[tuple[float, ...], ...] | None = None
+    law = "granular"
 
     def __post_init__(self):
         check_numbers(self)
@@ -48,3 +50,12 @@ class Granular(TermLaw):
         # With v_t^2 + v_n^2 written out, C (v.n) / sqrt(tan^2 g0 + (v.n)^2)
         # = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2): a second dry term.
         return (1.0, 1.0, 1.0), (math.sin(self.gamma0), 0.0, self.C * math.cos(self.gamma0))
+
+    @classmethod
+    def examples(cls) -> dict[str, Granular]:
+        return {
+            "sharp": cls(C=1.8, gamma0=math.radians(0.1)),
+            "blunt": cls(C=1.8, gamma0=math.radians(89.9)),
+            "no-extra": cls(C=0.0, gamma0=0.3),
+            "strong": cls(C=1e3, gamma0=0.24),
+        }

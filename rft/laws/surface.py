@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers, checked_covariance, require
-from rft.laws.base import TermLaw
+from rft.laws.base import LAWS, TermLaw
 
 
+@LAWS.register
 @dataclass(frozen=True)
 class Surface(TermLaw):
     """Resistive force per unit length of a shallow body at the surface of dry grains, opposing the velocity.
@@ -28,6 +29,7 @@ class Surface(TermLaw):
     across: Annotated[float, Number(1e-6, 1e6, "-", "strength of the drag across, A of that fit, over the axial drag")]
     covariance: tuple[tuple[float, ...], ...] | None = None
     uncertain = ("C", "gamma0", "across")
+    law = "surface"
 
     def __post_init__(self):
         check_numbers(self)
@@ -42,3 +44,7 @@ class Surface(TermLaw):
         # As in `Granular`: C (v.n) / sqrt(tan^2 g0 + (v.n)^2) = C cos g0 v_n / sqrt(sin^2 g0 v_t^2 + v_n^2).
         extra = self.across * self.C * math.cos(self.gamma0)
         return (1.0, 1.0, float(self.across)), (math.sin(self.gamma0), 0.0, extra)
+
+    @classmethod
+    def examples(cls) -> dict[str, Surface]:
+        return {"surface": cls(C=0.2, gamma0=0.06, across=9.0)}

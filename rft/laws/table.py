@@ -8,7 +8,8 @@ import numpy as np
 
 from rft.checks import real_array, require
 from rft.drag import rod_drag
-from rft.laws.base import require_drag
+from rft.laws.base import LAWS, require_drag
+from rft.laws.granular import Granular
 from rft.vectors import absolute, copysign, floor, formula, gather, minimum, sqrt, where
 
 MOST_ROWS = 10_000
@@ -16,6 +17,7 @@ MOST_CELLS = 4096  # of a curve on [0, 1]
 LARGEST_GAP = np.radians(15.0)  # from 0 to the smallest angle, and from the largest angle to pi/2
 
 
+@LAWS.register
 @dataclass(frozen=True)
 class Table:
     """Rate-independent drag (f_t, f_n) measured at attack angles psi between velocity and body axis, in any one unit.
@@ -35,6 +37,7 @@ class Table:
     dry = None
     viscous = None
     mirror = True
+    law = "table"
 
     def __post_init__(self):
         rows = [real_array(name, getattr(self, name)) for name in ("psi", "f_t", "f_n")]
@@ -81,6 +84,11 @@ class Table:
         _, by_s = curve(s, self.across, self.across_cells, self.across_knots, self.across_steps)
         by_c, by_s = by_c * inverse, by_s * inverse
         return by_c * (s * s + e * e), -by_c * c * s, -by_s * c * s, by_s * (c * c + e * e)
+
+    @classmethod
+    def examples(cls) -> dict[str, Table]:
+        psi = np.linspace(0.0, np.pi / 2, 12)
+        return {"measured": cls(psi, *Granular(C=1.4, gamma0=0.25).traction(np.cos(psi), np.sin(psi)))}
 
 
 @formula

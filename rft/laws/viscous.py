@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from rft.checks import Number, check_numbers, checked_covariance
-from rft.laws.base import TermLaw
+from rft.laws.base import LAWS, TermLaw
 
 
+@LAWS.register
 @dataclass(frozen=True)
 class Viscous(TermLaw):
     """Linear drag: f_t = v_t, f_n = ratio v_n per unit length, in units of the axial drag coefficient.
@@ -21,6 +22,7 @@ class Viscous(TermLaw):
     ratio: Annotated[float, Number(1e-8, 1e8, "-", "normal over axial drag")] = 2.0
     covariance: tuple[tuple[float, ...], ...] | None = None
     uncertain = ("ratio",)
+    law = "viscous"
 
     def __post_init__(self):
         check_numbers(self)
@@ -29,3 +31,7 @@ class Viscous(TermLaw):
     @property
     def viscous(self) -> tuple[float, float]:
         return 1.0, float(self.ratio)
+
+    @classmethod
+    def examples(cls) -> dict[str, Viscous]:
+        return {"viscous-1": cls(1.0), "viscous-slippery": cls(1e4)}

@@ -1,9 +1,9 @@
 """Tables of a connection read from files, whose contents are never believed: NetCDF as `geomech connection` writes it, and
 MATLAB files in sysplotter's layout."""
 
-from geomech.core.registry import load_all
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored, scaled
 from geomech.io.tables.read import load
+from rft.registry import load_all
 
 load_all(__name__, __path__)
 

@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from geomech.core.errors import plain
-from geomech.core.registry import Registry, functions_with
 from geomech.geometry.connection import Connection
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Tube
+from rft.registry import Registry, functions_with
 
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
 LARGEST_ANGLE = 10 * np.pi  # rad of a shape variable, a joint angle or a bend; beyond it is taken for degrees

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.core.registry import Registry, functions_with
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
@@ -28,6 +27,7 @@ from geomech.output.plots.maps import (
     vector_field,
 )
 from geomech.output.plots.style import axes_of, quantity, styled
+from rft.registry import Registry, functions_with
 
 CONNECTION_STYLES = Registry(
     "geomech.connection_styles", "style", "a way to draw a connection", functions_with("draws", "connection")

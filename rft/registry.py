@@ -1,4 +1,4 @@
-"""Registries: parts of scenes, tiers, pictures and file formats by the names that users give them.
+"""Registries: parts of one family, such as force laws or gaits, by the names that users give them.
 
 A part is one file with one decorator, `Registry.register`. Its class has ``examples()``, a class method that returns parts by
 name, or parameters that all have defaults; the tests hold every example to the laws of its family.
@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-import importlib.metadata
 import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import FunctionType
 from typing import Any, TypeVar, overload
-
-from geomech.core.errors import SceneError, choose
 
 Part = TypeVar("Part")
 REGISTRIES: dict[str, Registry] = {}  # all there are, by group
@@ -25,15 +22,12 @@ class Registry(Mapping[str, Any]):
     """Parts of one family by name, in the order in which they were registered.
 
     group: of entry points with which installed packages offer parts. key: attribute that holds a part's name. told: what a
-    part is, in words, such as "a gait". admits: whether an object is one. parts: a dict to keep them in, which may have
-    some.
+    part is, in words, such as "a gait". admits: whether an object is one.
     """
 
-    def __init__(
-        self, group: str, key: str, told: str, admits: Callable[[Any], bool], parts: dict[str, Any] | None = None
-    ):
+    def __init__(self, group: str, key: str, told: str, admits: Callable[[Any], bool]):
         self.group, self.key, self.told, self.admits = group, key, told, admits
-        self._parts = {} if parts is None else parts
+        self._parts: dict[str, Any] = {}
         REGISTRIES[group] = self
 
     def __repr__(self) -> str:
@@ -107,50 +101,6 @@ class Registry(Mapping[str, Any]):
             found |= own() if own else {name: part() if isinstance(part, type) else part}
         return found
 
-    def offered(self) -> dict[str, list[importlib.metadata.EntryPoint]]:
-        """Return what installed packages offer, by name, not loaded."""
-        found: dict[str, list] = {}
-        for entry in importlib.metadata.entry_points(group=self.group):
-            found.setdefault(entry.name, []).append(entry)
-        return found
-
-    def unloaded(self) -> tuple[dict[str, str], dict[str, str]]:
-        """Return names that installed packages offer and nobody has asked for yet, with their packages: new ones, and those
-        that are refused because one of that name is built in."""
-        packages = {name: " and ".join(map(_package, entries)) for name, entries in self.offered().items()}
-        new = {name: package for name, package in packages.items() if name not in self}
-        return new, {name: package for name, package in packages.items() if name in self.built_in}
-
-    def choose(self, where: str, word: object) -> str:
-        """Return word if it names a part, or one that an installed package offers, which is then loaded; else SceneError."""
-        if isinstance(word, str) and word in self:
-            return word
-        packages = self.offered()
-        try:
-            name = choose(where, word, [*self, *packages])
-        except SceneError as error:
-            own = " (or add --plugin FILE.py, a file that has it)" if isinstance(word, str) else ""
-            raise SceneError(f"{error}{own}") from None
-        self._load(where, name, packages[name])
-        return name
-
-    def _load(self, where: str, name: str, entries: list[importlib.metadata.EntryPoint]) -> None:
-        who = " and ".join(map(_package, entries))
-        if len(entries) > 1:
-            raise SceneError(f"{where}: {name!r} is offered by {who}: uninstall one")
-        try:
-            part = entries[0].load()
-        except (Exception, SystemExit) as error:
-            raise SceneError(f"{where}: {name!r} of {who} cannot be loaded: {type(error).__name__}: {error}") from error
-        try:
-            if not self.admits(part):
-                raise ValueError(f"{getattr(part, '__name__', part)} is not {self.told}")
-            if getattr(part, self.key, name) != name:
-                raise ValueError(f"its {self.key} is {getattr(part, self.key)!r}: give both one name")
-            self.put(part, name)
-        except ValueError as error:
-            raise SceneError(f"{where}: {name!r} of {who}: {error}") from None
-
 
 def classes_with(member: str) -> Callable[[Any], bool]:
     """Return whether an object is a class that has a member, as a function of it."""
@@ -185,7 +135,3 @@ def home(part: Any) -> str:
 def place(part: Any) -> tuple[str, str]:
     """Return the module and the name of a part in it; of an object its own name."""
     return home(part), getattr(part, "__qualname__", "") or part.name
-
-
-def _package(entry: importlib.metadata.EntryPoint) -> str:
-    return f"the package {entry.dist.name} {entry.dist.version}" if entry.dist else f"the package of {entry.value}"
