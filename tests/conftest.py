@@ -16,6 +16,24 @@ TRUTHS = pytest.StashKey()
 BY_HAND = {"soak", "benchmark"}
 
 
+@pytest.fixture
+def own_parts(monkeypatch):
+    """Parts of one's own, and the modules they came in, are forgotten after the test."""
+    from geomech.scene import kinds
+    from rft.registry import REGISTRIES
+
+    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
+    modules = set(sys.modules)
+    for name in ("_code", "_files"):
+        monkeypatch.setattr(kinds, name, {})
+    yield
+    for group, registry in REGISTRIES.items():
+        registry.restore(before.get(group, registry))
+    for name in set(sys.modules) - modules:
+        if name.startswith(kinds.PLUGIN):
+            del sys.modules[name]
+
+
 def pytest_addoption(parser):
     parser.addoption("--renew-truths", action="store_true", help="compute what tests/data keeps, and write it anew")
 

@@ -36,20 +36,7 @@ from rft.registry import REGISTRIES
 
 PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
 SMALL = Numerics(grid=7, phases=32)
-
-
-@pytest.fixture(autouse=True)
-def as_before(monkeypatch):
-    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
-    modules = set(sys.modules)
-    for name in ("_code", "_files"):
-        monkeypatch.setattr(kinds, name, {})
-    yield
-    for group, registry in REGISTRIES.items():
-        registry.restore(before.get(group, registry))
-    for name in set(sys.modules) - modules:
-        if name.startswith("geomech_plugin_"):
-            del sys.modules[name]
+pytestmark = pytest.mark.usefixtures("own_parts")
 
 
 def told(capsys, *argv):

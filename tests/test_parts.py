@@ -136,8 +136,8 @@ SWIMMER = '[medium]\nlaw = "treacle"\n[body]\nkind = "knee"\n[[effects]]\nkind =
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    """One of each in a folder, and registries as before afterwards."""
+def folder(tmp_path, monkeypatch, own_parts):
+    """One of each in a folder."""
     for name, text in FILES.items():
         (tmp_path / f"own_{name}.py").write_text(HEAD + text)
     end = '[gait]\nkind = "egg"\namplitude = 0.4\n[numerics]\ngrid = 7\nextent = 1.5\nphases = 32\n'
@@ -150,16 +150,7 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "own.json").write_text(json.dumps({"axes": [axis.tolist()] * 2, "A": A.tolist()}))
     (tmp_path / "table.toml").write_text(f'[system]\nkind = "table"\nfile = "own.json"\n{end}')
     monkeypatch.chdir(tmp_path)
-    modules = {*sys.modules}
-    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
-    for name in ("_code", "_files"):
-        monkeypatch.setattr(kinds, name, {})
-    yield tmp_path
-    for group, registry in REGISTRIES.items():
-        registry.restore(before[group])
-    for name in {*sys.modules} - modules:
-        if name.startswith(kinds.PLUGIN):
-            del sys.modules[name]
+    return tmp_path
 
 
 PLUGINS = [word for name in FILES for word in ("--plugin", f"own_{name}.py")]

@@ -242,16 +242,13 @@ class Power:
 
 
 @pytest.fixture
-def power(tmp_path, monkeypatch):
+def power(tmp_path, own_parts):
     """A law of one's own, whose file is gone."""
-    for name in ("_code", "_files"):
-        monkeypatch.setattr(kinds, name, {})
-    laws, path = LAWS, tmp_path / "power.py"
+    path = tmp_path / "power.py"
     path.write_text(POWER)
     kinds.load_file(path)
     path.unlink()
-    yield laws["power-of-workers"]
-    del laws["power-of-workers"]
+    return LAWS["power-of-workers"]
 
 
 def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
