@@ -710,6 +710,8 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     t = np.arange(6.0)
     n = f.known.loop.normals(t)[..., 0]
     assert np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min() > 0.05  # not known
+    slopes = np.abs(f.known.errors[:, :, :, 1]).max((1, 2, 3))
+    assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
     assert told.told(f)["status"].startswith("fitted along the gait alone")
