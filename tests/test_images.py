@@ -169,15 +169,15 @@ SHARES = {  # one over that of the phases that are solved, without traits, mirro
 def symmetric_gaits():
     """Return random gaits, with two rows of cosines and two of sines, by the symmetries that their curves have."""
     found, rng = {}, np.random.default_rng(5)
-    for harmonics in (1, 3):
-        cos, sin = rng.normal(size=(2, 2, harmonics))
-        odd = np.arange(1, harmonics + 1) % 2
+    for n in (1, 3):
+        cos, sin = rng.normal(size=(2, 2, n))
+        odd = np.arange(1, n + 1) % 2
         found |= {
-            f"none {harmonics}": (cos, sin),
-            f"mirrored {harmonics}": (cos * odd, sin * odd),
-            f"backwards {harmonics}": (cos[[0, 0]] * [[-1], [1]], sin[[0, 0]]),
-            f"backwards in a mirror {harmonics}": (cos[[0, 0]], sin[[0, 0]] * [[1], [-1]]),
-            f"both {harmonics}": (cos[[0, 0]] * odd, sin[[0, 0]] * odd * [[1], [-1]]),
+            f"none {n}": (cos, sin),
+            f"mirrored {n}": (cos * odd, sin * odd),
+            f"backwards {n}": (cos[[0, 0]] * [[-1], [1]], sin[[0, 0]]),
+            f"backwards in a mirror {n}": (cos[[0, 0]], sin[[0, 0]] * [[1], [-1]]),
+            f"both {n}": (cos[[0, 0]] * odd, sin[[0, 0]] * odd * [[1], [-1]]),
         }
     return {name: Fourier(cos=cos.tolist(), sin=sin.tolist()) for name, (cos, sin) in found.items()}
 
