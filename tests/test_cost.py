@@ -37,7 +37,16 @@ FIVE = scenes.parse(FIVE_LINKS)
 
 LARGE = {
     "amplitudes": ["displacement", "sandfish-loose", "--amplitudes", "0.1:0.4:99999"],
-    "values of a sweep": ["sweep", "three-link-glass", "--over", "medium.gamma0=0.1:0.5:999999", "-o", "out.nc"],
+    "values of a sweep": [
+        "sweep",
+        "three-link-glass",
+        "--over",
+        "medium.C=1:2:99999",
+        "--over",
+        "gait.amplitude=0.1:1:99",
+        "-o",
+        "o.nc",
+    ],
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],

@@ -333,8 +333,8 @@ class Study(Faced):
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
                 self._refuse_singular(plan, gait, some, phases)
-                if plan.table and plan.table.axes:
-                    self.refuse_outside(gait, some, phases)
+            if any(plan.table and plan.table.axes for plan in chosen.values()):
+                self.refuse_outside(gait, some, phases)
         return gait, amplitudes, chosen
 
 
