@@ -330,9 +330,10 @@ def test_names_of_no_python_file_are_refused(tmp_path):
     for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
         with pytest.raises(SceneError, match=said):
             load_file(tmp_path / name if name else "")
-    (tmp_path / "own.py").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SceneError, match="--plugin"):
-        load_file(tmp_path / "own.py")
+    for raw, said in ((b"\xff\xfe\x00", "it is not text"), (b"#" * 1_000_001, "it is larger than 1 MB")):
+        (tmp_path / "own.py").write_bytes(raw)
+        with pytest.raises(SceneError, match=f"--plugin .*: {said}"):
+            load_file(tmp_path / "own.py")
 
 
 def test_digests_of_own_code_cover_its_sources(tmp_path, monkeypatch):

@@ -681,6 +681,28 @@ def test_damaged_fields_are_refused(field, tmp_path):
             Table(tmp_path / "bad.nc").run(*gaits.Circle().cycle(16))
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.drop_vars("gait_slope"), "no gait_slope that fits it"),
+        (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
+        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not fit"),
+        (lambda d: d.isel(normal=[0, 0]), "parts do not fit"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not fit"),
+        (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
+        (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not fit"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not fit"),
+        (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
+    ],
+)
+def test_parts_of_a_gait_that_do_not_fit_are_refused(change, said, field, tmp_path):
+    with xarray.open_dataset(field / "field.nc", engine="scipy") as data:
+        change(data).to_netcdf(tmp_path / "bad.nc", engine="scipy")
+    with pytest.raises(SceneError, match=said):
+        tables.load(tmp_path / "bad.nc")
+
+
 def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_path):
     f = fitted(viscous, seed=1, spread=0.0, cycles=14)
     assert not f.across

@@ -524,6 +524,8 @@ BAD = {
     "turned": ({"turned": "A"}, r"A over \(alpha_2, alpha_1, joint, component\) where it must be"),
     "unit": ({"length_unit": b"furlong"}, "length_unit that makes no sense"),
     "length": ({"body_length": -1.0}, "body_length"),
+    "lengths": ({"body_length": [0.3, 0.3]}, "body_length"),
+    "length in words": ({"body_length": b"0.3"}, "body_length"),
     "component": ({"component": lambda x: x[::-1]}, "rows x, y, theta"),
 }
 
