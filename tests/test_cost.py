@@ -256,7 +256,7 @@ def test_a_terminal_without_letters_and_a_home_without_folders(tmp_path):
     assert (first, second, third) == ("0", "0", "2")
     assert said.startswith("sch\\xf6n \\u2603.toml: displacement per cycle")
     assert (tmp_path / "\u2603.png").stat().st_size > 10_000
-    (error,) = done.stderr.decode("ascii").splitlines()
+    *_, error = done.stderr.decode("ascii").splitlines()  # on a slow machine how far it is comes before
     assert error.startswith("error: cannot read scene")
 
 
