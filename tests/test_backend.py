@@ -461,6 +461,8 @@ def test_nothing_of_damaged_code_reaches_numba(small, monkeypatch):
         assert file.read() is None
     file.path.write_bytes(raw)
     assert file.read() == good
+    file.flush()
+    assert not file.path.exists()
 
 
 def test_code_of_another_signature_is_not_taken(small):

@@ -107,6 +107,7 @@ COUNTS = [
     ("sine's elements", lambda n: Sine(elements=n, waves=0.5), 3, 2000),
     ("sections", lambda n: ConstantCurvature(elements=12, sections=n), 1, None),
     ("depths", lambda n: DepthProfile(along=(1.0,) * n), 2, None),
+    ("pieces", lambda n: body_velocity(Viscous(), Chain(), [0.1, 0.2], [1.0, 0.0], pieces=n), 1, 10_000),
     ("midpoints", lambda n: element_load(Viscous(), f"midpoint:{n}"), 1, 1000),
     ("grid", lambda n: connection.grid(2, n), 4, None),
     ("directions, one joint", lambda n: connection.directions(1, n), 1, None),

@@ -140,6 +140,11 @@ def test_a_leg_of_three_dimensions_is_like_that_of_two():
     assert solid.moment[:, 1].min() == pytest.approx(flat.moment.min(), rel=0.2)
 
 
+def test_the_coarsest_meshes_still_are_the_bodies():
+    share = [body.mesh(1).volume / body.mesh(20_000).volume for body in BODIES]
+    assert share == pytest.approx([0.606, 0.901, 0.915, 0.975], abs=1e-3)
+
+
 @pytest.mark.parametrize("motion", MOTIONS, ids=["drag", "penetrate", "rotate"])
 @pytest.mark.parametrize("body", BODIES, ids=["sphere", "cylinder", "screw", "leg"])
 def test_velocities_are_those_of_the_poses(body, motion):
