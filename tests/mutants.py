@@ -84,7 +84,7 @@ def variants(node):
             yield with_(attr=TWIN[name])
         case ast.Call(args=args, keywords=given):
             yield from (with_(keywords=[*given[:k], *given[k + 1 :]]) for k in range(len(given)))
-            if len(args) > 1 and not any(isinstance(x, ast.Starred) for x in args[:2]):
+            if len({*map(ast.dump, args[:2])}) == 2 and not any(isinstance(x, ast.Starred) for x in args[:2]):
                 yield with_(args=[args[1], args[0], *args[2:]])
         case ast.If(test=test) | ast.IfExp(test=test):
             yield test, ast.UnaryOp(ast.Not(), test)

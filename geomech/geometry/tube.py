@@ -61,15 +61,12 @@ class Loop:
 
     @cached_property
     def _normals(self) -> np.ndarray:
-        """(P + 1, d, d - 1) at the places and at the first once more. Beyond two joints they turn about the curve as little as
-        they can and close after a cycle: parallel transport, whose holonomy is spread over all of it."""
+        """(P + 1, d, d - 1) of more than two joints, at the places and at the first once more. They turn about the curve as
+        little as they can and close after a cycle: parallel transport, whose holonomy is spread over all of it."""
         from scipy.linalg import expm, logm
 
         rate = self.shape(self._places[0], 1)
         tangent = rate / np.linalg.norm(rate, axis=1, keepdims=True)
-        if tangent.shape[1] == 2:
-            frames = np.stack([-tangent[:, 1], tangent[:, 0]], 1)[..., None]
-            return np.concatenate([frames, frames[:1]])
         found = [_complement(tangent[0])]
         for t in [*tangent[1:], tangent[0]]:
             u, _, v = np.linalg.svd(found[-1] - np.outer(t, t @ found[-1]), full_matrices=False)

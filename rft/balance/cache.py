@@ -81,7 +81,7 @@ class Cache(_Cache):
             note(f"compiled code is not kept in {self.path.parent}: {error.strerror}; {cure}")
         finally:
             with contextlib.suppress(OSError):
-                part.unlink(missing_ok=True)
+                part.unlink()
 
     def rename(self, why: str) -> None:
         """Rename a file that cannot be used, with a note."""
