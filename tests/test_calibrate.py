@@ -356,7 +356,7 @@ def test_options_overrule_the_header():
     base = json.loads(geomech("calibrate", "dem-rod-drag", "--json")[1])
     assert found["k"] * 0.06 * 600 == pytest.approx(base["k"] * 0.03 * 0.588 * 1030)
     text = geomech("calibrate", "dem-rod-drag", "--law", "viscous")[1]
-    assert "ratio" in text and "k is not known" not in text
+    assert "ratio" in text and "psi_deg  F_parallel_N" in text and "k is not known" not in text
     assert geomech("calibrate", "dem-rod-drag", "--depth", "-1")[0] == 2
     code, _, err = geomech("calibrate", "dem-rod-drag", "--density", "0.6")
     assert code == 2 and "dem_rod_drag.csv: k must be a number from 0.001 to 1000" in err

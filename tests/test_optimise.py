@@ -532,6 +532,7 @@ def test_a_cycle_begun_from_the_last_one_is_the_same():
         (value, found), (same, rise) = (getattr(c, name) for c in (warm(p), cold(p)))
         assert value == pytest.approx(same, abs=1e-9), name
         assert np.abs(np.asarray(found) - rise).max() < 1e-5 * np.abs(rise).max(), name
+    assert (warm.count, cold.count) == (5, 4)
 
 
 def test_steepest_way_from_a_gait_that_brings_nothing():
