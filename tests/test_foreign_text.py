@@ -111,7 +111,7 @@ def test_names_of_scene_files(geomech, tmp_path):
         assert code == ends, err
         shown(out, err)
         assert command[0] == "connection" or r"\x1b]0;owned\x07" in out + err  # which says nothing
-    with pytest.raises(errors.SceneError) as error:
+    with pytest.raises(errors.Refusal) as error:
         scenes.load(tmp_path / f"{ESC}-bad.toml")
     shown(str(error.value))
     assert str(error.value).count("-bad.toml") == 1  # named once

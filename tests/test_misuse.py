@@ -15,7 +15,7 @@ from test_cli import geomech
 
 import geomech as geomech_package
 from geomech import scene as scenes
-from geomech.core.errors import SceneError, UnitWarning, VelocityWarning
+from geomech.core.errors import UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
@@ -26,6 +26,7 @@ from geomech.study.single import single as single_of
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
@@ -242,9 +243,9 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
 
 
 def test_names_that_are_none_get_a_hint():
-    with pytest.raises(SceneError, match="numerics: 'nonsense' is unknown; use one of"):
+    with pytest.raises(Refusal, match="numerics: 'nonsense' is unknown: use one of"):
         VISCOUS.with_numerics(nonsense=1)
-    with pytest.raises(SceneError, match="part: 'meduim' is unknown; did you mean 'medium'"):
+    with pytest.raises(Refusal, match="part: 'meduim' is unknown: did you mean 'medium'"):
         VISCOUS.changed(meduim=Coulomb())
     with pytest.raises(ValueError, match="a CCF is that of a Connection, .* got 'x'"):
         curvature.ccf("x")
@@ -358,7 +359,7 @@ def test_no_medium_of_ours_is_suspected(name):
         (
             '"circle"',
             '"circle"\n[numerics]\ngrid_deg = 9',
-            "[numerics] key: 'grid_deg' is unknown; did you mean 'grid'",
+            "[numerics] key: 'grid_deg' is unknown: did you mean 'grid'",
         ),
     ],
 )

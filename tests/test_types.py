@@ -10,7 +10,6 @@ from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 
 import rft
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
@@ -26,6 +25,7 @@ from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity, ground, meshes, se2
 from rft.plates import SHAPES, Drag, Path, Penetrate, Rotate
+from rft.refusal import Refusal
 from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
@@ -254,4 +254,4 @@ def test_the_place_is_named():
         with pytest.raises(ValueError, match=".") as caught:
             call()
         assert said in str(caught.value)
-    assert issubclass(SceneError, ValueError)
+    assert issubclass(Refusal, ValueError)
