@@ -108,17 +108,19 @@ class Problem(NamedTuple):
     def with_points(self, points: Contact, terms: Sequence[tuple[float, float, float]]) -> Problem:
         """Return the problem with more points, each with all of these dry terms (q, k_t, k_n)."""
         new = np.repeat(np.array(terms, float)[:, :, None, None], len(points.station), 2)
-        count = max(len(self.point_terms), len(new))
-
-        def padded(x):
-            return np.concatenate([x, np.broadcast_to(NO_TERM, (count - len(x), 3, x.shape[2], 1))])
-
-        terms_of_all = np.concatenate([padded(self.point_terms), padded(new)], 2)
-        return self._replace(points=self.points.joined(points), point_terms=terms_of_all)
+        if len(self.points.station):
+            count = max(len(self.point_terms), len(new))
+            new = np.concatenate([_padded(x, count) for x in (self.point_terms, new)], 2)
+        return self._replace(points=self.points.joined(points), point_terms=new)
 
 
 NO_TERM = np.array([1.0, 0.0, 0.0])[:, None, None]  # (q, k_t, k_n)
 NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
+
+
+def _padded(terms: np.ndarray, count: int) -> np.ndarray:
+    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones without drag."""
+    return np.concatenate([terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))])
 
 
 def mapped(function: Callable, *records):

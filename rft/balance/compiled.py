@@ -267,9 +267,9 @@ def stacked(record) -> np.ndarray:
 
 def kernel_number(x) -> np.ndarray | float:
     """Return a number of a law as a float, an array as two-dimensional, the nodes of a rule as a column."""
-    if np.ndim(x) == 0:
+    if not isinstance(x, np.ndarray) or x.ndim == 0:
         return float(x)
-    return plain(np.reshape(x, (-1, 1)) if np.ndim(x) > 2 else x)
+    return plain(x.reshape(-1, 1) if x.ndim > 2 else x)
 
 
 def load_arguments(problem: Problem) -> tuple:
@@ -283,7 +283,7 @@ def load_arguments(problem: Problem) -> tuple:
     inclines = [stacked(c.incline) if additions.incline else NO_ROWS for c in (p.sides, p.points)]
     sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
     points = stacked(p.points.elements) if has_points else NO_POINTS, factors[1], NO_ROWS, inclines[1]
-    terms = np.ascontiguousarray(np.moveaxis(p.point_terms[..., 0], 2, 0)) if has_points else NO_TERMS
+    terms = plain(p.point_terms[..., 0].transpose(2, 0, 1)) if has_points else NO_TERMS
     frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
     return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
 

@@ -87,8 +87,9 @@ def solve(
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
+            index = slice(None) if index.size == size else index  # a slice is quicker
             first = guess[:, index] if method is WARM else None
-            n_new = index.size - np.count_nonzero(results[EVALUATIONS, index])
+            n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
             store(index, driver.solve(problem, _begin(method, linear, limits), limits, first), limits)
             if n_new:
                 tell(n_new, assembly.n_law_points, linear)

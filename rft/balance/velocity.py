@@ -93,7 +93,7 @@ def body_velocity(
     ValueError
         For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
     """
-    if engine(effects) != "algebraic":
+    if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))
         raise ValueError(f"no body velocity follows from shape alone where effects are {broken}: use rft.time_steps")
     assembly = assemble(medium, body, effects, loads, pieces)
@@ -119,7 +119,7 @@ def body_velocity(
     solved = solve(problem_at, speed, Accuracy(regularisation, tolerance), assembly, backend, threads, guess)
     xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
     xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
-    status = STATUSES[np.where(residual <= limit, stuck.astype(int), UNCONVERGED)]
+    status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
