@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib
 import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
-from types import ModuleType
 
 from rft.checks import formatted, require
 from rft.laws.records import is_compilable
@@ -37,12 +35,6 @@ def check(backend: str) -> None:
 def installed() -> bool:
     """Return whether numba is installed."""
     return importlib.util.find_spec("numba") is not None
-
-
-@functools.cache
-def compiled_driver() -> ModuleType:
-    """Return the module `rft.balance.compiled`, whose import loads numba."""
-    return importlib.import_module("rft.balance.compiled")
 
 
 _preferred: ContextVar[str] = ContextVar("preferred", default="")

@@ -5,14 +5,16 @@ Samples that a descent (`rft.balance.newton`) leaves unsolved are followed along
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 
 from rft.balance import arrays
-from rft.balance.backend import compiled_driver, compiles
+from rft.balance.backend import compiles
 from rft.balance.listening import listener
 from rft.balance.newton import EVALUATIONS, RESIDUAL, RESULT_ROWS, Descent, Limits, is_possible
 from rft.balance.path import follow
@@ -120,6 +122,14 @@ def solve(
     residual, evaluations, slowest = results[RESIDUAL:]
     stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
     return Solved(results[:3] * scale, residual, evaluations.astype(int), stuck, float(limit.max(initial=0.0)))
+
+
+@functools.cache
+def compiled_driver() -> ModuleType:
+    """Return the module of the compiled driver, whose import loads numba."""
+    from rft.balance import compiled
+
+    return compiled
 
 
 def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
