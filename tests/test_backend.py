@@ -14,8 +14,8 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from commands import geomech
 from registry import EFFECTS, MEDIA
-from test_cli import geomech
 from test_hard_cases import GLASS, apart
 
 from geomech import scene as scenes

@@ -10,8 +10,8 @@ import warnings
 
 import numpy as np
 import pytest
+from commands import geomech
 from registry import MEDIA
-from test_cli import geomech
 
 import geomech as geomech_package
 from geomech import scene as scenes

@@ -21,6 +21,7 @@ from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, se2
 from rft.balance.listening import listening
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
 BENCH = Study(GLASS)
 RADII = np.linspace(0.5, 2.0, 13)
