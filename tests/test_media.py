@@ -178,6 +178,7 @@ PUSHING = {
     "one way": (Tilted(), "Tilted pushes instead of drags at velocity"),
     "everywhere": (Backwards(), "Backwards has no drag"),
     "nothing": (Law(), "Law has no drag at any velocity"),
+    "without limit": (Law((1.0, np.inf, 1.0)), "Law has no drag at any velocity"),
 }
 
 
