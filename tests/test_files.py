@@ -202,7 +202,7 @@ def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
         [sys.executable, "-c", LIMITED, writer, str(tmp_path / "out")], capture_output=True, text=True
     )
     assert said.stdout.startswith("cannot write ")
-    assert "out: File too large; make room" in said.stdout
+    assert f"{tmp_path / 'out'}: File too large; make room" in said.stdout
     assert file.read_text() == "old"
     assert sorted(tmp_path.rglob("*")) == sorted({tmp_path / "out", file})
 

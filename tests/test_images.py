@@ -230,7 +230,9 @@ def test_what_is_nearly_an_image_is_none():
                 assert count(*moved) == 32, (part, where)
     circle, butterfly = Circle().cycle(32), Butterfly().cycle(32)
     assert count(*map(np.stack, zip(circle, butterfly))) == 16
-    assert around(*circle, NOTHING).count == 32 and around(*circle, BACKWARDS).count == 17
+    backwards = around(*circle, BACKWARDS)
+    assert around(*circle, NOTHING).count == 32 and backwards.count == 17
+    assert {*map(tuple, backwards.factor.tolist())} == {(1.0, 1.0, 1.0), (1.0, 1.0, -1.0)}
 
 
 def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):

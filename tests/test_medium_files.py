@@ -178,6 +178,8 @@ def test_a_table_passes_through_its_rows_in_units_of_axial_drag():
         [0.5, 0.6, 0.4, 0.3, 0.2, 0.01],
         [0.02, 0.6, 0.9, 1.2, 1.1, 1.3],
     )
+    with pytest.raises(ValueError, match="f_n must be finite"):
+        Table(psi, f_t, [*f_n[:-1], np.inf])
     table = Table(psi, f_t, f_n)
     for sign_t, sign_n, speed in ((1, 1, 1.0), (-1, 1, 1e-9), (1, -1, 1e9), (-1, -1, 3.0)):
         got = np.array(table.traction(sign_t * speed * np.cos(psi), sign_n * speed * np.sin(psi)))

@@ -101,11 +101,18 @@ def test_gamma0_below_a_degree_is_noted(tmp_path):
         assert scenes.parse(small).system.medium.gamma0 == pytest.approx(math.radians(0.24))
 
 
-@pytest.mark.parametrize(("given", "hinted"), [("gamma0 = 17", True), ("gamma0_deg = 117", False)])
-def test_degrees_where_gamma0_is_in_rad_are_told_of_the_other_key(given, hinted, tmp_path):
+@pytest.mark.parametrize(
+    ("given", "said", "hinted"),
+    [
+        ("gamma0 = 17", "lie between 0 and 90 degrees", True),
+        ("gamma0 = inf", "be a number from", False),
+        ("gamma0_deg = 117", "lie between 0 and 90 degrees", False),
+    ],
+)
+def test_degrees_where_gamma0_is_in_rad_are_told_of_the_other_key(given, said, hinted, tmp_path):
     code, _, err = geomech("explain", scene(tmp_path, PLAIN.replace("gamma0_deg = 13.8", given)), cwd=tmp_path)
     assert (code, err.count("\n")) == (2, 1)
-    assert "gamma0 must lie between 0 and 90 degrees, got " in err
+    assert f"gamma0 must {said}" in err
     assert err.endswith(": gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
 
 

@@ -178,6 +178,13 @@ def test_speeds_are_those_of_the_planar_engine(name, frequency):
     assert np.abs(kept.spatial["roll"]).max() < 1e-12
 
 
+def test_the_hull_is_drawn_as_a_box():
+    robot = XPLORER.robot
+    model = mujoco.MjModel.from_xml_string(hexapod.mjcf(robot))
+    sides = 2 * model.geom_size[model.geom_bodyid == 1]
+    np.testing.assert_allclose(sides, [[robot.length, robot.width, robot.height]])
+
+
 def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
     """Legs swapped from left to right, by half a cycle; hips so near that they roll and yaw."""
     robot = Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=(0.03, 0.04))
@@ -200,6 +207,13 @@ def test_a_robot_and_its_mirror_image_walk_as_mirror_images():
 def test_distances_of_legs_from_the_middle_plane_are_checked(aside):
     with pytest.raises(ValueError, match="^aside must be 2 numbers from 0 to .* m, one for each hip, got"):
         Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.0205, 0.01), (-0.05, 0.04), aside=aside)
+
+
+def test_distances_of_legs_may_be_listed():
+    listed, told = (
+        Rhex(0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01), (0.0,), aside=kind([0.03])) for kind in (list, tuple)
+    )
+    assert listed == told and hash(listed) == hash(told)
 
 
 def test_legs_alternate_as_in_the_plane():
