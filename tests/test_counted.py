@@ -4,7 +4,7 @@ import pytest
 
 from geomech import scene as scenes
 from geomech.study import accuracy, cost, effort, motion, sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
 

@@ -31,8 +31,8 @@ from geomech.measured import cycles, phase, regression, results, smooth, synthet
 from geomech.output import mat
 from geomech.scene import Scene, load
 from geomech.study import fields
-from geomech.study.bench import Study
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.text import measured as told

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geomech import cli, scene
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.study.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.laws.base import require_drag

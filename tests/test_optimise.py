@@ -19,7 +19,7 @@ from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
 from geomech.scene import Scene, parse
 from geomech.study import fields
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.text import optimum as optima

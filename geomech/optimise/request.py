@@ -152,7 +152,7 @@ class Request:
         else:
             steps = self.starts * (RUNS if self.by_runs else NEAR)
         gaits = int(steps * TRIES * each)
-        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, every=True)
+        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, all_phases=True)
         total, ascents = cost.price(jobs), ASCENT * (self.ascents + 1)
         return total._replace(seconds=total.seconds + ascents, besides=total.besides + ascents)
 

@@ -1,4 +1,4 @@
-"""Others who compute: processes of this machine, one a core, or the workers of a Dask cluster."""
+"""Executors: processes of this machine, one per core, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if 
 
 
 class Processes:
-    """So many processes, started by the first task; when one is ended from outside all are started anew."""
+    """A pool of so many processes, started by the first task; when one is ended from outside all are started anew."""
 
     remote, patience = False, None
 
@@ -50,7 +50,7 @@ class Processes:
         return AHEAD * self.count
 
     def look(self, future: Future) -> None:
-        """A process that is ended is noticed by the pool."""
+        """Do nothing: the pool notices a process that is ended."""
 
     def failure(self, error: Exception) -> Exception:
         return error
@@ -100,7 +100,7 @@ def undisturbed() -> Iterator[None]:
 
 
 class Cluster:
-    """The workers of one Dask scheduler; of one that is lost Dask gives the tasks to others."""
+    """The workers of one Dask scheduler. Dask gives the tasks of a lost worker to others."""
 
     remote = True
 
@@ -155,21 +155,21 @@ class Cluster:
                 )
             time.sleep(0.05)
         try:
-            found = self.client.run(_probe)
+            workers = self.client.run(_probe)
         except Exception as error:
             raise Refusal(
                 f"its workers cannot load geomech ({formatted(str(error), 120)})",
                 where=self.place,
                 instead="install it there",
             ) from None
-        for worker, (version, _) in found.items():
+        for worker, (version, _) in workers.items():
             if version != VERSION:
                 raise Refusal(
                     f"the worker {worker} has {version}, this command {VERSION}",
                     where=self.place,
                     instead="install the same there",
                 )
-        return min((back_end for _, back_end in found.values()), key=BACKENDS.index)
+        return min((back_end for _, back_end in workers.values()), key=BACKENDS.index)
 
     def _count(self) -> int:
         """Return the number of threads of all workers."""

@@ -1,4 +1,4 @@
-"""Processes that know nothing of the program that starts them, which so needs no guard, and that end with it."""
+"""Processes that do not load the program that starts them, which so needs no guard, and that end with it."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ def pool(count: int) -> ProcessPoolExecutor:
 
 
 def begin() -> None:
-    """Be a worker: what is printed goes to the error stream, and the process ends with its parent, also in the middle of a
-    task."""
+    """Start a worker: printed text goes to the error stream, and the process ends with its parent, even within a task."""
     sys.geomech_worker = True
     os.dup2(2, 1)
     parent = parent_process()

@@ -122,17 +122,17 @@ def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize)
 
 def direct(
     scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True,
-    every: bool = False,
+    all_phases: bool = False,
 ) -> list[Job]:  # fmt: skip
     """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
-    (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
+    (`estimate.direct`) or, if not ``checked``, without. all_phases: balances of all phases, those that are images too."""
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, at_once(system, phases))
-    held = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
-    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
-    solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
+    stored = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
+    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
+    solves = (lambda n: n) if all_phases else (lambda n: solved(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)
     jobs = [

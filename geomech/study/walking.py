@@ -75,8 +75,8 @@ def walked(
     """Scenes of equal numerics and engines, side by side. settling: a few cycles from rest are enough. progress: told the
     fraction done."""
     numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
-    told = {"progress": lambda done: progress(WALKING * done)} if progress else {}
-    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **told)
+    callback = {"progress": lambda done: progress(WALKING * done)} if progress else {}
+    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
     others = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
     others += [("elements", min(1000, 2 * numerics.elements))]
     changes = []
@@ -113,7 +113,7 @@ def run(
     hangs on whether a cycle repeats itself, which nobody knows before."""
     begin = time.process_time()
 
-    def told(done: float) -> None:
+    def report(done: float) -> None:
         if time.process_time() - begin > longest and done < WALKING:
             cure = "lower [numerics] duration, or say --yes"
             raise Refusal(
@@ -123,7 +123,7 @@ def run(
             progress(done)
 
     with located(scene.name):
-        return walked([scene], by, progress=told)[0]
+        return walked([scene], by, progress=report)[0]
 
 
 @dataclass(frozen=True)
@@ -245,17 +245,17 @@ class Walks:
     def as_stored(self, result: Result) -> Result:
         """Return a sweep as its file has it: the error as estimate, the status as a number that its label tells."""
         speed, status = result["speed"], result["status"]
-        told = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
+        describe = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
         index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(float)
         found = [v for v in result.variables if v.is_coordinate]
         found += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
-        found += [result["cycles"], Variable("status", speed.dims, index, "1", told)]
+        found += [result["cycles"], Variable("status", speed.dims, index, "1", describe)]
         return dataclasses.replace(result, variables=tuple(found))
 
     def table(self, result: Result) -> dict:
         """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
-        told = {name: result[name].values for name in ("speed", "status", "cycles")}
-        return {"speed": told["speed"], "estimate": result["speed"].error, **told}
+        describe = {name: result[name].values for name in ("speed", "status", "cycles")}
+        return {"speed": describe["speed"], "estimate": result["speed"].error, **describe}
 
     def summary(self, table: Mapping) -> str:
         worst = np.max(table["estimate"], initial=0.0)
@@ -302,7 +302,7 @@ class Settings:
     def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
         return {"error": float(abs(found[0] - truth[0]))}
 
-    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
         return {"label": knob.name, "order": knob.order}
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
