@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -37,6 +38,8 @@ from geomech.tiers.harmonic import HARMONIC
 from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
+
+SAMPLES = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
 
 
 class Study(Faced):
@@ -240,16 +243,17 @@ class Study(Faced):
         plan = self.plan(method, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
 
-    def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
-        """Refuse a gait, or the scene's own, that leaves the field of the tables."""
+    def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+        """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        shapes = lambda group: inside(field, gait.cycle(n.phases, group)[0], [x for x, _ in shape_labels(system)])[:, 0]
-        in_groups(shapes, chosen, at_once(system, n.phases))
+        names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+        shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
+        in_groups(shapes, chosen, at_once(system, phases))
 
-    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
+    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
         """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
-        system, phases = self.scene.system, self.scene.numerics.phases
+        system, phases = self.scene.system, phases or self.scene.numerics.phases
         if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if plan.table and plan.table.amplitudes is not None:
@@ -311,13 +315,15 @@ class Study(Faced):
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
         """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.study.cost`."""
-        gait, amplitudes, plans = self._checked(gait, amplitudes, methods)
+        gait, amplitudes, plans = self._checked(gait, amplitudes, methods, *SAMPLES)
         with located(self.scene.name):
             return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
-    def _checked(self, gait, amplitudes, methods):
-        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request; Refusal for one that
-        makes no sense."""
+    def _checked(self, gait, amplitudes, methods, samples: int = sys.maxsize, phases: int = sys.maxsize):
+        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
+
+        Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
+        many phases."""
         scene = self.scene
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
@@ -327,13 +333,16 @@ class Study(Faced):
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
-            chosen = {}
+            sampled = np.sort(amplitudes)[
+                np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), samples)).astype(int)
+            ]
+            phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
             for tier in [_tier(m) for m in methods]:
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
-                self._refuse_singular(plan, gait, amplitudes)
-                if plan.table and plan.table.axes:
-                    self.refuse_outside(gait, amplitudes)
+                self._refuse_singular(plan, gait, sampled, phases)
+            if any(plan.table and plan.table.axes for plan in chosen.values()):
+                self.refuse_outside(gait, sampled, phases)
         return gait, amplitudes, chosen
 
 
