@@ -10,19 +10,19 @@ from geomech.measured import phase
 from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
 
-FEWEST = 8  # whole cycles: fewer do not tell how they scatter
-ENOUGH = FEWEST + 2  # cycles of a log that surely has as many: half of one at each end is not taken
-ROWS = 12  # a cycle, at least
+FEWEST = 8  # full cycles: fewer do not show their scatter
+ENOUGH = FEWEST + 2  # cycles of a log for that many full ones: half a cycle at each end is not used
+ROWS = 12  # per cycle, at least
 GAP = 1 / 8  # of a cycle without a row, at most
 PERIOD_RATIO = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
 TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
-AFTER = 0.8  # the same where all cycles of one come before those of the other
+AFTER = 0.8  # the same share where all cycles of one gait come before those of the other
 LEAST_DISTANCE = 0.05  # of the gait's size, between the means of two gaits
-STEADY = 4  # times the scatter of a joint's cycles about it, that a drift is at least
+STEADY = 4  # least drift over the scatter of a joint's cycles about it
 SURELY = 1.5  # standard deviations of noise that may look like a motion
-THIN = 1e-3  # of its length, the width of a gait that encloses nothing
-SLIGHT = 0.01  # of a joint, that another must have in it to be named
-REFINED = 3  # times the phase is that of the nearest point of the mean gait
+THIN = 1e-3  # of its length: width of a gait that encloses no area
+SLIGHT = 0.01  # of a joint: smaller contributions of others are not named
+REFINED = 3  # iterations of the phase by the nearest point of the mean gait
 
 
 def period(log: Log) -> float:

@@ -20,9 +20,9 @@ from geomech.measured.spread import spread
 from rft import se2
 from rft.checks import in_range
 
-HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
+HARMONICS = 12  # of the connection and of the gait, at most
 PHASES = 128  # of the mean gait, at which it is integrated
-PRINTED_PHASES = 24  # phases at which numbers are told
+PRINTED_PHASES = 24  # phases of printed numbers
 SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
@@ -156,7 +156,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         ) from None
     across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
     if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
-        combined = {}  # nothing is gained by leaving them out
+        combined = {}  # leaving them out would not help
     A, errors = (equations.split(x, loop) for x in (coefficients, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
@@ -171,7 +171,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         )
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
     mean, mean_error = mean_of(measured, level)
-    square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less what the mean leaves open
+    square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
     known = replace(known, beyond=beyond, off=residual.off)

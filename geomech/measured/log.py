@@ -26,10 +26,10 @@ POSE = {
     "heading": ("heading", "theta", "yaw"),
 }
 JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
-UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns that stand for t, and tell no s
-ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|ms)")  # in units that are not those of t, x and y
-SPIKE = 20.0  # times as far off its neighbours as nine in ten rows
-LARGE = 0.05  # of a column's range, that a row must be off besides
+UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns in place of t that are no times
+ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|ms)")  # units that are not those of t, x and y
+SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
+LARGE = 0.05  # of a column's range: least deviation of an outlier
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from geomech.geometry.tube import waves
 
-LIKELY = 0.9  # of the best correlation of a log with itself: the shortest shift that comes so near is the period
+LIKELY = 0.9  # of the highest autocorrelation: the shortest shift above this is the period
 ORDER = 4  # of the Butterworth filter about the cycle's frequency
-DENSITY = 8  # harmonics of the density of a protophase that is made uniform
+DENSITY = 8  # harmonics of the density of a protophase
 
 
 def period_of(t: np.ndarray, alpha: np.ndarray) -> float:

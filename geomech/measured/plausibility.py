@@ -17,8 +17,8 @@ TURNS = (
 )
 MOVES = 2.0  # body lengths per rad of the joints, rms, at most: 0.02 to 0.07 in sand and fluid
 SLOWEST = 300.0  # s of a cycle
-HARMONICS = 3  # of the body velocity over the phase, by which hands are told
-MIRRORED = 0.5  # of what is left of the velocity, that is left of its mirror image where the frame is left-handed
+HARMONICS = 3  # of the body velocity over the phase, for the test of handedness
+MIRRORED = 0.5  # residual of the mirror image over that of the velocity in a left-handed frame, at most
 
 
 def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float) -> None:

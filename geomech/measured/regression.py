@@ -18,13 +18,13 @@ import numpy as np
 from geomech.geometry.tube import Loop, waves
 
 FOLDS = 5  # of the cross-validation over cycles that chooses harmonics
-MOST_BLOCKS = 120  # of cycles, that are left out as one
+MOST_BLOCKS = 120  # of cycles in the jackknife
 MOST_NUMBERS = 20_000_000  # of all their matrices
-SECOND = 2  # harmonics of what is of the second order in the deviation, at most
+SECOND = 2  # harmonics of the terms of the second order in the deviation, at most
 LAGS = 8  # blocks over which errors are correlated
-CROSSWISE = 0.01  # of what a series of A may at most do along the gait, that it does at least
+CROSSWISE = 0.01  # least singular value, relative, of a series of A acting along the gait
 CERTAIN = 5.0  # standard errors by which the cycles must vary
-LEAST_VARIED = 3e-3  # of the joint rates, or of the gait's size, that those across it must be: splines make up as much
+LEAST_VARIED = 3e-3  # least deviation across the gait, over joint rates or the gait's size: splines cause as much
 NOTHING, SHAPES, RATES = range(
     3
 )  # what varies from cycle to cycle beyond noise: it determines A along the gait, its slopes, all of A
@@ -205,7 +205,7 @@ def unknown(loop: Loop, A: np.ndarray, varies: int) -> np.ndarray:
     )
     directions = np.linalg.lstsq(waves(t, wide // 2), directions.reshape(len(t), -1), rcond=None)[
         0
-    ].T  # as few waves as the gait
+    ].T  # no more harmonics than the gait
     directions, errors = np.moveaxis(directions.reshape(d, d, wide), 1, 0), []
     for i, (direction, k) in itertools.product(range(3), itertools.product(range(d), range(d))):
         if direction < d - 1 or (

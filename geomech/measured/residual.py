@@ -21,10 +21,10 @@ from geomech.geometry.tube import Known, series
 from geomech.measured.regression import RATES, Samples
 from geomech.measured.spread import PLACES, WIDTH
 
-NOISE = 0.3  # of its variance: what splines and harmonics that cross-validation chooses leave, where A is smooth
-COARSE = 0.5  # of the mean that halves leave: splines through all rows, twice as close, leave less
-UPPER = 0.5  # of the harmonics are below those that stand for what is cut off
-TAIL = 2.0  # times what these make: between a jump, 1, and spikes; covers 95 % of the entries of A where it has both
+NOISE = 0.3  # of its variance: residual of cross-validated splines and harmonics where A is smooth
+COARSE = 0.5  # of the mean residual of halves: splines through all rows have twice the knots and less of it
+UPPER = 0.5  # of the harmonics: higher ones stand for the truncated ones
+TAIL = 2.0  # truncation over these: between a jump, 1, and spikes; covers 95 % of the entries of A with both
 SLOWEST = 0.03  # of its rms: the rate across the gait, at least
 
 
@@ -57,11 +57,11 @@ def residual_of(known: Known, samples: Samples, varies: int) -> Residual:
         swings = (np.einsum("nik,ni->nk", known.loop.normals(samples.phase), u) for _, u in samples.halves)
         swing = _near(places.mean(np.multiply(*swings).mean(-1, keepdims=True)))
         across = _near(common - NOISE * noise) / np.maximum(swing, SLOWEST**2 * swing.mean())
-    square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _cut_off(known)
+    square = np.maximum(np.stack([along, across]), 0.0) + TAIL**2 * _truncation(known)
     return Residual(residual, explained, np.sqrt(square).transpose(2, 0, 1))
 
 
-def _cut_off(known: Known) -> np.ndarray:
+def _truncation(known: Known) -> np.ndarray:
     """Return (2, PLACES, 3): squares of the upper harmonics of A along the gait and across it, less those of their
     noise."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 DEGREE = 5  # of the splines: their rates are of order 5 in the spacing of the knots
-KNOTS = (4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64)  # a cycle, at most
-PIECE = 2000  # rows of a spline that is solved at once
-TRIED = 4000  # rows on which spacings are tried
-CLOSER = 1.5  # knots for each that values want: rates want more
+KNOTS = (4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64)  # per cycle, at most
+PIECE = 2000  # rows of a spline that is solved as one
+TRIED = 4000  # rows for the choice of a spacing
+CLOSER = 1.5  # more knots than is best for values: rates need more
 FEWEST = 2  # rows between two knots; of every second row twice as many, at least
 
 
@@ -33,7 +33,7 @@ def smoothed(t: np.ndarray, channels: np.ndarray, period: float) -> Smoothed:
 
     Knots are at rows; their number per cycle minimises the geometric mean over the channels of the generalised
     cross-validation."""
-    rows = len(t) * period / (t[-1] - t[0])  # a cycle
+    rows = len(t) * period / (t[-1] - t[0])  # per cycle
     step = _spacing(t[:TRIED], channels[:TRIED], sorted({max(FEWEST, round(rows / k)) for k in KNOTS}, reverse=True))
     values, rates = _through(t, channels, step, t)
     noise = np.sqrt(((channels - values) ** 2).sum(0) / (len(t) * (1 - 1 / step)))

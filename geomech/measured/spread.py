@@ -8,9 +8,9 @@ from geomech.geometry.tube import Loop
 from geomech.measured.regression import Samples
 
 DEVIATIONS = 2.5  # standard deviations of the samples about the mean gait
-PLACES = 64  # phases at which their spread is told
+PLACES = 64  # phases of the spread
 WIDTH = 0.3  # rad of phase, over which it is averaged
-LEAST = 0.02  # of the gait's size: as far from it A is that of the gait, where its cycles do not vary
+LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not vary
 
 
 def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:

@@ -13,7 +13,7 @@ from geomech.io.files import whole_file
 from rft.checks import in_range
 
 FINER = 4  # steps of the integration between two rows
-MEMORY = 0.25  # cycles over which the deviations of a body's joints forget
+MEMORY = 0.25  # correlation time of the joints' deviations, cycles
 
 
 class SyntheticLog(NamedTuple):
@@ -56,7 +56,7 @@ def made(
 def _smooth(rng, count: int, width: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
     """Return values and their derivatives by the step, (count, columns) each, of unit variance, correlated over
     ``width`` steps."""
-    k = 2 * np.pi * np.fft.rfftfreq(2 * count)[:, None]  # twice as long, so that the end knows nothing of the beginning
+    k = 2 * np.pi * np.fft.rfftfreq(2 * count)[:, None]  # twice as long, so that end and beginning are uncorrelated
     waves = (rng.normal(size=(len(k), columns)) + 1j * rng.normal(size=(len(k), columns))) * np.exp(
         -((k * width) ** 2) / 2
     )

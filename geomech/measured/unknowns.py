@@ -8,10 +8,13 @@ import numpy as np
 from geomech.geometry.tube import Loop
 from geomech.measured.regression import FOLDS, NOTHING, RATES, SECOND, Samples, Sums, sums
 
-LEAST, MORE = 4, 2  # harmonics at least, and beyond those of the best prediction: what is cut off stays below the noise
-FEWEST = 2  # harmonics for which those of the second order are given up
-SHARE = 0.5  # of the numbers that splines through the rows have, that unknowns are at most: more follow the noise
-WORSE = 1.5  # times as large, what cycles that are left out keep of xi with more unknowns: then noise makes these up
+LEAST, MORE = (
+    4,
+    2,
+)  # harmonics: the least number, and those beyond the best prediction, so that the truncation is below the noise
+FEWEST = 2  # harmonics: with fewer, terms of the second order are dropped
+SHARE = 0.5  # unknowns over parameters of the splines, at most: more would fit the noise
+WORSE = 1.5  # ratio of prediction errors from which on more unknowns only fit noise
 
 
 def selected(loop: Loop, samples: Samples, most: int, fixed: int | None, varies: int, size: float) -> tuple[Sums, int]:

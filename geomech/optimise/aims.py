@@ -13,7 +13,7 @@ from rft.refusal import Refusal
 
 AIMS = ("displacement", "efficiency", "turning", "speed")
 DIRECTIONS = ("x", "y")
-TINY = 1e-9  # body lengths: a distance that is none
+TINY = 1e-9  # body lengths: smaller distances count as 0
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Aim:
             theta = b.net[0][2]
             return abs(theta), (-1.0 if theta < 0 else 1.0) * b.net[1][2]
         far = self._displacement(b)
-        if (b.length[0] if self.name == "efficiency" else time) == 0:  # of a gait that rests
+        if (b.length[0] if self.name == "efficiency" else time) == 0:  # the gait rests
             return 0.0, 0 * far[1]
         if self.name == "efficiency":
             value = far[0] / b.length[0]
@@ -77,7 +77,7 @@ class Aim:
         (x, y, _), (dx, dy, _) = b.net
         if not self.direction:
             size = np.hypot(x, y)
-            if size < TINY * self.length:  # at the tip of a cone: the steepest way up
+            if size < TINY * self.length:  # at the tip of a cone: the direction of steepest ascent
                 x, y = np.linalg.svd(np.stack([dx.ravel(), dy.ravel()]), full_matrices=False)[0][:, 0]
             return size / self.length, (x * dx + y * dy) / np.hypot(x, y) / self.length
         value, slopes = self.along(b)

@@ -11,11 +11,11 @@ from geomech.optimise.aims import Aim
 from geomech.optimise.problem import EVEN, Enough, Problem, is_feasible
 from geomech.optimise.stroke import Stroke
 
-STRIDE = 0.5  # rad, if joints have 2.5: how far the numbers go in so many steps, from one loop to one near
+STRIDE = 0.5  # largest change of x (rad, if joints have 2.5) in TOGETHER steps
 TOGETHER = 50
-TRIES = 2.5  # cycles that a step takes, at most in the mean
-SETTLING, INSIDE = 8, 1e-9  # steps of Newton's method, and how far inside of a rule they aim
-SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after a loop that cannot be run, or no way up; and at the end
+TRIES = 2.5  # cycles per step, at most on average
+SETTLING, INSIDE = 8, 1e-9  # steps of Newton's method, and their margin inside the constraints
+SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after an infeasible loop or no progress; and at the end
 
 
 def ascend(
@@ -69,7 +69,7 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
     constraints = [(kind, y - INSIDE * (kind == "ineq"), A) for kind, y, A in constraints]
     unit = max(
         np.abs(y).max() if kind == "eq" else -y.min() for kind, y, _ in constraints
-    )  # so that a tolerance is one of it
+    )  # so that the solver's tolerance is relative
     linear = [
         {"type": kind, "fun": lambda x, y=y / unit, A=A: y + A @ x, "jac": lambda x, A=A: A}
         for kind, y, A in constraints
@@ -113,7 +113,7 @@ class _Ascent:
         radius = np.where(np.arange(len(x)) < moving, stride, np.inf)
         try:
             self(x)
-            with warnings.catch_warnings():  # SciPy before 1.13 says so where it clips its own steps to the bounds
+            with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds
                 warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
                 solution = minimize(
                     self.objective, x, jac=True, method="SLSQP", constraints=self.constraints,

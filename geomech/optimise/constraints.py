@@ -8,9 +8,9 @@ from geomech.optimise.loops import DENSE, Loops, waves
 from geomech.optimise.stroke import Stroke
 
 MARGIN = 0.5  # of the first loop's distance from singular shapes
-NEARLY = 0.95  # of that, to rounding
-SLIGHTLY = 0.05  # of the sweep of its first harmonic: a loop that goes back no further is one stroke, or soon made one
-SMALLER = 0.7 ** np.arange(12)  # sizes that are tried
+NEARLY = 0.95  # of that: allows for roundoff
+SLIGHTLY = 0.05  # of the sweep of its first harmonic: a loop that goes back less is one stroke, or nearly so
+SMALLER = 0.7 ** np.arange(12)  # sizes tried in turn
 
 
 class Constraints:

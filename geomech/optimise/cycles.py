@@ -16,7 +16,7 @@ import numpy as np
 from geomech.geometry.reconstruct import slopes, turning
 from geomech.optimise.loops import Loops
 
-STEP = 1e-5  # of differences: rad, and of the rate
+STEP = 1e-5  # of differences: rad, and relative to the rate
 STEP_OF_RUNS = 1e-3  # rad: cycles repeat to 1e-6 only
 
 
@@ -40,7 +40,7 @@ class Phases:
     velocity(alpha, alphadot) -> (..., 3). power(alpha, alphadot, xi) -> (...), of degree ``degree`` in alphadot; None
     where no cost is needed."""
 
-    exact = 1e-10  # rad: what a turn of none may be
+    exact = 1e-10  # rad: tolerance of a net turn of 0
 
     def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
         self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
@@ -94,7 +94,7 @@ class Phases:
 class Runs:
     """Cycles of gaits run as a whole, by `System.run`; loops: whatever has ``cycle(p)`` for rows of p. length: of the body."""
 
-    exact = 1e-6  # rad: that to which they repeat
+    exact = 1e-6  # rad: cycles repeat to this
 
     def __init__(
         self, loops, run: Callable, work: bool = False, degree: float = 1.0, length: float = 1.0,
@@ -123,7 +123,7 @@ def takes_start(velocity: Callable) -> bool:
     """Return whether a velocity accepts a start for its iterations."""
     try:
         return "start" in inspect.signature(velocity).parameters
-    except (TypeError, ValueError):  # of compiled code
+    except (TypeError, ValueError):  # raised for compiled code
         return False
 
 

@@ -14,7 +14,7 @@ from geomech.systems.framed import Framed
 from rft.checks import in_range, is_number, real_array
 from rft.refusal import Refusal, formatted
 
-LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
+LEAST, MOST = 1e-6, 100.0  # rad: of the range between two limits, and of a limit
 Within = float | tuple[tuple[float, float], ...]
 WithinArgument = float | Sequence[float] | Sequence[Sequence[float]] | None
 

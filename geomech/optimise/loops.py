@@ -13,12 +13,12 @@ import numpy as np
 
 from geomech.gaits import Fourier, Gait
 
-DENSE = 1024  # phases at which a limit is held, and loops are compared
-TOUCHING = 5e-3  # of a limit: how near a loop is that touches it
-NARROWER = 1e-4  # of a limit: what a curve has beyond its phases
-SMALL, SIZEABLE = 0.05, 0.3  # of the limit: a start that is too small, and what it is made
-SAME = 0.02  # of its size: largest distance between two loops that are one
-OUTLINES = (  # polygons to begin with, of two joints whose limits are -1 and 1: the largest and the shortest way round
+DENSE = 1024  # phases at which limits hold and loops are compared
+TOUCHING = 5e-3  # of a limit: a loop this near touches it
+NARROWER = 1e-4  # of a limit: a curve may exceed it by this between phases
+SMALL, SIZEABLE = 0.05, 0.3  # of the range: a start that is too small, and its size after enlargement
+SAME = 0.02  # of its size: largest distance between two loops that count as the same
+OUTLINES = (  # initial polygons of two joints with limits -1 and 1: the largest and shorter ones
     ((1, 1), (-1, 1), (-1, -1), (1, -1)),
     ((1, 0.5), (0.5, 1), (-1, 1), (-1, -0.5), (-0.5, -1), (1, -1)),
     ((1, 1), (-0.5, 1), (-1, 0.5), (-1, -1), (0.5, -1), (1, -0.5)),
@@ -28,7 +28,7 @@ OUTLINES = (  # polygons to begin with, of two joints whose limits are -1 and 1:
     *(tuple((0.5 * i + 0.35 * x, 0.5 * j + 0.35 * y) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1)))
       for i, j in ((1, -1), (1, 1), (-1, 1), (-1, -1))),
 )  # fmt: skip
-IN_MIRROR = 2  # of these, the last, that are others in the mirror
+IN_MIRROR = 2  # number of these, at the end, that are mirror images of others
 
 
 @dataclass(frozen=True)

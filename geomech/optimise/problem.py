@@ -9,9 +9,9 @@ import numpy as np
 from geomech.optimise.aims import Aim
 from geomech.optimise.stroke import Stroke
 
-EVEN = 1e-3  # of the value: what uneven pacing and a long way cost; it decides among loops that bring the same
+EVEN = 1e-3  # of the value: weight of uneven pacing and length; it decides between loops of equal value
 STRAIGHT = 1e-3  # rad: below it a gait does not turn
-FEASIBLE = 5e-3  # rad, and of a limit: how far beyond a rule a loop may be that counts as keeping it
+FEASIBLE = 5e-3  # rad, and relative to a limit: violation of a constraint up to which a loop counts as feasible
 
 
 class Enough(Exception):
@@ -94,7 +94,7 @@ class Problem:
             out.append(_rates(self))
             out += [_power(self)] if self.aim.power is not None else []
         theta = self.values_at(self.first).net[1][2]
-        if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else, as in sines, none of them turns
+        if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
             out += _straight(self, turn)
         out += [] if once is None else [_once(self, once)]
         return out + ([] if singularity is None else [_away(self, singularity, away)])

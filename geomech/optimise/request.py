@@ -27,26 +27,23 @@ from rft.checks import in_range
 from rft.premise import ALL, Premise
 from rft.refusal import Refusal, located
 
-JOINTS = 12  # more make more numbers than a search without a model of them can find
+JOINTS = 12  # with more, loops have too many parameters for this search
 PHASES = 128  # of a cycle in the search
-FINISHED = 3  # answers of the table that the direct tier goes on from
-PERTURBATIONS, MORE = (
-    (0.1, 0.2),
-    3,
-)  # rad, if joints have 2.5: how far off the best it goes on beside it, by the table first from the
-# second; and from how many loops each
-SHARE, LED = 0.8, 4  # of the limits: narrower ones, that the search begins within; and how many of its answers lead on
-ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
+FINISHED = 3  # optima by tables that the direct tier improves
+PERTURBATIONS = 0.1, 0.2  # rad, if joints have 2.5: of the best loop; the larger ones are first improved by tables
+MORE = 3  # loops for each of these sizes
+SHARE, LED = 0.8, 4  # narrower limits for a first search, relative; and the number of its optima that are start values
+ROOM = 1.02  # extent of tables over the limit, as iterates exceed it
 NEAR, FINISH, POLISH, RUNS = (
     100,
     16,
     60,
     12,
 )  # steps in tables, by the direct tier, of its best, of gaits run as a whole
-ASCENT = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
-STILL = 1e-12  # of the velocity: what is rounding
-LOOPS = 4 + len(OUTLINES)  # of which one at least turns, if any does
-DEGREES = 1e-3  # by which the degree of the power may scatter
+ASCENT = 0.4  # s of other work per ascent, some twice the time on the machine that this was written on
+STILL = 1e-12  # of the velocity: roundoff
+LOOPS = 4 + len(OUTLINES)  # loops for the test whether any turns
+DEGREES = 1e-3  # largest scatter of the degree of the power
 
 
 @dataclass(frozen=True)

@@ -41,13 +41,13 @@ from geomech.run.jobs import runner
 from geomech.scene.model import Scene
 from rft.refusal import Refusal, located
 
-NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
-NO_TURN = 1e-7  # rad: a net turn that is none
-AS_MUCH = 1e-3  # of the value
-LARGER = 0.6  # of the room: how far the scene's own gait goes the second time
-POLISHED, EVEN_AT_LAST = 1e-7, EVEN / 10  # of the way of the best one, at the phases where it is told
-FINISHING = 1.0  # s from a start by the direct tier, likewise
-ENOUGH = 64  # harmonics that any start is told in
+NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # change of the value in a step at which an ascent ends
+NO_TURN = 1e-7  # rad: smaller net turns count as 0
+AS_MUCH = 1e-3  # of the value: a reverse that loses less counts as good
+LARGER = 0.6  # of the range: size of the scene's gait as a second start
+POLISHED, EVEN_AT_LAST = 1e-7, EVEN / 10  # tolerance and weight of the last ascent, at the phases of evaluations
+FINISHING = 1.0  # s of other work per ascent by the direct tier, likewise
+ENOUGH = 64  # harmonics that suffice for any initial gait
 
 
 def optimise(
@@ -80,7 +80,7 @@ class _Search:
         self.r, self.progress, self.began, self.count = request, progress, time.perf_counter(), 0
         self.completed = 0
         ascents = request.ascents + self._rough
-        self.cycles_per_ascent = TRIES * (RUNS if request.by_runs else FINISH)  # cycles of one, or so
+        self.cycles_per_ascent = TRIES * (RUNS if request.by_runs else FINISH)  # a rough estimate
         self.expected = ascents * self.cycles_per_ascent
 
     @property
@@ -94,7 +94,7 @@ class _Search:
         self.origin, *others = r.loops.starts(own, r.starts)
         self.constraints = Constraints(r.loops, r.system.traits.singularity, self.origin)
         start = self._evaluated(self._start())
-        self._timed(start)  # refuses what no gait can be
+        self._timed(start)  # refuses impossible frequencies
         turn = abs(float(start.displacement[2]))
         loops, others = self._ascended([self.constraints.first, *map(self.constraints.feasible, others)], turn)
         best, answers, p = start, [], None
@@ -129,7 +129,7 @@ class _Search:
         near = self._near(
             evaluators.from_tables(r, *tables), starts + self._from_narrower(tables, starts, turn), turn, tables, NEAR
         )
-        if not r.system.traits.odd:  # where the table, which is, takes either sense for as good
+        if not r.system.traits.odd:  # the table is odd and so does not distinguish the senses
             near += [series.reversed_(p) for p in near]
         ranked = self._ranked(tier, near, turn)
         further = self._each([p for p, *_ in ranked[:FINISHED]], turn, None, FINISH, TOLERANCE)
@@ -162,10 +162,10 @@ class _Search:
         optima about the best."""
         rng, loops = np.random.default_rng(0), self.r.loops
         falling = 1 / np.repeat(np.arange(loops.harmonics + 1), 2)[1:].clip(1)[:, None]
-        off = lambda size: self.constraints.feasible(
+        perturbed = lambda size: self.constraints.feasible(
             loops.fitted(p + size * loops.unit * falling * rng.normal(size=p.shape))
         )
-        near, further = ([off(size) for _ in range(MORE)] for size in PERTURBATIONS)
+        near, further = ([perturbed(size) for _ in range(MORE)] for size in PERTURBATIONS)
         return near, further
 
     def _from_narrower(self, tables: tuple, starts: list[np.ndarray], turn: float) -> list[np.ndarray]:
@@ -215,14 +215,14 @@ class _Search:
             self.count += count
             self._report(
                 max(0, before + len(ends) * self.cycles_per_ascent - self.completed)
-            )  # whoever did it, and however soon
+            )  # the same by any executor, however soon it ended
         return ends
 
     def _worth(self, tier, p, turn: float) -> float:
         """Return the value of a loop, less a linear estimate of the loss by turning no more than ``turn``."""
         try:
             b = tier(p)
-        except RuntimeError:  # it cannot be run
+        except RuntimeError:  # the loop cannot be run
             return -np.inf
         finally:
             self.count += 1
@@ -252,7 +252,7 @@ class _Search:
             even=EVEN_AT_LAST if ascent.phases else EVEN,
         )
         self.count += cycles.count - before
-        return p if isinstance(self.r.loops, Loops) else self.r.loops.fitted(p)  # loops are settled yet
+        return p if isinstance(self.r.loops, Loops) else self.r.loops.fitted(p)  # loops are projected later
 
     def _finished(self, p: np.ndarray, turn: float) -> tuple[Evaluation, np.ndarray]:
         """Return the evaluation of the projected loop, and the loop."""
@@ -265,13 +265,13 @@ class _Search:
         if not isinstance(r.loops, Loops):
             return p
         cycles = evaluators.direct(r, r.phases)
-        with contextlib.suppress(RuntimeError):  # of a loop near by that cannot be run
+        with contextlib.suppress(RuntimeError):  # raised for a loop nearby that cannot be run
             p = project(
                 cycles, r.aim, p, turn=turn, stroke=self.constraints.stroke, singularity=r.system.traits.singularity,
                 away=self.constraints.away,
             )  # fmt: skip
         self.count += cycles.count
-        return r.loops.fitted(p)  # as it is, but where no loop near by keeps all rules
+        return r.loops.fitted(p)  # unchanged, unless no loop nearby is feasible
 
     def _slack(self, this: Evaluation) -> float:
         """Return the allowed excess of a net turn, rad: roundoff and, where cycles are not those of the search, their
@@ -315,7 +315,7 @@ class _Search:
         r = self.r
         if not (r.aim.direction and isinstance(r.loops, Loops)) or r.by_runs:
             return p
-        for _ in range(3):  # the crossing nearest to the start, more closely each time
+        for _ in range(3):  # the crossing nearest to the start, refined
             ahead = turning(r.scene.system.run(*r.loops.cycle(p)).xi)
             n, after = len(ahead), np.roll(ahead, -1)
             places = np.flatnonzero(ahead * after <= 0)

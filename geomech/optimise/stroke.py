@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-FLAT, BACK = 0.05, 1e-9  # of the first harmonic: how thin a plane is none; of its sweep: how far back is not back
-NEWTON = 3  # steps to the least sweep between two phases
+FLAT, BACK = 0.05, 1e-9  # of the first harmonic: thinner ellipses span no plane; of its sweep: tolerance
+NEWTON = 3  # steps to the least sweep in an interval
 
 
 class Stroke:
@@ -44,7 +44,7 @@ class Stroke:
             x, dx, ddx, dddx = self._going(p, self.phases + shift)
             rise, bend = cross(x, ddx), cross(dx, ddx) + cross(x, dddx)
             step = -rise / np.where(bend > 0, bend, 1.0)
-            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where it has no least
+            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where there is no minimum
             shift = np.clip(shift + step, -self.width / 2, self.width / 2)
         return self.phases + shift
 

@@ -19,7 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
-BACKENDS = "numpy", "numba"  # slow ones first
+BACKENDS = "numpy", "numba"  # slowest first
 MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
 
 _most: ContextVar[str] = ContextVar("most", default="numba")

@@ -14,13 +14,13 @@ from typing import NamedTuple
 from geomech.run.backend import listen, listener, nobody, preferred
 from rft.refusal import Refusal
 
-LONGEST = 60.0  # s of computing that a command begins without being told to
+LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
-BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
+BASE = 1.6e8  # bytes: Python, its libraries, and a batch of the solver
 SURE = 10.0  # factor by which the assumed seconds may be wrong
-ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that tell how long others take
-LOADING = 20.0  # times what is usual: a batch that takes longer has loaded or compiled code
+ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that suffice to time them
+LOADING = 20.0  # times the median: a batch that takes longer has loaded or compiled code
 
 # Assumed seconds, for each place of the body where forces are evaluated; measured 3.5e-6 to 6e-6 by NumPy and 0.7e-6 to
 # 1.8e-6 compiled in dry media, 0.4e-6 and 0.2e-6 in a linear one; and for each batch of balances, however small.
@@ -83,7 +83,7 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     decided = is_clear or cost.memory > LARGEST
     listen(
         nobody if decided else _Watch(cost, judge)
-    )  # what an earlier part of the request took says nothing of this one
+    )  # times of an earlier part of the request do not apply to this one
     if decided:
         judge(cost)
 
@@ -98,7 +98,7 @@ class _Watch:
 
     def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
         self.cost, self.judge, self.over = cost, judge, False
-        self.back_end = preferred()  # which threads of the solver do not know
+        self.back_end = preferred()  # threads of the solver do not inherit it
         self.last: float | None = None
         self.batches: list[tuple[float, float]] = []  # (seconds, those assumed)
 

@@ -44,7 +44,7 @@ class Computation:
         return f"{self.title}: {100 * fraction:.0f} % after {seconds:.0f} s, about {remaining:.0f} s to go"
 
 
-_under_way: ContextVar[Computation | None] = ContextVar("course", default=None)
+_current: ContextVar[Computation | None] = ContextVar("course", default=None)
 
 
 def counted(items: Iterable, count: int, progress: Callable | None) -> Iterator:
@@ -60,7 +60,7 @@ def progress(title: str, bar: bool = True):
     """Yield a function that takes the fraction done and shows it: in a notebook as a bar; on a terminal, too, unless
     ``bar`` is False; else as lines on standard error. Inside another computation it is a part of that, under its own
     title."""
-    outer = _under_way.get()
+    outer = _current.get()
     if outer is not None:
         before = outer.title, outer.fraction, outer.start
         outer.begin(title)
@@ -70,12 +70,12 @@ def progress(title: str, bar: bool = True):
             outer.title, outer.fraction, outer.start = before
         return
     computation = Computation(title)
-    token = _under_way.set(computation)
+    token = _current.set(computation)
     try:
         with _display_for(bar)(computation):
             yield computation.reached
     finally:
-        _under_way.reset(token)
+        _current.reset(token)
 
 
 def _display_for(bar: bool) -> Callable:
@@ -132,7 +132,7 @@ def _in_pipe(computation: Computation):
 
     def speak():
         while not over.wait(EVERY):
-            with contextlib.suppress(OSError, ValueError, AttributeError):  # nobody need listen
+            with contextlib.suppress(OSError, ValueError, AttributeError):  # the pipe may be closed
                 print(computation, file=sys.stderr, flush=True)
 
     speaker = threading.Thread(target=speak, daemon=True)

@@ -19,7 +19,7 @@ UNHEARD = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(sig
 
 def pool(count: int) -> ProcessPoolExecutor:
     """Return so many processes, each of one thread of BLAS, that start with the tasks they get."""
-    with _environment({"PYTHONWARNINGS": "ignore"}):  # else it warns, after a kill, of what it then removes
+    with _environment({"PYTHONWARNINGS": "ignore"}):  # else it warns, after a kill, of the resources that it removes
         resource_tracker.ensure_running()
     return ProcessPoolExecutor(count, Context(), begin)
 

@@ -19,7 +19,7 @@ from geomech.io.files import hidden, note
 from rft.refusal import Refusal
 
 CHECKPOINT = 2.0  # s between writes; a request that takes less writes nothing
-LARGEST = 6_000_000_000  # bytes of results in a file, as the largest sweep has; what is beyond is computed again
+LARGEST = 6_000_000_000  # bytes of results in a file, as of the largest sweep; further ones are not stored
 OURS = 0x67656F6D  # application_id of our files
 DAMAGED = sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR  # the last where tables are not ours
 ARRAY = 1  # code of arrays in a value
@@ -92,7 +92,7 @@ class Store:
             return None
         try:
             return (decoded(row[0], kind),)
-        except (ValueError, TypeError):  # of msgspec's among them
+        except (ValueError, TypeError):  # msgspec's errors among them
             return None
 
     def put(self, key: bytes, value: Any, kind: Any) -> None:
@@ -155,7 +155,7 @@ class Store:
                 instead="remove it, or choose another output",
             )
         self._try(self._connect)
-        while self.db is not None and not self.path.exists():  # who had it has removed it a moment ago
+        while self.db is not None and not self.path.exists():  # its owner has removed it a moment ago
             self._disconnect()
             self._try(self._connect)
 
@@ -186,7 +186,7 @@ class Store:
         """Return act(...); None after an error of the file, which is then replaced or given up."""
         try:
             return act(*arguments)
-        except (sqlite3.Error, OSError, UnicodeError) as error:  # the last of names in a damaged file
+        except (sqlite3.Error, OSError, UnicodeError) as error:  # UnicodeError: of names in a damaged file
             code = getattr(error, "sqlite_errorcode", 0) & 0xFF
             if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 self._disconnect()
@@ -212,7 +212,7 @@ class Store:
         try:
             other = next(name for name in names if not os.path.lexists(name))
             self.path.rename(other)
-            self._unlink()  # the journal, which is the other one's
+            self._unlink()  # the journal of the renamed file
         except (OSError, StopIteration) as error:
             self._lose(error)
             return
@@ -224,7 +224,7 @@ class Store:
         self.lost, self.new = True, {}
         if self.db is not None:
             with contextlib.suppress(sqlite3.Error):
-                self.db.execute("ROLLBACK")  # what is written stays, and the lock
+                self.db.execute("ROLLBACK")  # earlier results stay, and so does the lock
 
 
 def partial_file(output: Path) -> Path:

@@ -63,7 +63,7 @@ class Adjustable(Protocol):
 def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
     """Return the question of an accuracy study of a scene: a displacement, forces along a motion, or the speed of a
     robot."""
-    kinds = {"robot": "walking", "intruder": "intrusion"}  # each loaded where it is asked for
+    kinds = {"robot": "walking", "intruder": "intrusion"}  # loaded only where needed
     module = next((module for part, module in kinds.items() if hasattr(scene, part)), "tiered")
     kind = import_module(f"geomech.study.{module}").Settings
     return kind(scene) if runs is None else kind(scene, runs)

@@ -28,7 +28,7 @@ SIZES = {
     "length": "m",
     "depth": "m",
     "density": "kg/m^3",
-}  # of the rod and the bed, as options have them
+}  # of the rod and the bed, by the names of options
 
 MOST_LINES = 60  # of a table of residuals
 
@@ -157,7 +157,7 @@ def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float |
         rod = Rod(**{**measured.sizes, **sizes})
         data = rod_drag(*measured.rows)
         calibration = OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
-        calibration.toml()  # what no medium can be, such as a k of thousands, is refused here
+        calibration.toml()  # refuses impossible media, such as a k of thousands
     return calibration
 
 

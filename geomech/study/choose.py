@@ -21,7 +21,7 @@ from rft.checks import is_number, real_array
 from rft.refusal import Refusal
 
 MOST_PHASES = 1 << 16
-FINEST_PIECES = 640  # that a tolerance asks for
+FINEST_PIECES = 640  # of body, for a tolerance
 
 
 def cheapest(
@@ -66,7 +66,7 @@ def cheapest(
         ask(cost.predicted(scene, plans[method], len(amplitudes)))
         try:
             checked = study.displacement(method, gait, amplitudes[checked])
-        except ValueError:  # the gait leaves the field or the family: this tier cannot say
+        except ValueError:  # the gait leaves the field or the family of this tier
             continue
         if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
             poses = study.displacement(method, gait, amplitudes)
@@ -77,10 +77,10 @@ def cheapest(
                 return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
-        settled_at = " and ".join(f"{n} {name}" for name, n in settings.items())
+        settings_text = " and ".join(f"{n} {name}" for name, n in settings.items())
         finer = "lower [numerics] regularisation and tolerance" if solver_of(system) else "take a finer table"
         raise Refusal(
-            f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settled_at})",
+            f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settings_text})",
             where=scene.name,
             instead=f"raise --tol, or {finer}",
         )

@@ -25,8 +25,8 @@ from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
 
-CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, measured for those that ship, assumed for others
-LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number of it that this sums; measured
+CLOSED = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
+LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number that it sums; measured
 CYCLES = 3  # until they repeat, assumed
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
 TABLES = 4  # of a table while it is built, interpolated and written
@@ -144,7 +144,7 @@ def direct(
     ]
     return jobs + (
         frame(scene) * groups * (len(runs) - 1) if isinstance(system, Framed) else []
-    )  # other models have their own
+    )  # other models have frames of their own
 
 
 def cycles_of(system: System) -> int:

@@ -21,9 +21,9 @@ from geomech.study.grid import Grid, at_points
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import at_once
 
-POINT_BYTES = 200  # bytes of a point: its row, and what becomes of it on the way to a file
-MAKING = 6e-4  # s that a scene takes to be made of its tables, measured
-SAMPLES_TOGETHER = 64  # gaits run side by side: enough to fill the solver, few enough to lose little when stopped
+POINT_BYTES = 200  # bytes of a point: its row, and copies of it on the way to a file
+MAKING = 6e-4  # s to build a scene from its tables, measured
+SAMPLES_TOGETHER = 64  # gaits of a batch: enough to fill the solver, few enough to lose little when stopped
 WIDTH = 5  # numbers of a point: x, y, theta and the errors of position and heading
 AMPLITUDE = "gait.amplitude"
 FREQUENCIES = "gait", "physical", "effects", "frequency"  # sections that have one, and its key

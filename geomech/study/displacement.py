@@ -71,7 +71,7 @@ class Cheapest(Question):
             refuse_costless(self.scene)
 
     def cost(self) -> Cost:
-        # What a tolerance takes is known only once a tier has run: `allow` is asked before each.
+        # The cost of a tolerance is known only once a tier has run: `allow` is called before each.
         return cost.price(self._more)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:

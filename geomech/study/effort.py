@@ -35,9 +35,9 @@ from rft.premise import ALL, SHAPE_ALONE
 from rft.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
-HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
+HIGHEST = 14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
 METRIC = "of the system's own metric"
-EVEN = 1e-6  # of the power: a solver's rounding is below it
+EVEN = 1e-6  # of the power: above a solver's tolerance
 
 
 def why_none(system: System) -> str:
@@ -108,7 +108,7 @@ def with_harmonics(
     seen = _Watched(system)
     harmonics = harmonic.table(seen, numerics).build(progress)
     P, size = np.concatenate(seen.powers), np.prod([len(a) for a in harmonics.axes])
-    P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
+    P = np.concatenate([P, P[: size - len(P)][::-1]])  # with mirror symmetry half of the grid is solved
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
     return harmonics, metric.of_samples(F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST)
@@ -176,7 +176,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         rates = _rates(system, *shapes)
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
-        if system.traits.steps:  # a step rests on the one before: fewer phases are other steps
+        if system.traits.steps:  # each step depends on the one before: fewer phases are other steps
             half, quarter = (integral(_rates(system, *amplitudes)) for amplitudes in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
@@ -199,7 +199,7 @@ def _rates(system: System, alpha, alphadot) -> np.ndarray:
     """Return the integrands of path length and work, (B, 2, N), nan where there is none."""
     degree = system.traits.power_degree
     own = capability(system, OwnMetric)
-    if own is not None:  # a metric, of which there is no work
+    if own is not None:  # a metric has no work
         square = np.asarray(own.squared_speed(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
     work = system.run(alpha, alphadot, True).work

@@ -22,13 +22,13 @@ from rft.refusal import located
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
 )
-FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still makes a gait
-REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
-MOST_PIECES = 10_000  # to a body length
+FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still resolves a gait
+REFERENCE_PHASES = 64  # of that comparison without the direct tier in the request
+MOST_PIECES = 10_000  # per body length
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
-SEEN = 1.2  # times the difference to finer rounding and exact integrals: nearly all of the error is in it
+SEEN = 1.2  # times the difference from smaller regularisation and exact integrals, which is nearly all of the error
 SEEN_BY_RULES = (
-    3.5  # between two rules of an order of 1 in dry media, and for position and heading half of the larger: chance
+    3.5  # likewise between two rules, of order 1 in dry media; at least half of the larger of both, as they scatter
 )
 ROUNDING = 2e-16  # of a velocity
 
@@ -61,7 +61,7 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
     )
     one = (
         _direct if scene.system.traits.steps else partial(runner().call, _direct)
-    )  # pieces of steps are stored by themselves
+    )  # time stepping stores its own checkpoints
     with located(scene.name):
         return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, group, phases) for group in groups)))
 
@@ -75,7 +75,7 @@ def _direct(
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
     strided = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
-    if stepping:  # a step rests on the one before: fewer phases are other steps
+    if stepping:  # each step depends on the one before: fewer phases are other steps
         eighth, coarse, half, full = *(_with_fewer(system, *fewer) for fewer in strided[:3]), run.net
     else:
         eighth, coarse, half = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2))

@@ -83,7 +83,7 @@ def variables(study: Study) -> list[Variable]:
     if not effort.why_none(study.scene.system):
         variables += of_metric(
             study.metric, capability(study.scene.system, OwnMetric) is None
-        )  # before the harmonics, whose velocities it may share
+        )  # before the harmonics, as they may share velocities
     if (harmonics := study.harmonics) is not None:
         variables += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:

@@ -16,7 +16,7 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 LARGEST = 100_000_000  # points
-MOST = 200  # values of a parameter, each of which is seen to make a scene, which takes some 0.5 ms
+MOST = 200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Grid:
         outer = [self.over[name] for name in self.names if name != self.inner]
         yield from itertools.product(*([v[0], v[-1]] for v in outer))
         for k, values in enumerate(outer):
-            some = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
-            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in some)
+            tested = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
+            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in tested)
 
     def arranged(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (`total`, width) as an array (N_1, ..., width) over the parameters in the order given."""

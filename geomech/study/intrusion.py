@@ -22,8 +22,8 @@ UNITS = {
     "z": "m",
     "force": "N",
     "moment": "N m",
-}  # by what names begin with
-MARGIN = 1.125  # of the estimate over what its order says: covers the error of 95 of 100 motions of outlines, measured
+}  # by the first part of names
+MARGIN = 1.125  # factor on the extrapolation by order: covers the error of 95 of 100 motions of outlines, measured
 
 
 @dataclass(frozen=True)

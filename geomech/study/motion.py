@@ -22,8 +22,8 @@ from rft.premise import Premise
 from rft.refusal import Refusal, located
 
 MOST_CYCLES = 10_000
-WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
-ROWS_TOGETHER = 1 << 20  # numbers of a table that are held at a time
+WORDS = 2e-6  # s to compute and write a number of a table; some two times the measured time
+ROWS_TOGETHER = 1 << 20  # numbers of a table in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +167,9 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
     system, phases = scene.system, scene.numerics.phases
     jobs = direct(scene, scene.gait, 1, phases, checked=False)
     if system.traits.steps and not settling(system):
-        # Each goes on from the one before; cycles that are alike are run first.
-        settled_cycles = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
-        times = (settled_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
+        # Each continues the one before; cycles up to the limit cycle are run first.
+        first_cycles = 0 if system.traits.lacks & Premise.SE2_SYMMETRIC else cycles_of(system)
+        times = (first_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     total, rows = price(jobs), cycles * phases + 1
     width = 2 * (costed(system).elements + 1) + system.joints + 5

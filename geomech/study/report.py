@@ -27,7 +27,7 @@ from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
 from rft.refusal import Refusal, located
 
-AMPLITUDES = 10  # or so, in the study that is made of each gait
+AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
 ADDED = "not in the scene: added because Fig. 11(e) compares the two gaits of the three-link swimmer"
 

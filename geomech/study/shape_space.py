@@ -26,7 +26,7 @@ from geomech.tiers.fitted import fits
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
-MOST_PAIRS = 10  # of joints in a figure: those of five
+MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
 class Space(NamedTuple):

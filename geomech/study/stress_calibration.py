@@ -17,9 +17,9 @@ from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_
 from rft.plates.survey import survey
 from rft.refusal import Refusal, located
 
-KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # as files have them: B-11 for Bm11
+KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # in files: B-11 for Bm11
 MOST_LINES = 60  # of a table of residuals
-SEEN = 3.0  # standard errors from which on a depth of zero that is off is told
+SEEN = 3.0  # standard errors of a wrong zero of depth from which on it is noted
 GIVEN = "give a CSV file with columns depth_m,force_N"
 
 

@@ -39,7 +39,7 @@ from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
-SAMPLES = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
+SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
 
 
 class Study(Faced):
@@ -86,7 +86,7 @@ class Study(Faced):
         """Return the value of build(), the seconds that it took, and whether it was stored before."""
         key = name, self.scene.system, key
         if not (exists := key in self._tables):
-            import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
+            import scipy.interpolate  # noqa: F401  loaded here, so that no look-up is charged for it
 
             self._tables[key] = timed(build)
         return *self._tables[key], exists
@@ -272,7 +272,7 @@ class Study(Faced):
         the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
         call."""
         gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
-        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # refuses, before the rest
+        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
         seconds, stored = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
@@ -281,7 +281,7 @@ class Study(Faced):
         order = [*TIERS]
         for method in sorted(
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
-        ):  # others are checked with direct
+        ):  # the direct tier first, as the reference of others
             if chosen[method].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
                 reference, seconds[method] = timed(direct)
@@ -304,7 +304,7 @@ class Study(Faced):
         field, seconds, stored = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
-        for method in sorted(tables, key=of_field, reverse=True):  # the field is the picture, too
+        for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
             name = "field" if of_field(method) else f"{method} table"
             if name not in seconds:
                 with located(self.scene.name):

@@ -75,7 +75,9 @@ class Batched(Protocol):
 def batched(scene: Any) -> Batched:
     """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
     kind, module = ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
-    return getattr(import_module(f"geomech.study.{module}"), kind)()  # robots take as long to load as all else
+    return getattr(
+        import_module(f"geomech.study.{module}"), kind
+    )()  # loaded only where needed: robots take as long to load as all else
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class Sweep(Question):
         return self.question.cost(self.grid)
 
     def check(self) -> None:
-        _ = self.grid  # every point makes a scene
+        _ = self.grid  # refuses points that make no scene
 
     def cost(self) -> Cost:
         return self._cost
@@ -125,12 +127,12 @@ def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
     points, inner_values = grid.points, grid.inner_values
     count, completed = len(inner_values or [0]), 0
     while completed < grid.total:
-        k, j = divmod(completed, count)  # points, of which the inner values run fastest
+        k, j = divmod(completed, count)  # inner values vary fastest
         most = question.together(grid.at(points[k]))
         indices = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
         values = inner_values[j : j + most] if inner_values else None
         batch = [points[i] for i in indices]
-        # Files need not be where it is computed.
+        # Workers may lack the files, so they receive scenes.
         yield [grid.at(p) for p in batch] if grid.scene.files else batch, values
         completed += len(indices) * len(values or [0])
 

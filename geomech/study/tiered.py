@@ -25,14 +25,14 @@ from rft.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096
-TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
+TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
 KNOBS = tuple(
     replace(knob, tier=tier.name)
     for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
     for knob in tier.knobs
-)  # of the truth first, then of one gait's family, then of fields
+)  # the direct tier's first, then those of one gait's family, then those of fields
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Settings:
         setting = knob.setting or knob.name
         if value is not None:
             return scene.with_numerics(**{setting: f"{knob.rule}:{value}" if knob.rule else value})
-        if setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
+        if setting == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
             return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
         return scene.with_numerics(**{setting: FINEST[setting]})
 
@@ -144,7 +144,7 @@ def applies(knob: Knob, scene: Scene) -> bool:
     if setting == "regularisation" and solver_of(system) is None:
         return False
     of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points per joint: hours
         return False
     if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False

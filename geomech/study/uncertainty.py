@@ -23,11 +23,11 @@ from geomech.systems.capabilities import Uncertain, at_once, capability
 from geomech.tiers.base import in_groups
 from rft.refusal import Refusal, located
 
-PHASES = 64  # of a cycle: changes of displacement are wanted to a per cent, not displacements
+PHASES = 64  # of a cycle: enough for changes of displacement to a per cent
 NONLINEAR = 1.02  # times the linear standard deviation, from which on the second order counts
 DEVIATIONS = np.sqrt(3.0)  # standard deviations, of sigma points
-SHIFTED = 0.1  # of a standard deviation, from which on a shift of the mean is told
-SEEN = 1e-6  # body lengths or rad: smaller standard deviations, of second order, are rounding
+SHIFTED = 0.1  # of a standard deviation, from which on a shift of the mean is printed
+SEEN = 1e-6  # body lengths or rad: smaller standard deviations of second order are roundoff
 
 
 def root(covariance) -> np.ndarray:

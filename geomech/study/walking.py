@@ -29,25 +29,25 @@ from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
 
-PILOT = 0.05  # s of time steps that tell how long others take
+PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
-TOGETHER = 32  # robots side by side
+TOGETHER = 32  # robots in a batch
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = {"numpy": 2.2e-3, "numba": 2e-4}  # s of computing, for a robot by itself,
-MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each beside it, measured
-STEP = 200.0  # balances, of time by NumPy
+MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each further one of a batch, measured
+STEP = 200.0  # balances that take NumPy as long as a time step
 ALONE = 5e-3  # s, in three dimensions,
-OWN = 3e-2  # and of a machine of one's own, whose wheels stick and slip: 5e-3 to 5e-2 measured
+OWN = 3e-2  # and of a custom machine, whose wheels stick and slip: 5e-3 to 5e-2 measured
 HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
-PUSHED = 0.2  # of gravity, by which legs that are much faster than the body speed it up, measured
-IN_VAIN = 40  # cycles that a search for a limit cycle and its errors take where there is none, many at once
-TO_COME = 1.5  # times what twice the elements change: all that more would; up to 1.49 measured, 4/3 of order 2
-WALKING = 0.7  # of the time, before the errors are asked for
+PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
+IN_VAIN = 40  # cycles of a failing search for a limit cycle with its errors, many at once
+TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+WALKING = 0.7  # share of the time before the errors are computed
 UNITS = {  # of a walk's table; a positive pitch is nose down
     "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
     "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
 }  # fmt: skip
-LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
+LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
 KNOBS = (
     Knob("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
     Knob("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
@@ -187,7 +187,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     numerics, how = scene.numerics, by or scene.engine
     planar = how == "planar"
     together = TOGETHER if planar else 1
-    own = isinstance(scene.robot, Mjcf)  # which may never come to a limit cycle
+    own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
@@ -227,7 +227,7 @@ class Walks:
         return grid
 
     def together(self, scene: WalkerScene) -> int:
-        # Engines other than the planar one walk one robot after the other: each tells how far it is.
+        # Other engines walk one robot after the other, which also shows progress.
         return TOGETHER if scene.engine == "planar" else 1
 
     def rows(self, scenes: list[WalkerScene], inner_values: None) -> np.ndarray:
