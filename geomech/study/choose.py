@@ -52,10 +52,10 @@ def cheapest(
         more = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
         return Displacements(tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more))
 
-    checked = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
+    sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
     if study.lookups:
-        pilot, settings = _refined(scene, gait, amplitudes[checked], tol / 4, phases, ask)
+        pilot, settings = _refined(scene, gait, amplitudes[sampled], tol / 4, phases, ask)
         phases = settings["phases"]
     plans = {m: study.plan(m, gait, amplitudes) for m in study.lookups}
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
@@ -65,7 +65,7 @@ def cheapest(
             break
         ask(cost.predicted(scene, plans[method], len(amplitudes)))
         try:
-            checked = study.displacement(method, gait, amplitudes[checked])
+            checked = study.displacement(method, gait, amplitudes[sampled])
         except ValueError:  # the gait leaves the field or the family of this tier
             continue
         if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:

@@ -177,7 +177,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
         if system.traits.steps:  # each step depends on the one before: fewer phases are other steps
-            half, quarter = (integral(_rates(system, *amplitudes)) for amplitudes in fewer)
+            half, quarter = (integral(_rates(system, *coarser)) for coarser in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
             half, quarter = (integral(rates[..., ::step]) for step in (2, 4))
