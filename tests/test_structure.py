@@ -112,6 +112,7 @@ def test_mutants_are_made_of_all_files_that_exist_and_watched_by_tests_that_do()
     keys = *mutants.TABLE["tests"], *mutants.TABLE["unwatched"]
     assert [key for key in keys if not any(f.startswith(key) for f in files)] == []
     assert [f for f in files if not f.startswith(keys)] == []
+    assert [x["file"] for x in mutants.TABLE["equivalent"] if x["file"] not in files] == []
     text = {p.stem[5:]: p.read_text() for p in (ROOT / "tests").glob("test_*.py")}
     assert {name for names in mutants.TABLE["tests"].values() for name in names} <= set(text)
     slow = [(name, x.partition("[")[0]) for name, some in mutants.TABLE["slow"].items() for x in some]
