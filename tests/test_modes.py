@@ -17,6 +17,7 @@ from geomech.scene import Scene
 from geomech.study import fields, sweep
 from geomech.study.bench import Study
 from geomech.study.offer import tiers
+from geomech.study.report import is_three_link
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
@@ -200,7 +201,7 @@ def test_a_serpenoid_has_one_wave_if_it_does_not_say():
 def test_names_of_shape_variables():
     assert shape_labels(Swimmer(SAND, MODES)) == (("m_1", "rad"), ("m_2", "rad"))
     assert shape_labels(Swimmer(SAND, PLAIN)) == (("alpha_1", "rad"), ("alpha_2", "rad"), ("alpha_3", "rad"))
-    assert not Swimmer(SAND, Chain(modes="serpenoid")).three_link  # no published gaits beside its own
+    assert not is_three_link(Swimmer(SAND, Chain(modes="serpenoid")))  # no published gaits beside its own
 
 
 # Waves.

@@ -17,6 +17,7 @@ from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
 from geomech.study.bench import Study
+from geomech.study.report import is_three_link
 from geomech.study.single import single
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
@@ -215,7 +216,7 @@ def test_whatever_has_a_velocity_is_a_system():
 def test_three_links_are_a_chain_of_three_and_nothing_else():
     """The published gaits, circle and butterfly, are compared for these alone."""
     bodies = Chain((1, 2, 1)), Chain((1,) * 4), Chain((1,) * 3, modes=((1.0, 0.5), (0.0, 1.0))), Serpenoid(12)
-    assert [Swimmer(Coulomb(), body).three_link for body in bodies] == [True, False, False, False]
+    assert [is_three_link(Swimmer(Coulomb(), body)) for body in bodies] == [True, False, False, False]
 
 
 def test_points_on_either_side_of_a_change_of_sign_are_crossed():

@@ -16,7 +16,7 @@ from geomech.study.bench import Study
 from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit, shape_labels
-from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
+from geomech.systems.capabilities import Drawable, Stepped, balance_size, capability, settling
 from rft.checks import is_whole
 from rft.premise import Premise
 from rft.refusal import Refusal, located
@@ -170,7 +170,7 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
         times = (alike + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     found, rows = price(jobs), cycles * phases + 1
-    width = 2 * (costed(system).elements + 1) + system.joints + 5
+    width = 2 * (balance_size(system).elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
     words = WORDS * rows * width
     return found._replace(seconds=found.seconds + words, memory=found.memory + memory, besides=found.besides + words)

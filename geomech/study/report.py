@@ -25,6 +25,7 @@ from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
+from rft.bodies import Chain
 from rft.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, in the study that is made of each gait
@@ -101,9 +102,14 @@ def cost(scene: Scene) -> Cost:
 
 def _gaits(scene: Scene) -> list[Gait]:
     """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it, at the same frequency."""
-    three_link = isinstance(scene.system, Swimmer) and scene.system.three_link
-    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency)) if three_link else ()
-    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
+    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency))
+    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait) and is_three_link(scene.system))]
+
+
+def is_three_link(system: System) -> bool:
+    """Return whether a system is the three-link swimmer, for which the published gaits were made."""
+    body = system.body if isinstance(system, Swimmer) else None
+    return isinstance(body, Chain) and len(body.lengths) == 3 and body.modes is None
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
