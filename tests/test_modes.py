@@ -15,7 +15,7 @@ from geomech.geometry.coordinates import change_velocity
 from geomech.output import mat
 from geomech.scene import Scene
 from geomech.study import fields, sweep
-from geomech.study.bench import Study
+from geomech.study.bench import Study, refuse_outside
 from geomech.study.offer import tiers
 from geomech.study.report import is_three_link
 from geomech.systems import Swimmer, Table
@@ -287,4 +287,4 @@ def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     save(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
     assert shape_labels(Table(tmp_path / f"twice.{ending}")) == shape_labels(again)
     with pytest.raises(ValueError, match="m_1 = .* lies outside"):
-        Study(Scene(again, Circle(amplitude=9.0))).refuse_outside()
+        refuse_outside(Scene(again, Circle(amplitude=9.0)))

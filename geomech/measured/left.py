@@ -38,7 +38,7 @@ class Left(NamedTuple):
 
 def left(known: Known, samples: Samples, varies: int) -> Left:
     """What ``known`` leaves of the samples, and cuts off."""
-    told = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms_at(samples.phase, alpha, rate))
+    told = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms(samples.phase, alpha, rate))
     all_of_it = samples.xi - told(samples.alpha, samples.rate)
     residual = np.sqrt((all_of_it**2).mean(0) / (samples.rate**2).sum(-1).mean())
     explained = 1 - (all_of_it**2).mean(0) / samples.xi.var(0).clip(1e-300)

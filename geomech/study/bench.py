@@ -35,7 +35,6 @@ from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
 from geomech.tiers.harmonic import HARMONIC
-from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
@@ -75,12 +74,6 @@ class Study(Faced):
 
     methods = property(lambda self: methods(self.scene.system))
     tiers = property(lambda self: tiers(self.scene.system))
-
-    @property
-    def lookups(self) -> tuple[str, ...]:
-        """Tiers that approximate the system's velocity, of those that say something of it."""
-        s = self.scene
-        return tuple(m for m in self.tiers if not TIERS[m].plan(s.system, s.numerics, s.gait, None).exact)
 
     def _stored(self, name: str, key: tuple, build: Callable):
         """Return (what is built, the seconds that took, whether it was there before)."""
@@ -124,26 +117,13 @@ class Study(Faced):
         with located(self.scene.name):
             return self._built(plan.table, progress)[0] if plan.table else None
 
-    def refuse_connection(self) -> None:
-        """Refusal if the system has no connection."""
-        with located(self.scene.name):
-            fitted.refuse(self.scene.system)
-
-    @property
-    def has_connection(self) -> bool:
-        """Whether the system has a connection, and joints so few that a plain study fits it."""
-        return PATH.is_offered(self.scene.system)
-
-    def compute_field(self, progress: Callable | None = None) -> None:
-        """Fill `fitted` now, telling ``progress`` the fraction done."""
-        self._fitted(progress)
-
     @property
     def fitted(self) -> Connection:
         """The least-squares connection on the scene's grid."""
-        return self._fitted()
+        return self.compute_field()
 
-    def _fitted(self, progress: Callable | None = None) -> Connection:
+    def compute_field(self, progress: Callable | None = None) -> Connection:
+        """`fitted`, telling ``progress`` the fraction done."""
         with located(self.scene.name):
             fitted.refuse(self.scene.system)
             return self._built(self._connection(), progress)[0]
@@ -241,14 +221,6 @@ class Study(Faced):
         plan = self.plan(method, gait, amplitudes)
         return plan.spread(self._looked_up(plan), amplitudes)
 
-    def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
-        """ValueError if the gait, or the scene's own, leaves the field that is looked up. phases: those of the scene."""
-        system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
-        field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
-        shapes = lambda some: inside(field, gait.cycle(phases, some)[0], names)[:, 0]
-        in_groups(shapes, every, at_once(system, phases))
-
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
         system, phases = self.scene.system, phases or self.scene.numerics.phases
@@ -336,8 +308,17 @@ class Study(Faced):
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
                 self._refuse_singular(plan, gait, some, phases)
             if any(plan.table and plan.table.axes for plan in chosen.values()):
-                self.refuse_outside(gait, some, phases)
+                refuse_outside(scene, gait, some, phases)
         return gait, amplitudes, chosen
+
+
+def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+    """Raise Refusal if a gait, or the scene's own, leaves the field that is looked up. phases: those of the scene."""
+    system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
+    field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    shapes = lambda some: inside(field, gait.cycle(phases, some)[0], names)[:, 0]
+    in_groups(shapes, every, at_once(system, phases))
 
 
 def _tier(name: str) -> Tier:

@@ -17,6 +17,7 @@ from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import Drawable, Stepped, balance_size, capability, settling
+from geomech.tiers.path import PATH
 from rft.checks import is_whole
 from rft.premise import Premise
 from rft.refusal import Refusal, located
@@ -119,7 +120,7 @@ class Picture(Question):
 
     @property
     def _mapped(self) -> bool:
-        return self.scene.system.joints == 2 and self.study.has_connection
+        return self.scene.system.joints == 2 and PATH.is_offered(self.scene.system)
 
     def cost(self) -> Cost:
         costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]

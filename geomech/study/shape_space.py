@@ -15,14 +15,14 @@ from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import fields
-from geomech.study.bench import Study
+from geomech.study.bench import Study, refuse_outside
 from geomech.study.cost import Job, frame, harmonics, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored
-from geomech.tiers.fitted import fits
+from geomech.tiers.fitted import fits, refuse
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -104,11 +104,11 @@ class ShapeSpace(Question):
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
         with located(name):
-            self.study.refuse_connection()
+            refuse(system)
             if (self.map or self.planes) and system.joints == 1:
                 raise Refusal(NO_MAP)
             if self.gait:
-                self.study.refuse_outside()
+                refuse_outside(self.scene)
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.beside is not None and len(self._at) > 1:
