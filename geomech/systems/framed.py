@@ -145,12 +145,11 @@ class Framed:
     def with_solver(self, solver) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(solver))
 
-    def in_frame(self, frame: str) -> System:
-        return self if frame == NAME else in_frame(self.inner, frame)
-
 
 def in_frame(system: System, frame: str) -> System:
     """Return a system seen from another of its frames; ValueError if it has none of that name."""
+    if isinstance(system, Framed):
+        return system if frame == NAME else in_frame(system.inner, frame)
     if own := getattr(system, "in_frame", None):
         return own(frame)
     if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:
