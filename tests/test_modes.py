@@ -17,9 +17,9 @@ from geomech.scene import Scene
 from geomech.study import fields, sweep
 from geomech.study.bench import Study, refuse_outside
 from geomech.study.offer import tiers
-from geomech.study.report import is_three_link
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
+from geomech.systems.swimmer import is_three_link
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"

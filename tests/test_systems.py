@@ -17,13 +17,12 @@ from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
 from geomech.study.bench import Study
-from geomech.study.report import is_three_link
 from geomech.study.single import single
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
 from geomech.systems.capabilities import stored
 from geomech.systems.framed import in_frame
-from geomech.systems.swimmer import Solver
+from geomech.systems.swimmer import Solver, is_three_link
 from geomech.text.explain import explain
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2

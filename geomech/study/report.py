@@ -18,14 +18,13 @@ from geomech.study.bench import Study
 from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
-from geomech.systems import Swimmer
 from geomech.systems.base import System, refuse_singular
 from geomech.systems.capabilities import near
+from geomech.systems.swimmer import is_three_link
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
-from rft.bodies import Chain
 from rft.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, in the study that is made of each gait
@@ -104,12 +103,6 @@ def _gaits(scene: Scene) -> list[Gait]:
     """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it, at the same frequency."""
     more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency))
     return [scene.gait, *(g for g in more if type(g) is not type(scene.gait) and is_three_link(scene.system))]
-
-
-def is_three_link(system: System) -> bool:
-    """Return whether a system is the three-link swimmer, for which the published gaits were made."""
-    body = system.body if isinstance(system, Swimmer) else None
-    return isinstance(body, Chain) and len(body.lengths) == 3 and body.modes is None
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:

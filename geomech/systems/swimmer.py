@@ -14,7 +14,7 @@ from geomech.core.work import iterate
 from geomech.geometry.images import around
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
+from geomech.systems.base import SYSTEMS, Cycle, System, refuse_mutable
 from geomech.systems.capabilities import BalanceSize, Drawable, Part, Stepped, Uncertain
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
@@ -277,6 +277,12 @@ def _has_joint_angles(body: rft.Body) -> bool:
     """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""
     plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
     return plain and getattr(body, "modes", None) is None
+
+
+def is_three_link(system: System) -> bool:
+    """Return whether a system is the three-link swimmer, for which the published gaits were made."""
+    body = system.body if isinstance(system, Swimmer) else None
+    return isinstance(body, rft.Chain) and len(body.lengths) == 3 and body.modes is None
 
 
 def name_in(kinds: dict, part) -> str:
