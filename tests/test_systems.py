@@ -229,5 +229,5 @@ def test_points_on_either_side_of_a_change_of_sign_are_crossed():
 )
 def test_effects_that_vary_see_pieces_or_whole_elements(body, pieces, seen):
     swimmer = Swimmer(Coulomb(), body, (Transient(travel=0.1),), Solver(pieces=pieces))
-    assert swimmer.cut == seen
-    assert dataclasses.replace(swimmer, effects=()).cut == 0
+    assert swimmer.balance_size.pieces == seen
+    assert dataclasses.replace(swimmer, effects=()).balance_size.pieces == 0

@@ -43,13 +43,6 @@ class Refinable(Protocol):
 
 
 @runtime_checkable
-class Subdivided(Protocol):
-    """A body that effects which vary along an element cut into pieces; read by estimates of the error that leaves."""
-
-    cut: int  # pieces to a body length; 0 without such effects
-
-
-@runtime_checkable
 class Dissipative(Protocol):
     """A body that does work against its medium; read by `geomech.study.effort` and `geomech.optimise`."""
 
@@ -111,11 +104,13 @@ class Stepped(Protocol):
 class BalanceSize(NamedTuple):
     """The size of a balance of forces, of one velocity; the defaults are those of a system that solves none.
 
-    elements: straight parts of the body. evaluations: places at which forces are evaluated. memory: numbers that time
-    stepping remembers. batched: whether there is a parameter for each amplitude, so that gaits belong together."""
+    elements: straight parts of the body. evaluations: places at which forces are evaluated. pieces: to a body length, into
+    which effects that vary along elements cut these, 0 without such effects. memory: numbers that time stepping remembers.
+    batched: whether there is a parameter for each amplitude, so that gaits belong together."""
 
     elements: int = 1
     evaluations: int = 1
+    pieces: int = 0
     memory: int = 0
     batched: bool = False
 
@@ -184,8 +179,7 @@ def stored(system: System, name: str) -> Any:
 
 def pieces_of(system: System) -> int:
     """Return the pieces to a body length that effects which vary along elements see; 0 without such effects."""
-    subdivided = capability(system, Subdivided)
-    return 0 if subdivided is None else subdivided.cut
+    return balance_size(system).pieces
 
 
 def refined(system: System) -> System | None:

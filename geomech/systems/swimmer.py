@@ -151,19 +151,14 @@ class Swimmer:
         return max(e.drift_tolerance for e in self.effects) if runs_on else 0.0
 
     @property
-    def cut(self) -> int:
-        """Pieces to a body length that effects which vary along elements see: as asked for, or whole elements where these
-        are shorter; 0 without such effects."""
-        if not any(e.varies_along for e in self.effects):
-            return 0
-        return max(self.solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
-
-    @property
     def balance_size(self) -> BalanceSize:
-        assembly = assemble(self.medium, self.body, self.effects, self.solver.loads, self.solver.pieces)
-        batched = any(np.ndim(getattr(e, name)) for e in self.effects for name in e.batched)
-        memory = sum(e.memory_size for e in self.effects)
-        return BalanceSize(assembly.n_elements, assembly.n_law_points, memory, batched)
+        solver, effects, pieces = self.solver, self.effects, 0
+        assembly = assemble(self.medium, self.body, effects, solver.loads, solver.pieces)
+        if any(e.varies_along for e in effects):  # see elements that are shorter than a piece whole
+            pieces = max(solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
+        batched = any(np.ndim(getattr(e, name)) for e in effects for name in e.batched)
+        memory = sum(e.memory_size for e in effects)
+        return BalanceSize(assembly.n_elements, assembly.n_law_points, pieces, memory, batched)
 
     def with_solver(self, solver: Solver) -> Swimmer:
         return dataclasses.replace(self, solver=solver)
