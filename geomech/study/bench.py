@@ -34,7 +34,6 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
-from geomech.tiers.harmonic import HARMONIC
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
@@ -137,13 +136,7 @@ class Study(Faced):
     def harmonics(self) -> Harmonics | None:
         """What of the velocity a plain study knows beyond its linear part; None where it has no such part, or too many
         joints."""
-        return self.compute_harmonics() if self.has_harmonics else None
-
-    @property
-    def has_harmonics(self) -> bool:
-        """Whether there are `harmonics`."""
-        system = self.scene.system
-        return not system.traits.linear and HARMONIC.is_offered(system)
+        return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of

@@ -23,6 +23,7 @@ from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored
 from geomech.tiers.fitted import fits, refuse
+from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -85,7 +86,7 @@ class ShapeSpace(Question):
 
     @property
     def _harmonics(self) -> bool:
-        return self.file and self.study.has_harmonics
+        return self.file and is_looked_up(self.scene.system)
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
