@@ -23,10 +23,21 @@ from geomech.gaits import Ellipse
 from geomech.systems import solver
 from geomech.text.explain import explain
 from geomech.text.system import described
-from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
+from rft import (
+    Backbone,
+    Chain,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    SkinFriction,
+    TowedSled,
+    body_velocity,
+    time_steps,
+)
 from rft.balance import backend
 from rft.balance import solver as balance
 from rft.balance.backend import Note
+from rft.balance.newton import Limits
 from rft.bodies import Elements
 from rft.contact import assemble
 from rft.effects import Effect
@@ -156,6 +167,23 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
         GLASS, BODY, alpha[7], alphadot[7], effects=[e.take(slice(7, 8)) for e in effects], backend="numba"
     )
     np.testing.assert_allclose(alone.xi, fast.xi[7], rtol=0, atol=1e-15)
+
+
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize(
+    "effects", [(), (EndCaps(radius=0.06, tail=1.0), SkinFriction(), TowedSled(1.0, 0.3))], ids=len
+)
+@pytest.mark.parametrize("body", [BODY, Backbone(19)], ids=["chain", "backbone"])
+def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
+    """Alone its elements share vectors, among others each has one for itself."""
+    from rft.balance.compiled import solve
+
+    rng = np.random.default_rng(8)
+    alpha, alphadot = rng.uniform(-0.4, 0.4, (body.joints, 40)), rng.normal(size=(body.joints, 40))
+    problem = assemble(GLASS, body, effects).problem(alpha, alphadot)
+    common = balance.QUICK, Limits(1e-6, 1e-10), None
+    alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
+    np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
 
 
 @pytest.mark.usefixtures("compiled_code")
