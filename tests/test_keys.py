@@ -41,22 +41,22 @@ EVERY = {  # section and name of every class that a scene may name, by kind of s
 ROOT = pathlib.Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("name", EVERY)
-def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(name):
+def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning():
     """In the annotation or the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
-    _, variant = EVERY[name]
-    fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
-    if not variant.file:
-        assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
-    for key in keys_in(variant):
-        place = (
-            f"{variant.kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
-        )
-        assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
-        assert 0 < len(key.unit) < 25, place
-        assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
-        assert worded(key.schema) != "value", f"{variant.kind.__name__}.{key.name}: of a type that no scene file has"
-        assert key.degrees == (key.unit == "rad")
+    for _, variant in EVERY.values():
+        fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
+        if not variant.file:
+            assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
+    for _, variant in EVERY.values():
+        for key in keys_in(variant):
+            place = f"{variant.kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
+            assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
+            assert 0 < len(key.unit) < 25, place
+            assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
+            assert worded(key.schema) != "value", (
+                f"{variant.kind.__name__}.{key.name}: of a type that no scene file has"
+            )
+            assert key.degrees == (key.unit == "rad")
 
 
 def test_keys_are_told_as_they_are():

@@ -19,6 +19,7 @@ from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous, se2
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID = Viscous(2.0)
 
 

@@ -161,7 +161,7 @@ def status(pid):
 OVER = {"body.length": [1.0, 2.0, 3.0], "medium.C": [1.5, 2.5], "gait.amplitude": [0.4, 0.8, 1.2]}
 
 
-@pytest.mark.parametrize("at_once", [2, 5, 64])
+@pytest.mark.parametrize("at_once", [2, 64])
 def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, monkeypatch):
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
     here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
@@ -214,10 +214,9 @@ def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, mo
     assert parts > 2 * len(few) and told == 2 * [(k + 1) / parts for k in range(parts)]
 
 
-@pytest.mark.parametrize(("name", "aim"), [("three-link-glass", "efficiency"), ("three-link-viscous", "displacement")])
-def test_searches_have_the_same_digits_whoever_computes(name, aim, two, given_away):
-    scene, told = scenes.load(name).with_numerics(grid=7, phases=32), []
-    request = checked(scene, aim, harmonics=1, starts=3)
+def test_searches_have_the_same_digits_whoever_computes(two, given_away):
+    scene, told = GLASS.with_numerics(grid=7), []
+    request = checked(scene, "efficiency", harmonics=1, starts=3)
     here, shared = both(two, lambda: search(request, told.append))
     assert here.numbers() | {"seconds": 0.0} == shared.numbers() | {"seconds": 0.0}
     assert here.best.gait == shared.best.gait and here.answers == shared.answers
@@ -284,12 +283,12 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
     monkeypatch.setattr(executors, "SIGNALS", [signal.SIGALRM])
     before = signal.signal(signal.SIGALRM, ring)
     try:
-        for k in range(12):
+        for k in range(4):
             with contextlib.suppress(Rung), using(2):
                 executor = runner().executor
                 assert each(executor, doubled, 2, range(3)) == [0, 2, 4]
                 pool = executor.pool
-                signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 7 * k % 50))
+                signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 13 * k))
                 each(executor, doubled, 2, itertools.count(), 10**9)
             begun = time.monotonic()
             pool._executor_manager_thread and pool._executor_manager_thread.join(5.0)
