@@ -36,6 +36,7 @@ FIVE = scenes.parse(FIVE_LINKS)
 
 
 LARGE = {
+    "values of a sweep": ["sweep", "sandfish-transient", "--over", "medium.C=1:2:99999", "-o", "out.nc"],
     "amplitudes of a sweep": ["sweep", "sandfish-loose", "--over", "gait.amplitude=0.1:2:99999", "-o", "out.nc"],
     "a grid": ["connection", "three-link-glass", "--grid", "1414", "-o", "out.nc"],
     "a field of four joints": ["connection", "five.toml", "-o", "out.nc"],
@@ -44,6 +45,7 @@ LARGE = {
     "directions": ["connection", "directions.toml", "-o", "out.nc", "--grid", "301"],
     "harmonics": ["displacement", "harmonics.toml", "--amplitudes", "1", "--methods", "harmonic", "--grid", "201"],
     "phases": ["run", "phases.toml", "-o", "out"],
+    "phases of many amplitudes": ["displacement", "phases.toml", "--amplitudes", "0.1:1:1000"],
     "elements": ["displacement", "elements.toml", "--amplitudes", "0.1:0.2:2000"],
     "time stepping": ["displacement", "sandfish-transient", "--amplitudes", "0.1:0.2:9999"],
     "a tolerance": ["displacement", "butterfly-glass", "--amplitudes", "0.1:1:99999", "--tol", "1e-5"],
@@ -63,7 +65,7 @@ def large(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("name", [n for n in LARGE if n not in ("accuracy", "phases")])
+@pytest.mark.parametrize("name", [n for n in LARGE if n != "phases"])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(run_cost, "ENOUGH", 0.05)  # what is refused is far beyond what may be
     before = sorted(p.name for p in large.iterdir())
