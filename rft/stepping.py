@@ -17,18 +17,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft import limit_cycle
-from rft.balance import checked_input
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check
 from rft.balance.newton import to_element
 from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
-from rft.checks import in_range, require
+from rft.checks import in_range
 from rft.contact import Assembly, Problem, assemble
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.laws.base import Medium
 from rft.premise import Premise
+from rft.refusal import require
 from rft.work import Work, element_work
 
 MOST_CYCLES = 60
@@ -261,7 +262,7 @@ class Stepping:
         return [self._problem(k) for k in range(self.phases)]
 
     def _problem(self, k: int) -> Problem:
-        return self.assembly.rescaled(self.assembly.problem(self.alpha[k], self.alphadot[k]), self.scales[k])
+        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on the past or the place."""
@@ -311,7 +312,7 @@ class Stepping:
         def problem_at(index):
             return problem if index.size == scale.size else problem.take(index)
 
-        return solve(problem_at, scale, self.accuracy, problem.law, self.assembly.n_law_points, self.backend, 1, guess)
+        return solve(problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess)
 
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles, extrapolated if cycles are to repeat."""

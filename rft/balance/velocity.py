@@ -16,6 +16,7 @@ from rft.contact import assemble
 from rft.effects.base import Effect, broken_premises, engine
 from rft.laws.base import Medium
 from rft.premise import negated
+from rft.refusal import Refusal
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
@@ -93,9 +94,11 @@ def body_velocity(
     ValueError
         For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
     """
-    if engine(effects) != "algebraic":
+    if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))
-        raise ValueError(f"no body velocity follows from shape alone where effects are {broken}: use rft.time_steps")
+        raise Refusal(
+            f"no body velocity follows from shape alone where effects are {broken}", instead="use rft.time_steps"
+        )
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
@@ -108,25 +111,26 @@ def body_velocity(
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
         index = np.flatnonzero(moving)
-        assembly, alpha, alphadot = assembly.take(index), alpha[:, index], alphadot[:, index]
+        assembly, alpha, alphadot, speed = assembly.take(index), alpha[:, index], alphadot[:, index], speed[index]
         guess = None if guess is None else guess[:, index]
 
     def problem_at(index):
-        if index.size == alpha.shape[1]:
-            return assembly.problem(alpha, alphadot)
-        return assembly.take(index).problem(alpha[:, index], alphadot[:, index])
+        if index.size == speed.size:
+            return assembly.problem(alpha, alphadot, speed)
+        return assembly.take(index).problem(alpha[:, index], alphadot[:, index], speed[index])
 
-    accuracy = Accuracy(regularisation, tolerance)
-    solved = solve(problem_at, speed[moving], accuracy, assembly.law, assembly.n_law_points, backend, threads, guess)
-    xi, residual, iterations, stuck, limit = solved if moving.all() else _with_samples_at_rest(solved, moving)
+    solved = solve(problem_at, speed, Accuracy(regularisation, tolerance), assembly, backend, threads, guess)
+    xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
     xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
-    status = STATUSES[np.where(residual <= limit, stuck.astype(int), UNCONVERGED)]
+    status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
 def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
     """Return the solution of all samples from that of those which are ``moving`` (B,)."""
     size = moving.size
+    if solved.stuck.size == size:
+        return solved
     full = Solved(np.zeros((3, size)), np.zeros(size), np.zeros(size, int), np.ones(size, bool), solved.limit)
     for array, values in zip(full[:4], solved[:4]):
         array[..., moving] = values
@@ -142,7 +146,7 @@ def _guess(start, batch: tuple, length: float) -> np.ndarray:
     except ValueError:
         start = None
     if start is None:
-        raise ValueError(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
+        raise Refusal(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
     with np.errstate(over="ignore"):
         return start.reshape(-1, 3).T / [[length], [length], [1.0]]
 
@@ -156,22 +160,22 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
     for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
         x = real_array(name, x)
         if x.ndim == 0 or x.shape[-1] != body.joints:
-            raise ValueError(f"{name} must have shape (..., {body.joints}) for this body, got {x.shape}")
+            raise Refusal(f"{name} must have shape (..., {body.joints}) for this body", value=x.shape)
         size = np.abs(x)
         if not size.max(initial=0.0) <= largest:
             if not np.isfinite(x).all():
-                raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
-            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+                raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         if (
             name == "alphadot"
             and size.min(initial=1.0) < LEAST_RATE
             and size.min(initial=1.0, where=size > 0) < LEAST_RATE
         ):
-            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         arrays.append(x)
     if arrays[0].shape == arrays[1].shape:
         return arrays
     try:
         return np.broadcast_arrays(*arrays)
     except ValueError:
-        raise ValueError(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
+        raise Refusal(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
