@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import geomech
 from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
 
 from geomech import scene as scenes
@@ -257,14 +256,6 @@ def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
     scene, over = GLASS.changed(medium=power(1.0)), {"medium.power": [0.8, 0.9, 1.0, 1.1, 1.2]}
     here, shared = both(two, lambda: sweep.sweep(scene, over))
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])
-
-
-@pytest.mark.parametrize("word", ["0", "-1", "two", "1.5", "9999"])
-def test_numbers_of_workers_that_make_no_sense_are_refused(word, tmp_path):
-    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--workers", word]
-    code, out, err = geomech("sweep", *args, cwd=tmp_path)
-    assert (code, out) == (2, "") and err.count("\n") == 1 and "--workers" in err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_processes_are_not_started_before_they_are_asked():
