@@ -103,6 +103,9 @@ def printed():
 
 
 def test_the_command_prints_them_all_or_a_section(printed):
+    for table, variant in EVERY.values():
+        assert variant.implied or (variant.label or f"[{table}]") in printed[""]
+        assert [key.name for key in keys_in(variant) if f"\n  {key.name} " not in printed[""]] == []
     assert max(map(len, printed[""].splitlines())) <= 120
     assert {*TABLES} <= {*printed}
     body = printed["body"]
