@@ -816,7 +816,7 @@ BAD = {
     "kilometres": (changed(slice(3, 5), lambda x: 1e12 * x), "entries of A come out as large as .*: give x and y in body"),
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
-    "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
+    "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y, got .*: mend that row, or drop it"),
     "eight": (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
     "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
