@@ -4,6 +4,7 @@ tests/test_hard_cases.py); and which of the two is taken."""
 import dataclasses
 import errno
 import hashlib
+import itertools
 import json
 import os
 import resource
@@ -109,14 +110,14 @@ def test_starts(how, compiled_code):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("size", [1e12, 1e31, 1e154, 1e155, 1e200, 1e300])
 @pytest.mark.parametrize("rate", [1e-90, 1.0, 1e90])
-def test_starts_whose_squares_overflow(size, rate, solved_by):
+def test_starts_whose_squares_overflow(rate, solved_by):
     """So that drag reads as none: the answer is that of no start. In a dry medium, and in one in which speed counts."""
     rng = np.random.default_rng(12)
     alpha, alphadot = rng.uniform(-2, 2, (20, 2)), rng.normal(size=(20, 2)) * rate
-    start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
-    for medium in (GLASS, MEDIA["viscous-2"]):
+    sizes = [1e12, 1e31, 1e154, 1e155, 1e200, 1e300]
+    for medium, size in itertools.product((GLASS, MEDIA["viscous-2"]), sizes):
+        start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
         cold, found = (body_velocity(medium, BODY, alpha, alphadot, start=s, backend=solved_by) for s in (None, start))
         assert (found.status == cold.status).all()
         assert apart(found, cold, alphadot, BODY).max() < 1e-10
