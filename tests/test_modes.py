@@ -22,6 +22,7 @@ from geomech.systems.base import shape_labels
 from geomech.systems.swimmer import is_three_link
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"
 ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)
