@@ -10,7 +10,7 @@ import numpy as np
 
 from figures import main, style
 from geomech.output import plots
-from geomech.study.calibration import of_drag
+from geomech.study.calibration import Calibration
 from rft import CATALOGUE, Viscous
 
 
@@ -23,7 +23,7 @@ def compute(angles: int = 181) -> dict:
         "viscous": Viscous(2.0),
     }
     curves = {name: np.array(law.traction(np.cos(psi), np.sin(psi))) for name, law in laws.items()}
-    fit = of_drag("granular", "dem-rod-drag", {}, 0.0).fit
+    fit = Calibration("dem-rod-drag", "granular").ask().subject
     bed = {"psi": fit.data.psi, "parallel": fit.data.forces[0], "perpendicular": fit.data.forces[1]}
     values = dict(zip(fit.names, fit.values.tolist()))
     return {"psi": psi, **curves, "bed": bed, "fit": {**values, "axial_N": fit.axial_force, "rms_N": fit.rms}}

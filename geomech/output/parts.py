@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from geomech import text
 from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.io.files import note, write_text
@@ -70,9 +71,10 @@ def write_best(result: Result, path: Path) -> None:
 
 def write_medium(result: Result, path: Path) -> None:
     """Write a medium that was calibrated."""
-    write_text(path, result.subject.toml())
+    write_text(path, text.medium(result))
 
 
 def about_medium(result: Result, path: Path) -> str:
     """Return how a scene takes a medium."""
-    return f'medium in {path}: in {result.subject.scene}, [medium] file = "{path.name}"'
+    scene = "a scene" if result.kind == "rod_drag" else "an intruder scene"
+    return f'medium in {path}: in {scene}, [medium] file = "{path.name}"'

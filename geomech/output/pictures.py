@@ -16,6 +16,11 @@ from geomech.systems.base import shape_labels
 from rft.refusal import Refusal
 
 check = plots.check_format
+CALIBRATIONS = {
+    "rod_drag": plots.drag_figure,
+    "plate_drags": plots.plates_figure,
+    "penetration": plots.penetration_figure,
+}
 
 
 def displacement(result: Result, path: Path) -> None:
@@ -48,7 +53,7 @@ def measured(result: Result, path: Path) -> None:
 
 def calibration(result: Result, path: Path) -> None:
     """Draw measurements and the law that was fitted to them."""
-    plots.save(getattr(plots, result.subject.picture)(result.subject.curves()), path)
+    plots.save(CALIBRATIONS[result.kind](result), path)
 
 
 @dataclass(frozen=True)

@@ -20,5 +20,10 @@ def numbers(result: Result) -> dict[str, Any]:
     return _module(result).numbers(result)
 
 
+def medium(result: Result) -> str:
+    """Return the medium that a calibration found, as TOML."""
+    return _module(result).medium(result)
+
+
 def _module(result: Result) -> Any:
     return import_module(f"geomech.text.{result.kind}")
