@@ -66,7 +66,7 @@ def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Calla
 
 def write_best(result: Result, path: Path) -> None:
     """Write a scene with the best gait."""
-    write_text(path, optimum.scene_toml(result.subject))
+    write_text(path, optimum.scene_toml(result))
 
 
 def write_medium(result: Result, path: Path) -> None:
