@@ -238,17 +238,22 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
     return values
 
 
-def parameters(over: Sequence[str], scene, most: int | None = None) -> dict[str, list[float]]:
-    """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. most: parameters that a figure takes."""
+def parameters(over: Sequence[str], scene, drawn: bool = False) -> dict[str, list[float]]:
+    """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. drawn: in a figure, which takes one or two."""
     axes = {}
     for text in over:
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
             raise Refusal(f"--over {text!r}", instead="give each parameter once, as PARAM=START:STOP:COUNT")
         axes[parameter] = values
-    if most is not None and len(axes) > most:
+    if drawn and len(axes) > 2:
         raise Refusal(f"cannot draw {len(axes)} parameters", instead="sweep one or two, or leave --plot out")
     return {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
+
+
+def column_names(text: str | None) -> tuple[str, ...]:
+    """Return the names in T,A1,A2; none for an option that is left out."""
+    return () if text is None else tuple(text.split(","))
 
 
 def caps(text: str) -> float | str:

@@ -17,6 +17,6 @@ def scenes(
     ] = None,
 ):
     """The scenes that ship with the toolkit, and the named media."""
-    from geomech.text.scenes import listing, toml_of
+    from geomech.text.scenes import lines
 
-    shown(listing() if show is None else [toml_of(show)])
+    shown(lines(show))

@@ -28,6 +28,6 @@ def sweep(
     from geomech.study.sweep import Sweep, as_stored
 
     scene = loaded_moving(name)
-    axes = parameters(over, scene, 2 if plot else None)
+    axes = parameters(over, scene, drawn=plot is not None)
     file = Output(out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, behind("results in"))
     execute(Sweep(scene, axes), file, Output(plot, pictures.sweep, pictures.check), yes=yes)

@@ -18,7 +18,7 @@ from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
-from geomech.run.cost import BASE, Cost
+from geomech.run.cost import BASE, LONGEST, Cost
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
@@ -128,11 +128,12 @@ def run(
 
 @dataclass(frozen=True)
 class Walking(Question):
-    """How a robot walks. engine: what computes it, in place of the scene's. longest: s, as of `run`."""
+    """How a robot walks. engine: what computes it, in place of the scene's. limited: it may take `LONGEST` s of
+    computing and no more, where the way from rest is not done by then."""
 
     scene: WalkerScene
     engine: str | None = None
-    longest: float = field(default=math.inf, compare=False)
+    limited: bool = field(default=False, compare=False)
 
     @property
     def title(self) -> str:
@@ -145,7 +146,7 @@ class Walking(Question):
         return price(self.scene, by=self.engine)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_walk(self.scene, run(self.scene, self.engine, progress, self.longest))
+        return of_walk(self.scene, run(self.scene, self.engine, progress, LONGEST if self.limited else math.inf))
 
 
 def of_walk(scene: WalkerScene, found: Walked) -> Result:
