@@ -125,8 +125,8 @@ def test_a_shell_completes_commands_options_and_scenes(words, found):
 
 
 def test_what_is_completed_can_be_given(capsys):
-    for name in (*names.shown_names(), "half-cylinder", "sphere", "poppy-seeds-loose", "coulomb", "no-slip-snake"):
-        assert name in names.shown_names() and run(capsys, "scenes", "--show", name)[0] == 0
+    for name in (*names.printable_names(), "half-cylinder", "sphere", "poppy-seeds-loose", "coulomb", "no-slip-snake"):
+        assert name in names.printable_names() and run(capsys, "scenes", "--show", name)[0] == 0
     for name in names.medium_names():
         assert run(capsys, "stress", name, "--beta", "0", "--gamma", "90")[0] == 0
     assert [run(capsys, "keys", name)[0] for name in names.section_names()] == [0] * len(names.section_names())

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, caps
+from geomech.commands.options import JsonOption, PlotOption, parse_end_caps
 from geomech.commands.pipeline import Output, execute
 
 Size = Optional[float]
@@ -43,6 +43,6 @@ def calibrate(
 
     sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
-    file = Output(out, parts.write_medium, said=parts.about_medium)
+    file = Output(out, parts.write_medium, message=parts.about_medium)
     figure = Output(plot, pictures.calibration, pictures.check)
-    execute(Calibration(drag, law, known, caps(end_caps)), file, figure, as_json=as_json)
+    execute(Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -43,7 +43,7 @@ def ccf(
     from geomech.output import pictures
     from geomech.study.shape_space import ccf
 
-    scene = loaded(name, grid, extent)
+    scene = load_scene(name, grid, extent)
     drawn = pictures.Ccf(style, metric, stretch, beside)
     question = ccf(scene, pair, angles(scene, "--slice", slice_), beside, metric, stretch)
     execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -38,7 +38,7 @@ def displacement(
     from geomech.output import pictures
     from geomech.study.displacement import displacement
 
-    scene = loaded(name, grid, extent)
+    scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     question = displacement(scene, values, methods, tol, effort)
     execute(question, Output(plot, pictures.displacement, pictures.check), as_json=as_json, yes=yes)

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded_intruder
+from geomech.commands.loading import load_intruder
 from geomech.commands.options import IntruderArgument, JsonOption, PlotOption
 from geomech.commands.pipeline import Output, execute
 
@@ -26,4 +26,4 @@ def intrude(
 
     table = Output(out, lambda result, path: write_csv(path, result), formats.csv)
     figure = Output(plot, pictures.intrusion, pictures.check)
-    execute(Intrusion(loaded_intruder(name)), table, figure, as_json=as_json, yes=True)
+    execute(Intrusion(load_intruder(name)), table, figure, as_json=as_json, yes=True)

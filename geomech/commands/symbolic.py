@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import SceneArgument
 from geomech.commands.pipeline import show
 
@@ -19,4 +19,4 @@ def symbolic(
     """The connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
     from geomech.text.formulas import formulas
 
-    show(formulas(loaded(name), ccf, latex))
+    show(formulas(load_scene(name), ccf, latex))

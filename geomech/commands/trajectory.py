@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption
-from geomech.commands.pipeline import Output, behind, execute
+from geomech.commands.pipeline import Output, execute, path_message
 
 
 def trajectory(
@@ -23,4 +23,8 @@ def trajectory(
     from geomech.output import trajectories
     from geomech.study.motion import Trajectory
 
-    execute(Trajectory(loaded(name), cycles), Output(out, trajectories.write, formats.csv, behind("table in")), yes=yes)
+    execute(
+        Trajectory(load_scene(name), cycles),
+        Output(out, trajectories.write, formats.csv, path_message("table in")),
+        yes=yes,
+    )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.asked import scene_with_gait
+from geomech.commands.loading import load_with_gait
 from geomech.commands.options import JsonOption, SceneArgument, angles
 from geomech.commands.pipeline import execute
 
@@ -20,6 +20,6 @@ def velocity(
     """Body velocity for one shape and its rate of change, with its residual and status."""
     from geomech.study.velocity import Velocity
 
-    scene = scene_with_gait(name)
+    scene = load_with_gait(name)
     question = Velocity(scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot))
     execute(question, as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded_walker
+from geomech.commands.loading import load_walker
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, folder
 from geomech.commands.pipeline import Output, execute
 
@@ -31,6 +31,6 @@ def walk(
     from geomech.output import walks
     from geomech.study.walking import Walking
 
-    question = Walking(loaded_walker(name), engine, limited=not yes)
+    question = Walking(load_walker(name), engine, limited=not yes)
     results, picture = Output(out, walks.write, folder=True), Output(animate, walks.film, film.check_format)
     execute(question, results, picture, as_json=as_json, yes=yes)
