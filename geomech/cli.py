@@ -39,7 +39,7 @@ def geomech(
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run a command and exit: code 2 and one line on standard error for what the user can mend, 128 + its number for a signal."""
+    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 + its number for a signal."""
     terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
     sys.exit(copy_context().run(terminal.exit_code, app, arguments))  # what the command prefers ends with it

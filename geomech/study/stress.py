@@ -38,8 +38,8 @@ class Stress(Question):
     def answer(self, progress: Progress, allow: Allow) -> Result:
         law = load_medium(self.medium)
         whole = survey(law)
-        told = f"{self.medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
-        facts, angles = {"told": told, "notes": [told] if whole.pushing else []}, None
+        description = f"{self.medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
+        facts, angles = {"description": description, "notes": [description] if whole.pushing else []}, None
         if self.beta is None:
             found = [Variable(name, (), getattr(whole, name), "1") for name in ("pulling", "pushing")]
         else:
