@@ -21,7 +21,7 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Connection:
-    """Writes a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
+    """A writer of a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
 
     ending: str
     sign: str | None = None
@@ -53,7 +53,8 @@ def write_tube(result: Result, path: Path) -> None:
 
 
 def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:
-    """Return what writes a scene of a measured gait, whose connection is in the file ``field``, and what checks its name."""
+    """Return a function that writes a scene of a measured gait, whose connection is in the file ``field``, and a check of the
+    name of that scene."""
 
     def check(path: Path) -> None:
         if path.suffix != ".toml":
@@ -75,6 +76,6 @@ def write_medium(result: Result, path: Path) -> None:
 
 
 def about_medium(result: Result, path: Path) -> str:
-    """Return how a scene takes a medium."""
+    """Return the line that says how a scene takes a medium."""
     scene = "a scene" if result.kind == "rod_drag" else "an intruder scene"
     return f'medium in {path}: in {scene}, [medium] file = "{path.name}"'

@@ -1,4 +1,4 @@
-"""An optimal gait: its loop on the CCF map, coloured by what holds it there, and its angles over a cycle."""
+"""An optimal gait: its loop on the CCF map, coloured by its limits, and its angles over a cycle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from geomech.study.bench import Study
 from geomech.systems.base import shape_labels
 
 LONG = 12  # letters of a name: a legend of longer ones has a line for each
-HOLDS = {  # what holds a loop: colour, text
+LIMITS = {  # of a loop: colour, text
     "zero": ("black", "runs along the zero line"),
     "limit": ("#D55E00", "at the joint limit"),
     "singular": ("#0072B2", "as near to singular shapes as it may"),
@@ -23,13 +23,16 @@ HOLDS = {  # what holds a loop: colour, text
     "else": ("#CC79A7", "off the zero line"),
     "loop": ("black", "best"),
 }
-LEFT = {"length": ",\nand what A leaves of the law", "else": ": what A leaves of the law"}  # where drag is not linear
+RESIDUAL = {
+    "length": ",\nand what A leaves of the law",
+    "else": ": what A leaves of the law",
+}  # where drag is not linear
 
 
 @styled
 def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
-    """The best loop on the map of `gained_ccf`, coloured by what holds it; the start dashed. Where the velocity does not follow
-    from shape alone there is no CCF, and the map has the loop alone."""
+    """Draw the best loop on the map of `gained_ccf`, coloured by what limits it; the start dashed. Where the velocity does not
+    follow from shape alone there is no CCF, and the map has the loop alone."""
     ax, system = axes_of(ax), optimum.scene.system
     if system.traits.steps:
         shape_space(ax, [np.linspace(-1, 1, 2) * optimum.scene.numerics.extent] * 2, shape_labels(system))
@@ -48,7 +51,8 @@ def optimum_map(optimum: Optimum, ax=None, field: Field | None = None):
 
 @styled
 def stretched_optimum(optimum: Optimum, ax=None, field: Field | None = None, study: Study | None = None):
-    """`optimum_map` on shape space redrawn so that equal lengths cost equal effort. ValueError for what has no metric."""
+    """Draw `optimum_map` on shape space redrawn so that equal lengths cost equal effort. Refusal for a system without a
+    metric."""
     ax, study, system = axes_of(ax), study or Study(optimum.scene), optimum.scene.system
     field, plane = gained_ccf(optimum, study) if field is None else field, stretch(study.metric)
     effort = "BL" if system.traits.power_degree == 1 else "path length"
@@ -66,20 +70,26 @@ def gain(optimum: Optimum) -> str:
 
 
 def draw_start_and_best(optimum: Optimum, ax, place, field: Field | None) -> None:
-    """Both loops, each shape where ``place`` puts it."""
+    """Draw both loops, each shape where ``place`` puts it."""
     t = np.linspace(0, 2 * np.pi, PHASES)
     ax.plot(*place(optimum.start.gait.shape(t)).T, color="0.25", lw=0.9, ls="--", label="start")
-    left = field is not None and not optimum.scene.system.traits.linear
-    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum, field), left)
+    nonlinear = field is not None and not optimum.scene.system.traits.linear
+    draw_limited(ax, place(optimum.gait.shape(t)), limiting(optimum, field), nonlinear)
 
 
-def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, left: bool = False) -> None:
-    """A curve (P, 2) in the colours of HOLDS, with a dot at its start and an arrow along it. left: A is not all there is."""
-    for kind, (colour, text) in HOLDS.items():
-        here = kinds == kind
-        if here.any():
-            whole = here | np.roll(here, 1)
-            ax.plot(*np.where(whole, curve.T, np.nan), color=colour, lw=1.8, label=text + LEFT.get(kind, "") * left)
+def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, nonlinear: bool = False) -> None:
+    """Draw a curve (P, 2) in the colours of LIMITS, with a dot at its start and an arrow along it. nonlinear: drag is not
+    linear, so that A is not all."""
+    for kind, (colour, text) in LIMITS.items():
+        mask = kinds == kind
+        if mask.any():
+            joined = mask | np.roll(mask, 1)
+            ax.plot(
+                *np.where(joined, curve.T, np.nan),
+                color=colour,
+                lw=1.8,
+                label=text + RESIDUAL.get(kind, "") * nonlinear,
+            )
     ax.plot(*curve[0], "o", color="black", ms=3)
     ax.annotate(
         "", curve[100], curve[90], arrowprops={"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}
@@ -88,16 +98,16 @@ def draw_limited(ax, curve: np.ndarray, kinds: np.ndarray, left: bool = False) -
 
 @styled
 def angles(optimum: Optimum, ax=None):
-    """Shape variables of the best gait over a cycle, and the limits."""
+    """Draw the shape variables of the best gait over a cycle, and the limits."""
     ax, gait = axes_of(ax), optimum.gait
     t = np.linspace(0, 2 * np.pi, PHASES)
     names = shape_labels(optimum.scene.system)
-    every = max(1, gait.joints // 6)
-    for k, curve in list(enumerate(gait.shape(t).T))[every // 2 :: every]:
+    step = max(1, gait.joints // 6)
+    for k, curve in list(enumerate(gait.shape(t).T))[step // 2 :: step]:
         ax.plot(t, curve, label=quantity(names[k][0]))
     if any(x.startswith("alpha") for x in optimum.active):
         for side in np.unique(optimum.request.loops.box):
-            ax.axhline(side, color=HOLDS["limit"][0], lw=0.8, ls=":")
+            ax.axhline(side, color=LIMITS["limit"][0], lw=0.8, ls=":")
     ax.set(xlabel="phase $t$ (rad)", ylabel=f"shape ({names[0][1]})", xlim=(0, 2 * np.pi))
     ax.set(xticks=np.pi / 2 * np.arange(5), xticklabels=["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"])
     best, aim = optimum.best, optimum.request.aim
@@ -110,8 +120,8 @@ def angles(optimum: Optimum, ax=None):
 
 @styled
 def optimum_figure(optimum: Optimum, stretched: bool = False):
-    """`optimum_map` beside `angles`; the angles alone where there are not two joints. stretched: `stretched_optimum` between
-    them."""
+    """Draw `optimum_map` and `angles` side by side; the angles alone where there are not two joints. stretched:
+    `stretched_optimum` between them."""
     system, study = optimum.scene.system, Study(optimum.scene)
     if system.joints != 2:
         fig, axes = figure(3.8, 3.4)

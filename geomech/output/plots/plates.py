@@ -1,4 +1,4 @@
-"""Measurements in the vertical plane and what was fitted to them: plate drags and penetration tests."""
+"""Measurements in the vertical plane with their fits: plate drags and penetration tests."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def _residuals(ax, beta, gamma, residual, top: float, name: str) -> None:
 
 
 def _ahead(beta, gamma):
-    """Tilts and directions within +-90 degrees, and the sign of alpha_x there: motion backwards is the mirror image."""
+    """Return tilts and directions within +-90 degrees, and the sign of alpha_x there: motion backwards is the mirror image."""
     beta, gamma = beta - 180 * np.round(beta / 180), gamma - 360 * np.round(gamma / 360)
     back = np.abs(gamma) > 90
-    turned = np.where(back, -beta, beta), np.where(back, np.copysign(180.0, gamma) - gamma, gamma)
-    return *turned, np.where(back, -1.0, 1.0)
+    mirrored = np.where(back, -beta, beta), np.where(back, np.copysign(180.0, gamma) - gamma, gamma)
+    return *mirrored, np.where(back, -1.0, 1.0)
 
 
 def _coefficients(ax, result: Result) -> None:
