@@ -50,7 +50,7 @@ def draw(numbers: dict):
     ax.plot(np.degrees(bed["psi"]), bed["parallel"] / scale, "o", mfc="white", **dots)
     ax.set(xlabel="attack angle $\\psi$ (degrees)", ylabel="drag / axial drag", xlim=(-2, 92), ylim=(0, None))
     ax.set_xticks(range(0, 91, 15))
-    style.legend_beside(ax, title="solid, filled: across\ndashed, open: along")
+    style.legend_right(ax, title="solid, filled: across\ndashed, open: along")
     return fig
 
 
