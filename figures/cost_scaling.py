@@ -1,4 +1,4 @@
-"""What a balance of forces costs: microseconds a sample against the size of a batch, by both back ends, on one core and on
+"""The cost of a balance of forces: microseconds a sample against the size of a batch, by both back ends, on one core and on
 all, beside the usual loop of SciPy's; and time against links, directions and phases, with fitted exponents."""
 
 from __future__ import annotations

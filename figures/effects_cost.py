@@ -1,7 +1,7 @@
-"""What effects cost: time of one cycle of the sandfish with effects switched on one at a time, over that with none.
+"""The cost of effects: time of one cycle of the sandfish with effects switched on one at a time, over that with none.
 
 All from one run, seven amplitudes side by side. Effects that remember, or that give the body mass, take the phases one
-after the other and the cycle several times over until it repeats: that is what the engine costs, not the effect.
+after the other and the cycle several times over until it repeats: that is the cost of the engine, not of the effect.
 """
 
 from __future__ import annotations

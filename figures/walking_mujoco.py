@@ -1,6 +1,6 @@
-"""The engine of three dimensions: its step-size study, and its speeds beside those of the planar engine. Needs MuJoCo.
+"""The engine of three dimensions: its step-size study, and its speeds against those of the planar engine. Needs MuJoCo.
 
-Xplorer's way in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
+Xplorer's progress in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
 the grains' forces held as they are at the start of each: these are of order 1, and go astray below some 200 steps a cycle.
 """
 
@@ -32,7 +32,7 @@ def _simulation(steps: int):
 
 
 def stride_length(start, steps: int, how: str) -> float:
-    """Return the way in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
+    """Return the progress in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
     import mujoco
 
     body, h = _simulation(steps).body, 1 / (FREQUENCY * steps)

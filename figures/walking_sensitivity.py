@@ -1,4 +1,4 @@
-"""What the speeds of walking robots hang on: every size that the paper does not give, one at a time, times 0.7 and
+"""The sensitivity of the speeds of walking robots: every size that the paper does not give, one at a time, times 0.7 and
 1.4, and two choices of the model: whether grains pull on faces, as their map has it, and whether the belly is a closed box,
 whose bottom and front feel grains where they lead, or an open sheet, its bottom alone, which feels them on either side.
 

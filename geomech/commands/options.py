@@ -1,4 +1,4 @@
-"""What commands share: options, and what they must be."""
+"""Options that commands share, and their parsers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a robot walks, in lines."""
+"""The walk of a robot, in lines."""
 
 from __future__ import annotations
 
