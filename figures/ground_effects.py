@@ -1,6 +1,6 @@
 """The effects of grains and ground on the force on the c-leg of Fig. 8(b) in loose poppy seeds.
 
-Left: the force that the inertia of grains adds, rms over the turn, over the rms force without it, against the rate of turning, for
+Left: the force that the inertia of grains adds, rms over the turn, over the rms force without it, against the rate, for
 lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift over that in still, level ground against air
 speed over that of fluidisation, and against slope over the angle of repose, where the leg sweeps down the slope and where it
 sweeps up. Right: lift against angle with an earlier intrusion before the leg.
