@@ -16,8 +16,8 @@ def accuracy(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
-    scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
+    """Measure the cost of accuracy in a scene: error against time for every tier and knob, and the cheapest settings; of an
+    intruder scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
     from geomech.output import report
     from geomech.study.accuracy import Accuracy
 

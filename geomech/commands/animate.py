@@ -20,7 +20,7 @@ def animate(
     cycles: Annotated[Optional[int], typer.Option(metavar="N", help="of the gait; 3 in a film, 1 in a strip")] = None,
     yes: YesOption = False,
 ):
-    """The body moving over its own track beside its shape on the CCF map: a film, or a strip of pictures for a page."""
+    """Draw the body moving over its own track next to its shape on the CCF map: a film, or a strip of pictures for a page."""
     from geomech.output import animate as film
 
     question = film.picture(load_scene(name), out, cycles)

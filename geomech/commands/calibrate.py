@@ -35,9 +35,9 @@ def calibrate(
     area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
     as_json: JsonOption = False,
 ):
-    """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, of
-    the vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to
-    a plate pushed straight down, columns depth_m, force_N."""
+    """Fit a medium of your own: a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, in the
+    vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to a
+    plate pushed straight down, columns depth_m, force_N."""
     from geomech.output import parts, pictures
     from geomech.study.calibration import Calibration
 

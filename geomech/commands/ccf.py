@@ -38,8 +38,8 @@ def ccf(
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
-    """The CCF map with the scene's gait drawn on it. Of three and more joints: a slice for each pair, or for one, with the
-    others held."""
+    """Draw the CCF map with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
+    others fixed."""
     from geomech.output import pictures
     from geomech.study.shape_space import ccf
 

@@ -39,7 +39,8 @@ def connection(
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
-    """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
+    """Write the local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as
+    .mat."""
     from geomech.output import parts, pictures
     from geomech.study.shape_space import connection
 

@@ -34,7 +34,7 @@ def displacement(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
+    """Compute the net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
     from geomech.output import pictures
     from geomech.study.displacement import displacement
 

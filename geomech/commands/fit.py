@@ -45,8 +45,8 @@ def fit(
     ] = 1.0,
     as_json: JsonOption = False,
 ):
-    """The connection near a measured gait: phase, mean gait, A by regression with intervals, and the displacement that it
-    predicts beside the log's."""
+    """Fit the connection near a measured gait: phase, mean gait, A by regression with intervals, and the predicted
+    displacement against the log's."""
     from geomech.measured.results import Fit
     from geomech.output import parts, pictures
 

@@ -19,7 +19,7 @@ def keys(
     json_schema: Annotated[bool, typer.Option("--json-schema", help="print a JSON Schema of scene files")] = False,
     plugin: PluginOption = None,
 ):
-    """Every key of a scene file: type, unit, default and meaning; or a JSON Schema for editors."""
+    """Print every key of a scene file: type, unit, default and meaning; or a JSON Schema for editors."""
     from geomech.text.keys import reference
 
     load_plugins(plugin)

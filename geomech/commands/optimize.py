@@ -34,7 +34,7 @@ def optimize(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):  # fmt: skip
-    """The best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
+    """Find the best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
     from geomech.optimise.question import Optimize
     from geomech.output import parts, pictures
 

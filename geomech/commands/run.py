@@ -26,7 +26,7 @@ def run(
     medium: MediumOption = None,
     yes: YesOption = False,
 ):
-    """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
+    """Compute everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech.output import report
     from geomech.study.report import Report
 

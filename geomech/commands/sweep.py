@@ -21,8 +21,8 @@ def sweep(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Net displacement, or speed of a robot that walks, over a grid of the scene's parameters. What is done is kept if
-    interrupted, and taken up again."""
+    """Compute the net displacement, or the speed of a robot that walks, over a grid of the scene's parameters. A repeated
+    command resumes an interrupted one."""
     from geomech.io.results import write_netcdf
     from geomech.output import pictures
     from geomech.study.sweep import Sweep, as_stored

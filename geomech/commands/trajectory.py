@@ -19,7 +19,7 @@ def trajectory(
     cycles: CyclesOption = 1,
     yes: YesOption = False,
 ):
-    """Where the body is at every phase of the scene's gait: pose, joint angles and ends of all links, as CSV."""
+    """Write pose, joint angles and ends of all links at every phase of the scene's gait, as CSV."""
     from geomech.output import trajectories
     from geomech.study.motion import Trajectory
 

@@ -26,7 +26,8 @@ def walk(
     ] = None,
     yes: YesOption = False,
 ):
-    """How a robot walks on grains: mean speed with its error, and its way from rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains: mean speed with its error, and its motion from rest. SI units, pitch in rad, nose
+    down."""
     from geomech.output import animate as film
     from geomech.output import walks
     from geomech.study.walking import Walking
