@@ -12,7 +12,7 @@ from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import minimum_perturbation
 from geomech.optimise.loops import TOUCHING
 from geomech.optimise.optimum import Optimum
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros
 NEAR_SINGULAR = 0.05  # of the least distance from singular shapes: a loop that is so near is limited by them

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from geomech.core.variables import Result, Variable
-from geomech.optimise.limits import Asked
+from geomech.optimise.limits import WithinArgument
 from geomech.optimise.optimum import Optimum
 from geomech.optimise.request import Request, checked
 from geomech.optimise.search import search
@@ -20,13 +20,14 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """The best gait of a scene; as `optimise` has it. stretch: it is drawn where equal lengths cost the same, too."""
+    """The best gait of a scene, see `optimise`. stretch: it is also drawn in coordinates where equal lengths have equal
+    costs."""
 
     scene: Scene
     aim: str
     direction: str | None = None
     harmonics: int | None = None
-    within: Asked = None
+    within: WithinArgument = None
     starts: int | None = None
     rate: float | None = None
     power: float | None = None

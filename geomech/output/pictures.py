@@ -94,8 +94,8 @@ class Connection:
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
-        if space.beside:
-            options |= {"beside": space.beside.fitted, "names": [scene.frame, self.beside]}
+        if space.other:
+            options |= {"beside": space.other.fitted, "names": [scene.frame, self.beside]}
         plots.save(plots.connection_figure(space.study.fitted, **options), path)
 
 
@@ -122,12 +122,12 @@ class Ccf:
 
     def _slices(self, space: Space) -> Any:
         scene, options = space.study.scene, {"style": self.style or "map"}
-        if space.planes_beside:
-            options |= {"beside": space.planes_beside[0], "names": [scene.frame, self.beside]}
+        if space.other_planes:
+            options |= {"beside": space.other_planes[0], "names": [scene.frame, self.beside]}
         return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **options)
 
     def _map(self, space: Space) -> Any:
-        study, scene, other = space.study, space.study.scene, space.beside
+        study, scene, other = space.study, space.study.scene, space.other
         options: dict[str, Any] = {
             "gaits": [scene.gait],
             "error": study.curvature_error,

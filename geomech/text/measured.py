@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.measured.fit import SHOWN, Fitted
+from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scene.write import gait_table
 
@@ -19,9 +19,9 @@ def numbers(result: Result) -> dict[str, Any]:
 
 def fit_numbers(fit: Fitted) -> dict[str, Any]:
     """Return the numbers of a fit. Triples are x, y and theta; intervals are (low, high) of each; A, its interval's half width
-    and the half width of the data at SHOWN phases of the gait."""
+    and the half width of the data at PRINTED_PHASES phases of the gait."""
     (net, half_width), (mean, mean_half_width) = fit.displacement, fit.mean
-    t = 2 * np.pi * np.arange(SHOWN) / SHOWN
+    t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
     A, error = fit.along(t)
     residual, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
     return {
@@ -59,10 +59,10 @@ def fit_numbers(fit: Fitted) -> dict[str, Any]:
 
 
 def reach(fit: Fitted) -> np.ndarray:
-    """Return the half width of the data across the gait, rad, in the direction in which it is least, at SHOWN phases."""
+    """Return the half width of the data across the gait, rad, in the direction in which it is least, at PRINTED_PHASES."""
     spread = fit.known.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
-    return least[np.arange(SHOWN) * spread.shape[-1] // SHOWN]
+    return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
 
 
 def text(result: Result) -> str:

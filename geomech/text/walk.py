@@ -30,7 +30,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "settled": w.settling_time if np.isfinite(w.settling_time) else None,
         "aside": w.lateral_speed,
         "turning": w.yaw_rate,
-        "estimate_aside": found.aside,
+        "estimate_aside": found.lateral,
         "estimate_turning": found.turning,
         "estimate_elements": found.elements,
     }
@@ -77,7 +77,7 @@ def _turning(found: Walked) -> list[str]:
     if not w.spatial:
         return []
     turning, error = np.degrees([w.yaw_rate, found.turning])
-    drift = f"drifting aside at {w.lateral_speed:.2g} +- {found.aside:.1g} m/s"
+    drift = f"drifting aside at {w.lateral_speed:.2g} +- {found.lateral:.1g} m/s"
     return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {drift} (positive: to the left of its heading)"]
 
 

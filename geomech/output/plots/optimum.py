@@ -11,7 +11,7 @@ from geomech.optimise.gain import PHASES, gained_ccf, limiting
 from geomech.output.plots.maps import ccf_map, drawable, shape_space
 from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems.base import shape_labels
 
 LONG = 12  # letters of a name: a legend of longer ones has a line for each
