@@ -108,9 +108,9 @@ class _Ascent:
             self.best, self.least = np.array(x), value
 
     def run(self, x: np.ndarray, trust_radius: float, moving: int, max_steps: int, tolerance: float) -> str:
-        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``trust_radius`` of it, and return how
-        they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke; or "spent".
-        """
+        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``trust_radius`` of it, and
+        return how they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke;
+        or "spent"."""
         from scipy.optimize import minimize
 
         radius = np.where(np.arange(len(x)) < moving, trust_radius, np.inf)
