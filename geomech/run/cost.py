@@ -19,7 +19,7 @@ LONGEST = 60.0  # s of computing that a command begins without being told to
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
-SURE = 10.0  # factor by which the assumed seconds may be wrong
+SLOW, FAST = 10.0, 5.0  # times that balances may take of the assumed seconds, and one over the least share of them
 ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that tell how long others take
 LOADING = 20.0  # times what is usual: a batch that takes longer has loaded or compiled code
 
@@ -80,7 +80,7 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     """Call judge(cost) at once where the assumed seconds tell enough, else once the balances to come have told theirs; what
     it raises ends the request."""
     of_balances = cost.seconds - cost.besides
-    tells_enough = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
+    tells_enough = of_balances > FAST * LONGEST or cost.seconds < LONGEST / SLOW or cost.besides > LONGEST
     decided = tells_enough or cost.memory > LARGEST
     listen(
         nobody if decided else _Watch(cost, judge)
