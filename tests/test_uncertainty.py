@@ -71,7 +71,9 @@ def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch)
     in_frame = lambda system: Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
     told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
     media = whitened(40, 2, seed=2) @ uncertainty.root(COVARIANCE).T
-    at = lambda d: in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
+    at = lambda d: (
+        in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
+    )
     nets = np.stack([np.stack(list(of_pose(at(d)).values()), -1) for d in [[0.0, 0.0], *media, *-media]])
     for k, quantity in enumerate(QUANTITIES):
         scatter, shift = nets[1:, :, k].std(0), nets[1:, :, k].mean(0) - nets[0, :, k]
