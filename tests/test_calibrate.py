@@ -340,6 +340,7 @@ def test_weights_of_a_file(tmp_path):
         (["16 mm diameter rod, 80 mm long, in 6 mm beads at 30 mm depth"], (0.008, 0.08, 0.03, None)),
         (["rod 16 mm diameter x 80 mm; bed 20 cm deep; density of the rod 2700 kg/m^3"], (0.008, 0.08, None, None)),
         (["effective radius 8 mm", "density 2500 kg/m^3, packing density 0.6, void fraction 0.4"], (0.008, None, None, 1500)),
+        (["radius 8000 um, length 8 cm"], (0.008, 0.08, None, None)),
         (["nothing", "mean after 30 mm of travel, 0.1 m/s"], (None, None, None, None)),
     ],
 )  # fmt: skip

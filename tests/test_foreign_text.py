@@ -45,6 +45,7 @@ def test_plain_text_stays_what_it_is():
         assert errors.plain(text) == text
     assert errors.plain("a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r") == r"a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r"
     assert errors.line(" a\n\x1bb  c\n") == r"a \x1bb c"
+    assert errors.line("x" * 400) == "x" * 400
     assert len(errors.line(LONG)) < 400 and errors.line(LONG).startswith(r"\x1b]0;owned\x07")
 
 

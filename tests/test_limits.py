@@ -11,6 +11,9 @@ from registry import GAITS
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
 from geomech.geometry import connection, family, harmonics
+from geomech.systems import Swimmer
+from geomech.tiers import fitted
+from geomech.tiers.base import Numerics
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import (
@@ -191,6 +194,9 @@ def test_what_is_left_out_is_what_the_documentation_says():
     assert EndCaps(0.1) == EndCaps(0.1, head=1.0, tail=1.0)
     assert GrainInertia(**GRAINS) == GrainInertia(**GRAINS, strength=1.0)
     assert DepthProfile() == DepthProfile((1.0, 1.0), 0.0, 0.0)
+    for medium, counts in ((Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])):
+        systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
+        assert [fitted.directions(system, Numerics()) for system in systems] == counts
     axes = connection.grid(2)
     assert len(axes) == 2 and [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
 

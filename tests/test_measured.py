@@ -711,6 +711,8 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     t = np.arange(6.0)
     n = f.known.loop.normals(t)[..., 0]
     assert np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min() > 0.05  # not known
+    slopes = np.abs(f.known.errors[:, :, :, 1]).max((1, 2, 3))
+    assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
     assert told.told(f)["status"].startswith("fitted along the gait alone")
@@ -814,6 +816,7 @@ BAD = {
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
     "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
+    "eight": (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
     "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
     "thin": (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),

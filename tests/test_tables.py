@@ -22,6 +22,7 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.io import tables
+from geomech.io.tables import matlab
 from geomech.output import mat, plots
 from geomech.scene import Numerics, Scene
 from geomech.study import accuracy, choose, estimate, fields, tiered
@@ -641,6 +642,8 @@ def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path
     for options in ({"do_compression": True}, {"format": "4"}):
         savemat(tmp_path / "a.mat", found, **options)
         np.testing.assert_array_equal(tables.load(tmp_path / "a.mat").connection.A, c.A)
+    savemat(tmp_path / "a.mat", {"deep": np.full((1,) * 32, 2.5)})
+    assert matlab.arrays((tmp_path / "a.mat").read_bytes())["deep"] == 2.5
     monkeypatch.setattr("geomech.io.tables.matlab.LARGEST", 100_000)
     savemat(tmp_path / "a.mat", {**found, "more": np.zeros(10**6)}, do_compression=True)
     with pytest.raises(SceneError, match="is damaged, cut short, or no MATLAB file"):
