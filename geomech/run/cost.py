@@ -47,7 +47,7 @@ class Cost(NamedTuple):
 
     def __str__(self) -> str:
         balances = f"{self.balances:,} force balances"
-        return f"{balances}, about {_duration(self.seconds)} of computing and {_size(self.memory)} of memory"
+        return f"{balances}, about {duration(self.seconds)} of computing and {_size(self.memory)} of memory"
 
     @property
     def as_balances(self) -> float:
@@ -66,7 +66,7 @@ class Cost(NamedTuple):
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         """`TooLong` where it goes beyond the limits and ``yes`` does not allow that. less: what to do else."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
-            limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
+            limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
             raise TooLong(f"{place}: {self}: to compute for more than {limits} say --yes, or {less}")
 
 
@@ -122,7 +122,8 @@ class _Watch:
         return took / told
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a time in words, at least a second, in the largest unit that makes a few of it."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}" if seconds < 100 * size else f"{seconds / size:,.0f} {unit}"
