@@ -30,7 +30,7 @@ class Connection:
         """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter has
         (`geomech.io.tables`).
 
-        SceneError, one line, for any other. Its residual is nan where the file does not tell it."""
+        Refusal, one line, for any other. Its residual is nan where the file does not tell it."""
         from geomech.io.tables import load
 
         return load(path, sign, order).connection
@@ -68,10 +68,10 @@ class Study:
 
 class Displacements:
     def __repr__(self) -> str:
-        from geomech.core.errors import plain
         from geomech.text.displacement import text
+        from rft.refusal import printable
 
-        return plain(text(self.result))
+        return printable(text(self.result))
 
     def _repr_html_(self) -> str:
         from geomech.output import display

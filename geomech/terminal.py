@@ -20,9 +20,10 @@ from pathlib import Path
 
 import typer
 
-from geomech.core.errors import Note, line, plain
+from geomech.core.errors import Note
 from geomech.run import BELOW
 from geomech.run.progress import progress
+from rft.refusal import line, printable
 
 __all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
 
@@ -81,7 +82,7 @@ class _Plain:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        return self._stream.write(plain(text))
+        return self._stream.write(printable(text))
 
     def __getattr__(self, name: str):
         return getattr(self._stream, name)
@@ -186,7 +187,7 @@ def _unheard() -> int:
 def tell(text: str) -> None:
     """One line on standard error, if anybody listens."""
     try:
-        print(plain(" ".join(text.split())), file=sys.stderr, flush=True)
+        print(printable(" ".join(text.split())), file=sys.stderr, flush=True)
     except OSError:
         _deaf(sys.stderr)
 

@@ -1,23 +1,53 @@
 """Resistive force theory: force laws, bodies and the balance of forces. Gaits are in `geomech`."""
 
-from rft.balance import Solution, body_velocity
-from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
-from rft.effects import (
-    BodyInertia,
-    DepthProfile,
-    DisturbedGround,
-    EndCaps,
-    GrainInertia,
-    SkinFriction,
-    Slope,
-    TowedSled,
-    Transient,
-)
-from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
-from rft.stepping import TimeSteps, time_steps
-from rft.work import Work, work_done
+import importlib
+import pkgutil
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rft.balance.velocity import Solution, body_velocity
+    from rft.bodies import Backbone, Body, Chain, ConstantCurvature, Serpenoid
+    from rft.effects import (
+        BodyInertia,
+        DepthProfile,
+        DisturbedGround,
+        EndCaps,
+        GrainInertia,
+        SkinFriction,
+        Slope,
+        TowedSled,
+        Transient,
+    )
+    from rft.laws import CATALOGUE, Coulomb, Granular, Medium, Surface, Table, Viscous
+    from rft.refusal import Refusal
+    from rft.stepping import TimeSteps, time_steps
+    from rft.work import Work, work_done
 
 SOLVER = 8  # version of the numbers, raised with every change of one; results of other versions are not resumed
+_NAMES = {
+    "rft.balance.velocity": "Solution body_velocity",
+    "rft.bodies": "Backbone Body Chain ConstantCurvature Serpenoid",
+    "rft.effects": "BodyInertia DepthProfile DisturbedGround EndCaps GrainInertia SkinFriction Slope TowedSled Transient",
+    "rft.laws": "CATALOGUE Coulomb Granular Medium Surface Table Viscous",
+    "rft.refusal": "Refusal",
+    "rft.stepping": "TimeSteps time_steps",
+    "rft.work": "Work work_done",
+}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for at first use: a command that refuses needs no mechanics."""
+    if name in _MODULES:
+        return getattr(importlib.import_module(_MODULES[name]), name)
+    if name in {module.name for module in pkgutil.iter_modules(__path__)}:
+        return importlib.import_module(f"rft.{name}")
+    raise AttributeError(f"module 'rft' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
 
 __all__ = [
     "CATALOGUE",
@@ -34,6 +64,7 @@ __all__ = [
     "GrainInertia",
     "Granular",
     "Medium",
+    "Refusal",
     "Serpenoid",
     "SkinFriction",
     "Slope",

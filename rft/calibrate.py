@@ -14,13 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import formatted, in_range, require
+from rft.checks import in_range
 from rft.drag import Rod, RodDrag
 from rft.effects.end_caps import EndCaps
 from rft.laws.base import Medium
 from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular
 from rft.laws.viscous import Viscous
+from rft.refusal import Refusal, require
 
 CAPS = "end_caps"
 MOST_CAPS = 10.0  # e of a hemisphere is 4
@@ -166,18 +167,22 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
     if a parameter ends on a bound."""
     fitted_law = FITS[law]
     fits_caps = isinstance(end_caps, str)
-    require(not fits_caps or end_caps == "fitted", f"end caps must be 'fitted' or a number, got {formatted(end_caps)}")
+    require(not fits_caps or end_caps == "fitted", "end caps must be 'fitted' or a number", value=end_caps)
     if not fits_caps:
         in_range("end caps", end_caps, 0, MOST_CAPS)
     if end_caps:
-        require(law == "granular", f"end caps take the granular law, got {law}: leave them out")
+        require(law == "granular", f"end caps take the granular law, got {law}", instead="leave them out")
         require(
-            rod.radius and rod.length, "end caps take the rod's radius and length: give both, or leave the caps out"
+            rod.radius and rod.length,
+            "end caps take the rod's radius and length",
+            instead="give both, or leave the caps out",
         )
         require(rod.radius <= rod.length, f"end caps take a rod longer than its radius, got {rod.length:g} m")
     names = (*fitted_law.names, "axial_force", *([CAPS] if fits_caps else []))
     require(
-        data.n_forces > len(names), f"{data.n_forces} forces are too few for {', '.join(names)}: measure at more angles"
+        data.n_forces > len(names),
+        f"{data.n_forces} forces are too few for {', '.join(names)}",
+        instead="measure at more angles",
     )
     fixed_caps = 0.0 if fits_caps else float(end_caps)
 
@@ -186,7 +191,11 @@ def fit(law: str, data: RodDrag, rod: Rod = UNKNOWN_ROD, end_caps: float | str =
 
     low, high = np.array([*fitted_law.bounds, (0.0, np.inf), *([(0.0, MOST_CAPS)] if fits_caps else [])]).T
     best = _best(residual, _starts(fitted_law, data, residual, fits_caps), low, high)
-    require(best.success, f"the fit of {', '.join(map(_with_unit, names))} does not settle: measure at more angles")
+    require(
+        best.success,
+        f"the fit of {', '.join(map(_with_unit, names))} does not settle",
+        instead="measure at more angles",
+    )
     _check_inside(names, best.x, low, high)
     covariance = _covariance(names, best, data.n_forces)
     unit, newton = _unit(law, rod)
@@ -268,7 +277,7 @@ def _check_inside(names, values, low, high) -> None:
             if abs(x - bound) <= AT_BOUND * max(abs(bound), 1.0):
                 instead = "leave the end caps out" if name == CAPS else "measure at more angles, or fit another law"
                 message = f"the fit ends at the edge of {_with_unit(name)}, {_degrees(name, bound):g}"
-                raise ValueError(f"{message}: these data do not settle it; {instead}")
+                raise Refusal(message, because="these data do not settle it", instead=instead)
 
 
 def _with_unit(name: str) -> str:
@@ -286,6 +295,8 @@ def _covariance(names, best, count: int) -> np.ndarray:
     size = np.where(best.x > 0, best.x, 1.0)
     _, s, right = np.linalg.svd(best.jac * size, full_matrices=False)
     if s[-1] < DEPENDENT * s[0]:
-        raise ValueError(f"these data do not tell {', '.join(map(_with_unit, names))} apart: measure at more angles")
+        raise Refusal(
+            f"these data do not tell {', '.join(map(_with_unit, names))} apart", instead="measure at more angles"
+        )
     root = (right.T / s) * size[:, None]
     return root @ root.T * (2 * best.cost / (count - len(names)))

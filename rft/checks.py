@@ -8,10 +8,15 @@ The bounds, the unit and the meaning of a number field of a class stand in its a
 from __future__ import annotations
 
 import functools
+import math
+import numbers
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args, get_type_hints
 
-import numpy as np
+from rft.refusal import Refusal, require
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class Number(NamedTuple):
@@ -52,25 +57,33 @@ def check_numbers(owner: Any) -> None:
 
 def real_array(name: str, x) -> np.ndarray:
     """Return x as an array of floats; ValueError with its name unless it is an array of real numbers."""
+    import numpy as np  # a command that refuses starts without it
+
     try:
         array = np.asarray(x)
         if array.dtype.kind in "iuf" or (array.dtype.kind == "O" and all(map(is_number, array.flat))):
             return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ValueError(f"{name} must be real numbers in equal rows, got {formatted(x)}")
+    raise Refusal(f"{name} must be real numbers in equal rows", value=x)
 
 
-def is_number(value) -> bool:
-    """Return whether a value is one real number; True and False are not."""
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+def is_number(value: object) -> bool:
+    """Return whether value is one real number; True and False are not."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
-def in_range(name: str, value, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
+def is_whole(value: object) -> bool:
+    """Return whether value is an integer, as an int or a float."""
+    return is_number(value) and (isinstance(value, numbers.Integral) or (math.isfinite(value) and value == int(value)))
+
+
+def in_range(name: str, value: object, low: float, high: float, whole: bool = False, unit: str = "-") -> None:
     """Raise ValueError with the name unless value is a number, if ``whole`` an integer, from low to high."""
-    if not (is_number(value) and low <= value <= high and (not whole or value == int(value))):
+    exact = value.item() if hasattr(value, "item") and is_number(value) else value  # float32 has no 1e-50
+    if not ((is_whole if whole else is_number)(value) and low <= exact <= high):
         bounds = f"{low:g} to {high:g}" + (f" {unit}" if unit != "-" else "")
-        raise ValueError(f"{name} must be a {'whole ' * whole}number from {bounds}, got {formatted(value)}")
+        raise Refusal(f"{name} must be a {'whole ' * whole}number from {bounds}", value=value)
 
 
 def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | None:
@@ -78,10 +91,13 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
     ``sizes``, symmetric and, to roundoff, without a negative eigenvalue."""
     if value is None:
         return None
+    import numpy as np
+
     matrix, allowed = real_array("covariance", value), " or ".join(f"{n} x {n}" for n in sizes)
     require(
         matrix.shape in [(n, n) for n in sizes] and bool(np.isfinite(matrix).all()),
-        f"covariance must be {allowed} finite numbers, got {formatted(value)}",
+        f"covariance must be {allowed} finite numbers",
+        value=value,
     )
     deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     scale = np.where(deviation > 0, deviation, 1.0)
@@ -91,21 +107,7 @@ def checked_covariance(value, *sizes: int) -> tuple[tuple[float, ...], ...] | No
         is_symmetric
         and bool(np.linalg.eigvalsh(correlation)[0] >= -1e-9)
         and bool((matrix[:, deviation == 0] == 0).all()),
-        f"covariance must be symmetric and without negative eigenvalues, got {formatted(value)}",
+        "covariance must be symmetric and without negative eigenvalues",
+        value=value,
     )
     return tuple(tuple(row) for row in matrix.tolist())
-
-
-def formatted(value) -> str:
-    """Return repr(value) as one line of at most 60 characters."""
-    try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # an integer of more digits than Python prints
-        text = "a very long number"
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def require(condition: bool, text: str) -> None:
-    """Raise ValueError(text) unless the condition holds."""
-    if not condition:
-        raise ValueError(text)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import in_range, real_array, require
-from rft.laws.catalogue import GRAVITY
+from rft.checks import in_range, real_array
+from rft.metres import GRAVITY
+from rft.refusal import require
 
 PUSHING = 0.1  # of the largest force: a force below minus that pushes; a smaller one counts as an error of measurement
 LARGEST_IN_RADIANS = 7.0  # if no angle is larger, the angles are refused as radians
@@ -80,7 +81,8 @@ def rod_drag(psi_deg, along, across, weight=None) -> RodDrag:
     require(bool((weight >= 0).all() and weight.any()), "weights must be 0 or more, and not all 0")
     require(
         not 0 < np.abs(psi).max() <= LARGEST_IN_RADIANS,
-        f"psi_deg reaches only {np.abs(psi).max():.3g}: angles look like radians, give degrees from 0 to 90",
+        f"psi_deg reaches only {np.abs(psi).max():.3g}",
+        because="angles look like radians, give degrees from 0 to 90",
     )
     angle = np.arctan2(np.abs(np.sin(np.radians(psi))), np.abs(np.cos(np.radians(psi))))
     data = RodDrag(angle, _opposing(psi, forces), weight / weight[weight > 0].mean())
@@ -93,15 +95,20 @@ def _opposing(psi: np.ndarray, forces: np.ndarray) -> np.ndarray:
     velocity = np.array([np.cos(np.radians(psi)), np.sin(np.radians(psi))])
     signs = np.where(np.abs(velocity) < 1e-9, 1.0, np.sign(velocity))
     largest = np.abs(forces).max()
-    require(largest > 0, "all forces are zero: there is no drag to fit")
-    require(bool((forces > 0).any()), "no force is positive: drag is, where it opposes the motion; change the sign")
+    require(largest > 0, "all forces are zero", because="there is no drag to fit")
+    require(
+        bool((forces > 0).any()),
+        "no force is positive",
+        because="drag is, where it opposes the motion",
+        instead="change the sign",
+    )
     opposing = max(signs * forces, forces, key=lambda x: x.min())
     component, row = np.unravel_index(np.argmin(opposing), opposing.shape)
     direction, force = ("along", "across")[component], forces[component, row]
     require(
         opposing[component, row] >= -PUSHING * largest,
-        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes: "
-        "drag is positive where it opposes the motion",
+        f"at psi = {psi[row]:g} degrees the force {direction} the rod is {force:g} N and pushes",
+        because="drag is positive where it opposes the motion",
     )
     return opposing
 
@@ -117,7 +124,8 @@ def _require_not_exchanged(data: RodDrag) -> None:
 
     as_given = misfit(directions)
     require(
-        misfit(directions[::-1]) >= 0.25 * as_given or as_given < 1e-6 * (data.forces**2).sum(),
-        "the forces along the rod grow with psi and those across it fall: the columns are exchanged, or psi is measured from "
-        "the rod's normal; it is the angle between velocity and rod axis",
+        misfit(directions[::-1]) >= 0.25 * as_given or as_given < 1e-06 * (data.forces**2).sum(),
+        "the forces along the rod grow with psi and those across it fall",
+        because="the columns are exchanged, or psi is measured from the rod's normal",
+        instead="it is the angle between velocity and rod axis",
     )

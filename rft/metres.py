@@ -1,9 +1,10 @@
-"""Annotations of lengths in m, for plates, meshes and robots."""
+"""Units of plates, meshes and robots: annotations of lengths in m, and the acceleration of gravity."""
 
 from __future__ import annotations
 
 from rft.checks import Number
 
+GRAVITY = 9.81  # m/s^2
 LARGEST = 10.0  # m; a larger number was likely meant in mm
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from rft.checks import Number, require
+from rft.checks import Number
 from rft.metres import LARGEST, metres
+from rft.refusal import require
 
 MOST_SAMPLES = 100_000
 FARTHEST = 1e3  # m along the ground
@@ -31,6 +32,6 @@ class Motion:
 
     def require_turning(self) -> None:
         """Raise ValueError unless the rate leads from start to stop."""
-        require(abs(self.rate) >= 1e-9, "rate must not be 0: drag a body that does not turn")
+        require(abs(self.rate) >= 1e-09, "rate must not be 0", because="drag a body that does not turn")
         forwards = (self.stop - self.start) * self.rate > 0
-        require(forwards, "a rate from start to stop: positive if stop > start, else negative")
+        require(forwards, "a rate from start to stop", because="positive if stop > start, else negative")

@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from rft.link import TINY, Load, sum_loads
+from rft.refusal import Refusal
 from rft.vectors import formula, over_nodes, sqrt
 
 QUADRATURE = "gauss:24"  # in place of "exact" for a law without a closed form
@@ -63,4 +64,4 @@ def parse(text: str) -> tuple[str, int]:
         return "exact", 1
     if kind in ("midpoint", "gauss") and re.fullmatch(r"[1-9]\d{0,3}", count) and int(count) <= 1000:
         return kind, int(count)
-    raise ValueError(f"loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000, got {str(text)[:60]!r}")
+    raise Refusal("loads must be 'exact', 'midpoint:N' or 'gauss:N' with N from 1 to 1000", value=str(text)[:60])

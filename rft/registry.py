@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import FunctionType
 from typing import Any, TypeVar, overload
 
+from rft.refusal import Refusal
+
 Part = TypeVar("Part")
 REGISTRIES: dict[str, Registry] = {}  # all there are, by group
 BUILT_IN = ("geomech", "rft")  # packages whose names nobody else may give
@@ -74,17 +76,21 @@ class Registry(Mapping[str, Any]):
         who = f"{self.told} of one's own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
             if not dataclasses.is_dataclass(part) or not part.__dataclass_params__.frozen:
-                raise ValueError(f"{who} must be a value: put @dataclass(frozen=True) above it")
+                raise Refusal(f"{who} must be a value", instead="put @dataclass(frozen=True) above it")
             if self.key in {f.name for f in dataclasses.fields(part)}:
-                raise ValueError(f"{who} has {self.key} as a parameter: write {self.key} = {name!r} without a type")
+                raise Refusal(
+                    f"{who} has {self.key} as a parameter", instead=f"write {self.key} = {name!r} without a type"
+                )
         given = self.key in getattr(part, "__dict__", {}) or name in self
         if not isinstance(name, str) or not name.strip() or (isinstance(part, type) and not given):
-            raise ValueError(f'{who} has no name: give the class {self.key} = "..."')
+            raise Refusal(f"{who} has no name", instead=f'give the class {self.key} = "..."')
         there = self._parts.get(name, part)
         if place(there) != place(part):
             if name in self.built_in:
-                raise ValueError(f"{who} is named {name!r}, as one that is built in: give it another name")
-            raise ValueError(f"{who} is named {name!r}, as the {place(there)[1]} of {place(there)[0]}: rename one")
+                raise Refusal(f"{who} is named {name!r}, as one that is built in", instead="give it another name")
+            raise Refusal(
+                f"{who} is named {name!r}, as the {place(there)[1]} of {place(there)[0]}", instead="rename one"
+            )
         self._parts[name] = part
 
     def restore(self, parts: Mapping[str, Any]) -> None:

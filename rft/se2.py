@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rft.refusal import Refusal
+
 
 def _sinc(x: np.ndarray) -> np.ndarray:
     """Return sin x / x, 1 at 0, to the last digit or two (np.sinc rounds pi x first)."""
@@ -19,9 +21,9 @@ def _components(g):
     try:
         g = np.asarray(g, float)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError("a pose or velocity of the plane has three real numbers (..., 3)") from None
+        raise Refusal("a pose or velocity of the plane has three real numbers (..., 3)") from None
     if g.ndim == 0 or g.shape[-1] != 3:
-        raise ValueError(f"a pose or velocity of the plane has shape (..., 3), got {g.shape}")
+        raise Refusal("a pose or velocity of the plane has shape (..., 3)", value=g.shape)
     return g[..., 0], g[..., 1], g[..., 2]
 
 

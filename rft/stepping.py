@@ -17,18 +17,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rft import limit_cycle
-from rft.balance import checked_input
 from rft.balance.arrays import frame_net, velocities, with_frame_velocity
 from rft.balance.backend import check
 from rft.balance.newton import to_element
 from rft.balance.solver import Accuracy, Solved, solve
+from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
-from rft.checks import in_range, require
+from rft.checks import in_range
 from rft.contact import Assembly, Problem, assemble
 from rft.effects.base import PAST, Effect, Site, broken_premises, stepwise_effects
 from rft.laws.base import Medium
 from rft.premise import Premise
+from rft.refusal import require
 from rft.work import Work, element_work
 
 MOST_CYCLES = 60

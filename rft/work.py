@@ -7,18 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.balance import checked_input
 from rft.balance.arrays import loads as loads_on
 from rft.balance.arrays import velocities, with_frame_velocity
 from rft.balance.newton import times, to_frame
+from rft.balance.velocity import checked_input
 from rft.bodies.base import Body, Elements, checked_body, half_lengths, joint_speed
 from rft.bodies.pieces import PIECES
-from rft.checks import real_array, require
+from rft.checks import real_array
 from rft.contact import Problem, assemble
 from rft.effects.base import Effect, broken_premises
 from rft.laws.base import Medium
 from rft.momentum import element_momentum_rates
 from rft.premise import SHAPE_ALONE
+from rft.refusal import require
 
 
 class Work(NamedTuple):
@@ -58,7 +59,7 @@ def work_done(
     checked_body(body)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, 1.0)
     batch, xi = alpha.shape[:-1], real_array("xi", xi)
-    require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot, got {xi.shape}")
+    require(xi.shape == (*batch, 3), f"xi must have shape {(*batch, 3)} for these alpha and alphadot", value=xi.shape)
     broken_premises(effects)  # raises ValueError unless all are effects
     assembly = assemble(medium, body, effects, loads, pieces)
     assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))

@@ -6,9 +6,10 @@ import time
 import warnings
 from pathlib import Path
 
-from geomech.core.errors import SceneError, UnitWarning
+from geomech.core.errors import UnitWarning
 from geomech.run.jobs import runner
 from rft.balance import backend
+from rft.refusal import Refusal
 from rft.threads import thread_count
 
 
@@ -45,7 +46,7 @@ def always_dies(_, x):
 
 def fails(_, x):
     if x == 2:
-        raise SceneError("no such thing as 2")
+        raise Refusal("no such thing as 2")
     return x
 
 

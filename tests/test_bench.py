@@ -9,7 +9,6 @@ from registry import BODIES, EFFECTS, GAITS, MEDIA, SYSTEMS
 
 import rft
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier, Sine
 from geomech.geometry import connection
 from geomech.scene import Numerics, Scene
@@ -18,6 +17,7 @@ from geomech.systems import Solver, Swimmer
 from geomech.systems.base import length_unit
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import in_frame
+from rft.refusal import Refusal
 
 GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
@@ -146,7 +146,7 @@ def test_sizes_stand_once():
         (PLAIN.replace('"chain"', '"chain"\nlength = 0.2') + SIZES, r"\[body\] length = 0.2, but \[physical\] length = 0.1"),
         (PLAIN + SIZES + MASS + "radius = 0.07", r"\[\[effects\]\] radius = 0.07, but \[physical\] radius = 0.06: keep one"),
         (PLAIN + "[physical]\nmass = 1.0", r"\[physical\] mass: nothing in this scene has one"),
-        (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown; did you mean 'mass'"),
+        (PLAIN + "[physical]\nmas = 1.0", r"\[physical\] key: 'mas' is unknown: did you mean 'mass'"),
         (PLAIN + '[physical]\nlength = "x"', r"\[body\] Expected `float`, got `str`"),
         ("frame = 3" + PLAIN, r"\[body\] Expected `str`, got `int`"),
         ('frame = "link-1"' + PLAIN.replace('"chain"', '"chain"\nframe = "link-2"'), "but the scene's frame = 'link-1'"),
@@ -160,7 +160,7 @@ def test_sizes_stand_once():
     ],
 )  # fmt: skip
 def test_contradictions_and_strangers_are_refused(text, said):
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(Refusal, match=said) as caught:
         scenes.parse(text)
     assert "\n" not in str(caught.value)
 

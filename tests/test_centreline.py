@@ -13,12 +13,13 @@ from commands import geomech
 from scipy.special import ellipe
 
 from geomech import scene as scenes
-from geomech.core.errors import Note, SceneError, UnitWarning
+from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
 from geomech.study.bench import Study
 from geomech.study.sweep import Sweep
 from rft import Backbone
+from rft.refusal import Refusal
 
 ROOT = pathlib.Path(__file__).parents[1]
 T = np.linspace(0, 2 * np.pi, 97)
@@ -264,7 +265,7 @@ def test_file_lies_beside_the_scene(tmp_path, monkeypatch):
     made = scenes.load(toml)
     sine = Study(made).displacement("direct", Sine(amplitude=0.1, elements=ELEMENTS))
     assert float(done.stdout.splitlines()[2].split()[1]) == pytest.approx(np.hypot(*sine[:2]), abs=2e-5)
-    with pytest.raises(SceneError, match="cannot read"):
+    with pytest.raises(Refusal, match="cannot read"):
         scenes.parse(toml.read_text())
     monkeypatch.chdir(tmp_path)
     assert scenes.parse(toml.read_text()).gait == made.gait

@@ -13,12 +13,12 @@ from tasks import always_dies, dies, fails
 from test_workers import OVER, power  # noqa: F401  power is a fixture
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.run import executors
 from geomech.run.executors import Cluster
 from geomech.run.jobs import runner
 from geomech.run.workers import using
 from geomech.study import cycles, sweep
+from rft.refusal import Refusal
 
 distributed = pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
 
@@ -47,11 +47,11 @@ def test_the_cluster_gives_the_same_digits(address, power, monkeypatch):  # noqa
 
 
 def test_errors_of_parts_are_those_of_the_command(address):
-    with using(scheduler=address), pytest.raises(SceneError, match="no such thing as 2"):
+    with using(scheduler=address), pytest.raises(Refusal, match="no such thing as 2"):
         list(runner().map(fails, None, range(4), 4))
     with (
         using(scheduler=address),
-        pytest.raises(SceneError, match="a cluster cannot know what is to be computed"),
+        pytest.raises(Refusal, match="a cluster cannot know what is to be computed"),
     ):
         list(runner().map(lambda c, x: x, None, range(4), 4))
 
@@ -93,7 +93,7 @@ def test_a_worker_with_other_code_is_refused(address, monkeypatch):
     )  # of this command; threads share it, parts bear it
     monkeypatch.setattr(executors, "_probe", lambda: ("geomech 9.8, solver 9", "numpy"))
     with pytest.raises(
-        SceneError, match="has geomech 9.8, solver 9, this command geomech 9.9, solver 9: install the same"
+        Refusal, match="has geomech 9.8, solver 9, this command geomech 9.9, solver 9: install the same"
     ):
         Cluster(address)
 
@@ -122,7 +122,7 @@ def test_no_client_is_made_of_what_is_no_address(monkeypatch):
     """One whose connection fails so prints a traceback, seconds later."""
     monkeypatch.setattr(distributed, "Client", None)
     for word in ("nonsense", "http://127.0.0.1:80", "tcp://127.0.0.1:1;x", ""):
-        with pytest.raises(SceneError, match="missing port|unknown address|invalid literal"):
+        with pytest.raises(Refusal, match="missing port|unknown address|invalid literal"):
             Cluster(word)
 
 
@@ -131,26 +131,26 @@ def test_a_scheduler_that_never_answers_is_one_line(monkeypatch):
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
-        with pytest.raises(SceneError, match="nothing answers there"):
+        with pytest.raises(Refusal, match="nothing answers there"):
             Cluster(f"tcp://127.0.0.1:{silent.getsockname()[1]}")
 
 
 def test_a_cluster_without_workers_is_one_line(monkeypatch):
     monkeypatch.setattr(executors, "WAIT", 0.3)
     settings = {"processes": False, "n_workers": 0, "dashboard_address": ":0", "protocol": "tcp://"}
-    none = pytest.raises(SceneError, match="it has no workers: start some")
+    none = pytest.raises(Refusal, match="it has no workers: start some")
     with distributed.LocalCluster(silence_logs=50, **settings) as local, none:
         Cluster(local.scheduler_address)
 
 
 def test_without_the_package_the_cure_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(SceneError, match="pip install 'geomech.distributed.'"):
+    with pytest.raises(Refusal, match="pip install 'geomech.distributed.'"):
         Cluster("tcp://127.0.0.1:1")
 
 
 def test_workers_and_a_scheduler_are_one_too_many():
-    with pytest.raises(SceneError, match="give one of the two"), using(2, "tcp://127.0.0.1:1"):
+    with pytest.raises(Refusal, match="give one of the two"), using(2, "tcp://127.0.0.1:1"):
         pass
 
 

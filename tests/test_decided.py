@@ -8,13 +8,13 @@ import pytest
 import tasks
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.run import cost as run_cost
 from geomech.run import jobs
 from geomech.study import sweep
 from geomech.study.bench import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
+from rft.refusal import Refusal
 from rft.threads import run_shares
 
 GLASS = scenes.load("three-link-glass")
@@ -147,7 +147,7 @@ def test_what_is_refused_leaves_nothing(tmp_path, clock):
             run_cost.decide(run_cost.Cost(10**6, 31.0, 1e8), lambda told: told.check("here", False))
             clock.solve(1.0, count=9)
 
-    with pytest.raises(SceneError, match="here: 1,000,000 force balances, about"):
+    with pytest.raises(Refusal, match="here: 1,000,000 force balances, about"):
         refused()
     assert list(tmp_path.iterdir()) == []
 
@@ -160,5 +160,5 @@ def test_a_cost_reads_well():
     run_cost.Cost(1, 59.0, 1.9e9).check("here", False)
     for beyond in (run_cost.Cost(1, 61.0, 1.0), run_cost.Cost(1, 1.0, 2.1e9)):
         beyond.check("here", True)
-        with pytest.raises(SceneError, match="here: 1 force balances"):
+        with pytest.raises(Refusal, match="here: 1 force balances"):
             beyond.check("here", False)

@@ -11,7 +11,6 @@ from artists import curve, drawn
 from registry import EFFECTS
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.study.bench import Study
 from geomech.text.explain import explain
@@ -31,6 +30,7 @@ from rft.effects import EFFECTS as KINDS
 from rft.effects import batched_effect, engine
 from rft.link import quadratic_load
 from rft.premise import ALL, negated
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -285,7 +285,7 @@ def test_explain_names_effects_engine_and_losses():
 
 
 BAD = [
-    ('kind = "end-cap"\nradius = 0.1', "'end-cap' is unknown; did you mean 'end-caps'"),
+    ('kind = "end-cap"\nradius = 0.1', "'end-cap' is unknown: did you mean 'end-caps'"),
     ('kind = "end-caps"', "has no `radius`"),
     ('kind = "end-caps"\nradius = -1', "radius must be a number from 0 to 1"),
     ('kind = "skin-friction"\nforward = 0', "forward must be a number from 0.001"),
@@ -304,13 +304,13 @@ BAD = [
 
 @pytest.mark.parametrize(("effects", "said"), BAD)
 def test_bad_effects_are_refused(effects, said):
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         scenes.parse(scenes.load("three-link-glass").text + "[[effects]]\n" + effects)
 
 
 def test_grain_inertia_needs_grains():
     effect = '[[effects]]\nkind = "grain-inertia"\nfrequency = 1\nlength = 0.1\ndepth = 0.05'
-    with pytest.raises(SceneError, match="grain inertia takes a medium of grains, got Viscous"):
+    with pytest.raises(Refusal, match="grain inertia takes a medium of grains, got Viscous"):
         scenes.parse(scenes.load("three-link-viscous").text + effect)
 
 
@@ -338,12 +338,12 @@ def test_grain_inertia_takes_the_grains_own_pressure():
     old = INERTIAL.format(f=1.0)
     assert "assumes" not in explain(scenes.parse(old))
     assert "assumes k = 2.5" in explain(scenes.parse(old.replace("0.3mm-loose", "0.3mm-surface")))
-    with pytest.raises(SceneError, match="k must be a number from 0.001 to 1000"):
+    with pytest.raises(Refusal, match="k must be a number from 0.001 to 1000"):
         scenes.parse(old + "\nk = 0")
 
 
 def test_end_caps_need_grains():
-    with pytest.raises(SceneError, match="end caps take a granular medium, got Viscous"):
+    with pytest.raises(Refusal, match="end caps take a granular medium, got Viscous"):
         scenes.parse(scenes.load("three-link-viscous").text + '[[effects]]\nkind = "end-caps"\nradius = 0.1')
 
 
@@ -367,7 +367,7 @@ def test_with_grain_inertia_frequency_matters():
 def test_what_an_effect_breaks_is_refused_by_name(method):
     inertial = scenes.parse(INERTIAL.format(f=1.0))
     assert Study(inertial).methods == ("direct",)
-    with pytest.raises(SceneError, match="the effect grain-inertia, which is not rate-independent"):
+    with pytest.raises(Refusal, match="the effect grain-inertia, which is not rate-independent"):
         Study(inertial).displacement(method)
     assert "; not rate-independent; costs" in explain(inertial)
     assert "not available: connection, CCF" in explain(inertial)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import metric
 from geomech.geometry.connection import Connection
@@ -17,6 +16,7 @@ from geomech.systems import NoSlipSnake, Swimmer, Table
 from geomech.systems.capabilities import driven
 from rft import BodyInertia, Chain, DisturbedGround, Granular, Serpenoid, SkinFriction, Transient, Viscous
 from rft.balance.listening import listening
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.7), Granular(C=1.8, gamma0=np.radians(13.8))
@@ -130,7 +130,7 @@ def test_errors_of_work_in_time_stepping_cover_steps_and_pieces(effect):
 def test_what_has_no_metric_says_why(system, said):
     gait = Circle() if system.joints == 2 else geomech.gaits.Fourier(cos=((1,), (0,), (0,)), sin=((0,), (1,), (0.5,)))
     study = geomech.Study(scene(system, gait))
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         study.metric  # noqa: B018
 
 
@@ -175,7 +175,7 @@ def test_a_damaged_metric_is_refused(tmp_path):
                 file.variables["metric"][0, 1] += 1.0
             else:
                 file.power_degree = -1.0
-        with pytest.raises(SceneError, match="symmetric" if what == "symmetry" else "power_degree"):
+        with pytest.raises(Refusal, match="symmetric" if what == "symmetry" else "power_degree"):
             Table(str(path))
 
 

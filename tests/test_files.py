@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from geomech.core.errors import SceneError
 from geomech.io import files
+from rft.refusal import Refusal
 
 KILLED = """
 import os, signal, sys
@@ -138,14 +138,14 @@ def test_a_folder_replaces_files_alone(kind, tmp_path):
         os.mkfifo(tmp_path / "out" / "a.txt")
     else:
         (tmp_path / "out" / "a.txt").mkdir()
-    with pytest.raises(SceneError, match=r"a\.txt: it is no ordinary file"):
+    with pytest.raises(Refusal, match=r"a\.txt: it is no ordinary file"):
         write("whole_folder", tmp_path / "out")
 
 
 def test_a_folder_does_not_replace_an_input(tmp_path):
     file, source = write("whole_folder", tmp_path / "out", "input"), tmp_path / "input"
     source.hardlink_to(file)
-    with pytest.raises(SceneError, match="it is an input"), files.whole_folder(tmp_path / "out", [source]) as new:
+    with pytest.raises(Refusal, match="it is an input"), files.whole_folder(tmp_path / "out", [source]) as new:
         (new / "a.txt").write_text("new")
     assert file.read_text() == "input"
 
@@ -190,7 +190,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 try:
     with getattr(files, sys.argv[1])(sys.argv[2]) as path:
         (path / "a.txt" if sys.argv[1] == "whole_folder" else path).write_text("x" * 5000)
-except files.SceneError as error:
+except files.Refusal as error:
     print(error)
 """
 
@@ -211,10 +211,10 @@ def test_a_full_disk_is_named_and_leaves_what_was_there(writer, tmp_path):
 def test_where_nothing_can_be_written(bad, tmp_path):
     (tmp_path / "file").write_text("")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    with pytest.raises(SceneError, match="cannot write"):
+    with pytest.raises(Refusal, match="cannot write"):
         write("whole_file", tmp_path / bad)
     if bad != "missing/out":
-        with pytest.raises(SceneError, match="cannot write the folder"):
+        with pytest.raises(Refusal, match="cannot write the folder"):
             write("whole_folder", tmp_path / bad)
 
 

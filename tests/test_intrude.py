@@ -11,13 +11,13 @@ from registry import OUTLINES, STRESSES
 from test_fuzz import VALUES, mutated
 
 import geomech.scene as scenes
-from geomech.core.errors import SceneError
 from geomech.output import plots
 from geomech.scene.intruder import IntruderScene
 from geomech.scene.stress import load_medium
 from geomech.study.bench import Study
 from geomech.study.intrusion import estimate
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
+from rft.refusal import Refusal
 
 FLAT = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), IntruderScene)]  # others are meshes
 MADE = """[medium]
@@ -102,10 +102,10 @@ def test_a_scene_takes_its_medium_from_a_file(tmp_path):
         wanted = StressMap(zeta=0.2, tension=tension, grazing=math.radians(grazing))
         assert scenes.load(tmp_path / "s.toml").medium == wanted
     (tmp_path / "own.toml").write_text("file = 'own.toml'\n")
-    with pytest.raises(SceneError, match="names another file, own.toml: copy the coefficients"):
+    with pytest.raises(Refusal, match="names another file, own.toml: copy the coefficients"):
         scenes.load(tmp_path / "s.toml")
     (tmp_path / "own.toml").write_text("[medium\n")
-    with pytest.raises(SceneError, match="it is not TOML"):
+    with pytest.raises(Refusal, match="it is not TOML"):
         scenes.load(tmp_path / "s.toml")
 
 
@@ -270,7 +270,7 @@ def test_what_is_written_reads_the_same():
     for k, shape in enumerate(OUTLINES.values()):
         scene = IntruderScene(stress, shape, motions[k % 3], elements=31)
         assert scenes.parse(scenes.toml(scene)) == scene
-    with pytest.raises(SceneError, match="has a CSV file of its own"):
+    with pytest.raises(Refusal, match="has a CSV file of its own"):
         scenes.toml(IntruderScene(STRESSES["measured"], shape, motions[0]))
 
 
@@ -280,14 +280,14 @@ def _parts(scene):
 
 REFUSED = [
     ("[intruder]", "[motion.x]", "the table [intruder] is missing: add it, see 'geomech scenes --show c-leg'"),
-    ("[medium]", "[media]", "table: 'media' is unknown; did you mean 'medium'"),
+    ("[medium]", "[media]", "table: 'media' is unknown: did you mean 'medium'"),
     ('name = "poppy-seeds-close"', 'name = "poppy"', "[medium] name: 'poppy' is unknown"),
     ('name = "poppy-seeds-close"', 'name = "glass-0.3mm-loose"', "[medium] name: 'glass-0.3mm-loose' is unknown"),
     ('name = "poppy-seeds-close"', "A00 = 0.1", "has no A10, B01, B11, Bm11, C01, C11, Cm11, D10: keep one of"),
     ('name = "poppy-seeds-close"', 'name = "generic"\nA00 = 0.1', "keep one of 'name', 'file' and the nine"),
     ("zeta = 0.5", "zeta = -0.5", "[medium] zeta must be a number from 0 to 1e+06, got -0.5"),
     ("zeta = 0.5", 'zeta = "a"', "[medium] Expected `float`, got `str`"),
-    ("zeta = 0.5", "zetta = 0.5", "[medium] key: 'zetta' is unknown; did you mean 'zeta'"),
+    ("zeta = 0.5", "zetta = 0.5", "[medium] key: 'zetta' is unknown: did you mean 'zeta'"),
     ("zeta = 0.5", 'tension = "pull"', "tension must be 'keep' or 'cut', got 'pull'"),
     ("zeta = 0.5", 'file = "no.csv"', "keep one of 'name', 'file'"),
     (
@@ -295,15 +295,15 @@ REFUSED = [
         'file = "no.csv"',
         "No such file or directory; give a CSV file with the header beta,gamma",
     ),
-    ('kind = "polygon"', 'kind = "poligon"', "[intruder] kind: 'poligon' is unknown; did you mean 'polygon'"),
+    ('kind = "polygon"', 'kind = "poligon"', "[intruder] kind: 'poligon' is unknown: did you mean 'polygon'"),
     ('kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of plate, round-rod"),
     ("[0.03, 0.02]", "[0.03, 0.02], [0.01, -0.02]", "of the outline cross or touch"),
     ("[0.03, 0.02]", "[0.03]", "[intruder]"),
-    ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder]: cannot read"),
+    ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder] cannot read"),
     ("width = 0.03", "width = 0.03\nfile = 'b.csv'", "give either 'file' or 'points'"),
     ("width = 0.03", "width = 30", "width must be a number from 1e-06 to 10 m, got 30"),
     ("width = 0.03", "", "[intruder] has no `width`: add"),
-    ('kind = "drag"', 'kind = "dragg"', "[motion] kind: 'dragg' is unknown; did you mean 'drag'"),
+    ('kind = "drag"', 'kind = "dragg"', "[motion] kind: 'dragg' is unknown: did you mean 'drag'"),
     ("depth = 0.01", "depth = nan", "depth must be a number"),
     ("direction_deg = 30", "direction_deg = 30\ndirection = 1", "direction is given twice"),
     ("samples = 7", "samples = 1", "samples must be a whole number from 2"),
@@ -318,7 +318,7 @@ REFUSED = [
 @pytest.mark.parametrize(("old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED])
 def test_what_makes_no_sense_is_refused(old, new, said):
     assert old in MADE
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(Refusal) as caught:
         scenes.parse(MADE.replace(old, new), "made")
     assert said in str(caught.value) and str(caught.value).startswith("made")
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 450
@@ -366,14 +366,14 @@ def test_options_of_stress_and_intrude_are_refused_before_anything_is_written(ge
     refused(geomech("stress", "generic", "--beta", "nan", "--gamma", "0"), "must be finite")
     refused(
         geomech("stress", "generics", "--beta", "1", "--gamma", "0"),
-        "medium: 'generics' is unknown; did you mean 'generic'",
+        "medium: 'generics' is unknown: did you mean 'generic'",
     )
     refused(geomech("stress", "no.csv", "--beta", "1", "--gamma", "0"), "No such file or directory")
     refused(geomech("stress", "generic", "--plot", "a.gif"), "end the name in .png")
     refused(geomech("intrude", "c-leg", "-o", "a.txt"), "end the name of a table in .csv")
     refused(geomech("intrude", "c-leg", "--plot", "a.gif"), "end the name in .png")
     refused(geomech("intrude", "c-leg", "-o", "no/a.csv"), "cannot write no/a.csv")
-    refused(geomech("intrude", "c-legs"), "scene: 'c-legs' is unknown; did you mean 'c-leg'")
+    refused(geomech("intrude", "c-legs"), "scene: 'c-legs' is unknown: did you mean 'c-leg'")
     assert list(tmp_path.iterdir()) == []
 
 

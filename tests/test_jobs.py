@@ -17,7 +17,6 @@ from test_store import HARD, same
 from geomech import scene as scenes
 from geomech import terminal
 from geomech.commands.pipeline import allow, storing
-from geomech.core.errors import SceneError
 from geomech.core.knob import Knob
 from geomech.geometry import connection
 from geomech.optimise import checked, search
@@ -38,6 +37,7 @@ from rft.balance import backend
 from rft.effects import Effect
 from rft.laws import LAWS
 from rft.premise import Premise
+from rft.refusal import Refusal
 from rft.stepping import Stepping
 
 GLASS, VISCOUS = scenes.load("three-link-glass"), scenes.load("three-link-viscous")
@@ -579,7 +579,7 @@ def test_nothing_is_stored_over_an_input(tmp_path):
     name = str(tmp_path / ".f.nc.partial")
     scene = dataclasses.replace(VISCOUS, name=name)
     with (
-        pytest.raises(SceneError, match="it is an input"),
+        pytest.raises(Refusal, match="it is an input"),
         storing(Trajectory(scene), tmp_path / "f.nc", inputs(scene)),
     ):
         pass

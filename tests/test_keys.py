@@ -10,7 +10,6 @@ import tomllib
 import pytest
 from commands import geomech
 
-from geomech.core.errors import SceneError
 from geomech.scene import (
     builtin_names,
     from_tables,
@@ -29,6 +28,7 @@ from geomech.scene.sections import file_sections, keys_in
 from rft import CATALOGUE
 from rft.laws import LAWS
 from rft.plates import VERTICAL
+from rft.refusal import Refusal
 
 TABLES = file_sections(Scene)
 EVERY = {  # section and name of every class that a scene may name, by kind of scene
@@ -113,7 +113,7 @@ def test_the_command_prints_them_all_or_a_section():
     assert re.search(r"\n +C +number +- +required +the extra normal force", granular)
     assert re.search(r"\n +gamma0 +number +rad +required [^:]*as\s+gamma0_deg", granular)
     code, out, err = geomech("keys", "bdy")
-    assert (code, out, err) == (2, "", "error: SECTION: 'bdy' is unknown; did you mean 'body'?\n")
+    assert (code, out, err) == (2, "", "error: SECTION: 'bdy' is unknown: did you mean 'body'?\n")
     assert geomech("keys", "body", "--json-schema")[:2] == (2, "")
 
 
@@ -179,7 +179,7 @@ def both(valid, scene, table, k, part):
     try:
         from_tables(changed, "scene")
         read = True
-    except SceneError:
+    except Refusal:
         read = False
     assert valid(changed) == read, part
     return read
@@ -221,7 +221,7 @@ def test_the_schema_agrees_with_the_reader(toml, good, valid):
     if good:
         parse(scene)
     else:
-        with pytest.raises(SceneError):
+        with pytest.raises(Refusal):
             parse(scene)
 
 
@@ -261,7 +261,7 @@ def test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion
     if good:
         parse(scene)
     else:
-        with pytest.raises(SceneError):
+        with pytest.raises(Refusal):
             parse(scene)
 
 
@@ -368,7 +368,7 @@ def test_the_schema_agrees_with_the_reader_of_walkers(robot, legs, gait, more, g
     if good:
         parse(scene)
     else:
-        with pytest.raises(SceneError):
+        with pytest.raises(Refusal):
             parse(scene)
 
 
@@ -399,7 +399,7 @@ def test_the_schema_agrees_with_the_reader_of_mjcf_robots(old, new, good, valid,
     if good:
         parse(scene)
     else:
-        with pytest.raises(SceneError):
+        with pytest.raises(Refusal):
             parse(scene)
 
 

@@ -18,7 +18,6 @@ from registry import EFFECTS
 
 from geomech import cli
 from geomech.core.entry_points import offered
-from geomech.core.errors import SceneError
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Circle, Gait, Sine
 from geomech.geometry.traits import Traits
@@ -34,6 +33,7 @@ from geomech.text.system import notes
 from rft import Backbone, Chain, Coulomb, EndCaps, Granular, Viscous, body_velocity
 from rft.effects import Effect
 from rft.laws.base import TermLaw, is_rate_independent
+from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
 PAGE = (pathlib.Path(__file__).parents[1] / "geomech" / "scene" / "README.md").read_text()
@@ -247,7 +247,7 @@ PARTS = {"hinge": Hinge, "peanut": Peanut, "slick": Slick, "car": Car}
 @pytest.mark.parametrize("name", OWN)
 def test_one_of_each_family_runs_everywhere_and_round_trips(name):
     text = OWN[name] + "[numerics]\ngrid = 7\nphases = 32\n"
-    with pytest.raises(SceneError, match=f"{name}' is unknown"):
+    with pytest.raises(Refusal, match=f"{name}' is unknown"):
         parse(text)
     assert register(PARTS[name]) is PARTS[name]
     scene = parse(text)
@@ -307,7 +307,7 @@ def test_every_command_that_takes_a_scene_takes_plugins():
 def test_files_that_cannot_be_registered_get_one_line_and_leave_nothing(text, said, tmp_path):
     path = tmp_path / "own.py"
     path.write_text(text)
-    with pytest.raises(SceneError, match=".") as caught:
+    with pytest.raises(Refusal, match=".") as caught:
         load_file(path)
     assert said in str(caught.value)
     assert str(caught.value).startswith(f"--plugin {path}")
@@ -323,17 +323,17 @@ def test_a_file_is_run_as_python_would_with_types_as_it_writes_them(future, tmp_
     (tmp_path / "own.py").write_text(f"{head}{LAW}assert Thick.__annotations__ == {types}, Thick.__annotations__\n")
     assert load_file(tmp_path / "own.py") == ["thick"]
     assert parse(SCENE).system.medium.thickness == 3.0
-    with pytest.raises(SceneError, match=r"\[medium\] Expected `float`, got `str` - at `.thickness`"):
+    with pytest.raises(Refusal, match=r"\[medium\] Expected `float`, got `str` - at `.thickness`"):
         parse(SCENE.replace("3.0", '"3"'))
 
 
 def test_names_of_no_python_file_are_refused(tmp_path):
     for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             load_file(tmp_path / name if name else "")
     for raw, said in ((b"\xff\xfe\x00", "it is not text"), (b"#" * 1_000_001, "it is larger than 1 MB")):
         (tmp_path / "own.py").write_bytes(raw)
-        with pytest.raises(SceneError, match=f"--plugin .*: {said}"):
+        with pytest.raises(Refusal, match=f"--plugin .*: {said}"):
             load_file(tmp_path / "own.py")
 
 
@@ -469,7 +469,7 @@ def test_entry_points_of_all_families_are_read(package):
 )
 def test_a_broken_package_is_named_in_one_line(code, more, said, package):
     package(code, **more)
-    with pytest.raises(SceneError, match=".") as caught:
+    with pytest.raises(Refusal, match=".") as caught:
         parse(SCENE)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -478,7 +478,7 @@ def test_a_broken_package_is_named_in_one_line(code, more, said, package):
 def test_two_packages_of_one_name_and_built_in_names(package):
     package(LAW)
     package(LAW, dist="muds")
-    with pytest.raises(SceneError, match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one"):
+    with pytest.raises(Refusal, match="is offered by the package .* 1.2 and the package .* 1.2: uninstall one"):
         parse(SCENE)
     package("raise RuntimeError", "viscous", dist="clash")
     told = text("medium")
@@ -497,6 +497,6 @@ def test_parts_are_values_and_need_not_be_registered_from_python():
         Scene(Swimmer(Loose(Viscous()), Chain()), Circle())
     scene = Scene(Swimmer(Bare(Viscous(math.e)), Chain()), Circle(), SMALL)
     assert Study(scene).displacement("area").shape == (3,)
-    with pytest.raises(SceneError, match="Bare is of no kind that a scene file can name"):
+    with pytest.raises(Refusal, match="Bare is of no kind that a scene file can name"):
         toml(scene)
     assert set(GAITS) == GAITS.built_in

@@ -18,7 +18,7 @@ import geomech
 import rft
 from figures import measured_gait
 from geomech import gaits, measured
-from geomech.core.errors import SceneError, UnitWarning
+from geomech.core.errors import UnitWarning
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.curvature import ccf
@@ -39,6 +39,7 @@ from geomech.systems.base import length_unit
 from geomech.text import measured as told
 from geomech.text.explain import explain
 from rft import se2
+from rft.refusal import Refusal
 
 GAIT = gaits.Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.2, -0.1))
 BODY = rft.Chain((1, 1.3, 0.8))
@@ -569,11 +570,11 @@ def test_what_the_data_do_not_reach_is_refused(field):
     system, study = scene.system, Study(scene)
     with pytest.raises(ValueError, match=r"the data do not reach alpha = \(0.2, -0.1\), \d"):
         system.velocity(np.array([0.2, -0.1]), np.array([1.0, 0.0]))
-    with pytest.raises(SceneError, match="the data do not reach"):
+    with pytest.raises(Refusal, match="the data do not reach"):
         study.displacement("direct", amplitudes=[0.5])
-    with pytest.raises(SceneError, match="the area tier sums a field up, and A is known near the mean gait"):
+    with pytest.raises(Refusal, match="the area tier sums a field up, and A is known near the mean gait"):
         study.displacement("area")
-    with pytest.raises(SceneError, match="no gait but one to search"):
+    with pytest.raises(Refusal, match="no gait but one to search"):
         geomech.optimise.optimise(scene, "displacement")
     tube = study.fitted
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
@@ -699,7 +700,7 @@ def test_damaged_fields_are_refused(field, tmp_path):
 def test_parts_of_a_gait_that_do_not_fit_are_refused(change, said, field, tmp_path):
     with xarray.open_dataset(field / "field.nc", engine="scipy") as data:
         change(data).to_netcdf(tmp_path / "bad.nc", engine="scipy")
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         tables.load(tmp_path / "bad.nc")
 
 
@@ -833,7 +834,7 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_bad_logs_get_one_line(name, short, tmp_path):
     change, said = BAD[name]
-    with pytest.raises(SceneError, match="^log.csv(, |: )") as refused:
+    with pytest.raises(Refusal, match="^log.csv(, |: )") as refused:
         measured.fit_log(written(tmp_path / "log.csv", short, change=change))
     assert refused.match(said)
     assert len(str(refused.value).splitlines()) == 1
@@ -850,14 +851,14 @@ def test_bad_logs_get_one_line(name, short, tmp_path):
     ],
 )
 def test_missing_columns_are_named(names, columns, said, short, tmp_path):
-    with pytest.raises(SceneError, match=f"log.csv.*{said}"):
+    with pytest.raises(Refusal, match=f"log.csv.*{said}"):
         measured.fit_log(written(tmp_path / "log.csv", short, names), columns=columns)
 
 
 @pytest.mark.parametrize("text", ["", "hello\nworld\n", "t;alpha_1;alpha_2\n1;2;3\n", "\0\1\2", "1,2,3\n4,5,6\n"])
 def test_what_is_no_log_is_refused(text, tmp_path):
     (tmp_path / "log.csv").write_text(text)
-    with pytest.raises(SceneError, match="t,alpha_1,alpha_2,x,y,heading"):
+    with pytest.raises(Refusal, match="t,alpha_1,alpha_2,x,y,heading"):
         measured.fit_log(tmp_path / "log.csv")
 
 
@@ -889,7 +890,7 @@ def test_a_left_handed_pose_is_refused(moving):
     """y that runs down, x and y swapped, a heading that runs clockwise; wherever it is seen from."""
     measured.fit_log(log_of(moving), harmonics=2)
     for wrong in (moving.pose * [1, -1, 1], moving.pose[:, [1, 0, 2]], moving.pose * [1, 1, -1] + [0, 0, 2]):
-        with pytest.raises(SceneError, match="x, y and heading do not fit each other, .* give y upwards"):
+        with pytest.raises(Refusal, match="x, y and heading do not fit each other, .* give y upwards"):
             measured.fit_log(log_of(moving._replace(pose=wrong)), harmonics=2)
 
 
@@ -923,7 +924,7 @@ def test_likely_slips_of_unit_are_noted(names, change, said, moving, tmp_path):
 def test_columns_in_another_unit_by_their_names_are_refused(name, short, tmp_path):
     columns = [name if name[0] == c else c for c in NAMES]
     path = written(tmp_path / "log.csv", short, columns)
-    with pytest.raises(SceneError, match=f"log.csv: {name} is in {name[2:]} by its name: give t in s, x and y in body"):
+    with pytest.raises(Refusal, match=f"log.csv: {name} is in {name[2:]} by its name: give t in s, x and y in body"):
         measured.fit_log(path, columns=columns)
 
 

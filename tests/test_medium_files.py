@@ -9,11 +9,11 @@ import pytest
 from commands import geomech
 
 from geomech import scene
-from geomech.core.errors import SceneError
 from geomech.study.bench import Study
 from geomech.study.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.laws.base import require_drag
+from rft.refusal import Refusal
 
 LOOSE = Granular(C=1.8, gamma0=math.radians(13.8))
 REST = '[body]\nkind = "chain"\nlengths = [1, 1.3, 0.8]\n[gait]\nkind = "circle"\namplitude = 0.9\n'
@@ -96,7 +96,7 @@ def test_a_scene_goes_into_the_medium_of_a_file(folder, monkeypatch):
     assert "1.4" in scene.toml(own) and scene.tables(own)["medium"]["C"] == 1.4
     table = scene.in_medium(glass.with_numerics(loads="gauss:12"), "T.csv")
     assert table.system.medium == scene.load(written(folder, TABLE, REST + GAUSS)).system.medium
-    with pytest.raises(SceneError, match="a no-slip-snake takes no medium"):
+    with pytest.raises(Refusal, match="a no-slip-snake takes no medium"):
         scene.in_medium(scene.load("no-slip-snake"), "M.toml")
 
 
@@ -106,7 +106,7 @@ BAD = {
     "no such file": (FILE, {}, "cannot read 'M.toml': No such file"),
     "a folder": ('file = "."', {}, "ordinary file"),
     "no name": ('file = 3', {}, 'give text in "quotes" in place of 3'),
-    "extra": (FILE + "\nC = 2.0", {"M_toml": MEDIUM}, "key: 'C' is unknown; use one of file"),
+    "extra": (FILE + "\nC = 2.0", {"M_toml": MEDIUM}, "key: 'C' is unknown: use one of file"),
     "no TOML": (FILE, {"M_toml": "C = "}, "M.toml is not TOML"),
     "no text": (FILE, {"M_toml": b"\xff\xfe\x00"}, "it is not text"),
     "deep": (FILE, {"M_toml": "a = " + "[" * 5000}, "is not TOML"),
@@ -140,7 +140,7 @@ BAD = {
 def test_bad_media_get_one_line(name, folder):
     medium, files, said = BAD[name]
     file = written(folder, medium, **files)
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(Refusal) as caught:
         scene.load(file)
     text = str(caught.value)
     assert said in text and "\n" not in text and len(text) < 410, text

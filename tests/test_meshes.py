@@ -17,7 +17,6 @@ from test_intrude import outcome, refused
 
 import geomech.scene as scenes
 from figures import meshes
-from geomech.core.errors import SceneError
 from geomech.output import plots
 from geomech.scene import MeshScene
 from geomech.text.explain import explain
@@ -39,6 +38,7 @@ from rft.meshes import (
     wrench,
 )
 from rft.plates import VERTICAL
+from rft.refusal import Refusal
 
 NAMES = [n for n in scenes.intruder_names() if isinstance(scenes.load(n), MeshScene)]
 BODIES = (Sphere(0.02), Cylinder(0.0127, 0.1), Screw(0.03, 0.015, 0.06, 0.18), Leg(0.038, 0.025, 0.003, 0.7))
@@ -367,13 +367,13 @@ REFUSED = [
     ("surface_friction = 0.3", "friction = 0.3", "[medium] key: 'friction' is unknown"),
     ("surface_friction = 0.3", 'tension = "pull"', "tension must be one of cut, keep, push"),
     ('shape = "sphere"', "", "has no 'shape': add shape = one of sphere, cylinder, screw, c-leg, or file"),
-    ('shape = "sphere"', 'shape = "spere"', "[intruder] shape: 'spere' is unknown; did you mean 'sphere'"),
+    ('shape = "sphere"', 'shape = "spere"', "[intruder] shape: 'spere' is unknown: did you mean 'sphere'"),
     (
         'shape = "sphere"',
         'shape = "sphere"\nfile = "a.stl"',
-        "'file' is unknown; use one of radius",
+        "'file' is unknown: use one of radius",
     ),
-    ('kind = "mesh"', 'kind = "sphere"', "'shape' is unknown; use one of radius"),
+    ('kind = "mesh"', 'kind = "sphere"', "'shape' is unknown: use one of radius"),
     ("radius = 0.02", "radius = 20", "radius must be a number from 1e-06 to 10 m"),
     ("radius = 0.02", "radius = 0.02\nlength = 0.1", "[intruder] key: 'length' is unknown"),
     ("attitude_deg = [10, 0, 20]", "attitude_deg = [10, 0]", "attitude must be an angle about y or a rotation vector"),
@@ -389,7 +389,7 @@ REFUSED = [
 @pytest.mark.parametrize(("old", "new", "said"), REFUSED, ids=[said for *_, said in REFUSED])
 def test_what_makes_no_sense_is_refused(old, new, said):
     assert old in MADE
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(Refusal) as caught:
         scenes.parse(MADE.replace(old, new), "made")
     assert said in str(caught.value) and str(caught.value).startswith("made")
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 450

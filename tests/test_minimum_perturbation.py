@@ -7,7 +7,6 @@ import pytest
 from commands import geomech
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates, curvature
 from geomech.geometry.field import Field
@@ -18,6 +17,7 @@ from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous, se2
+from rft.refusal import Refusal
 
 FLUID = Viscous(2.0)
 
@@ -208,7 +208,7 @@ def test_it_stands_wherever_any_frame_stands(tmp_path):
     assert scenes.parse(afloat.format(line)) == scenes.parse(f"{line}\n{afloat.format('')}")
     for frame in ("mean", "link-2"):
         with pytest.raises(
-            SceneError, match=rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'"
+            Refusal, match=rf"\[body\] frame = 'minimum-perturbation', but the scene's frame = '{frame}'"
         ):
             scenes.parse(f'frame = "{frame}"\n{within}')
     (tmp_path / "a.toml").write_text(within)
@@ -224,7 +224,7 @@ def test_no_such_frame_where_there_is_none():
         text = SCENE.format(law="granular", numbers=LAWS["granular"]) + extra
         if not extra:
             text = text[: text.index("[medium]")] + '[system]\nkind = "no-slip-snake"\n' + text[text.index("[gait]") :]
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             scenes.parse(text)
 
 

@@ -15,7 +15,7 @@ from registry import MEDIA
 
 import geomech as geomech_package
 from geomech import scene as scenes
-from geomech.core.errors import SceneError, UnitWarning, VelocityWarning
+from geomech.core.errors import UnitWarning, VelocityWarning
 from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
@@ -26,6 +26,7 @@ from geomech.study.single import single as single_of
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 VISCOUS, GLASS = scenes.load("three-link-viscous"), MEDIA["glass-0.3mm-loose"]
@@ -105,7 +106,7 @@ def test_degrees_where_gamma0_is_in_rad_are_told_of_the_other_key(given, hinted,
     code, _, err = geomech("explain", scene(tmp_path, PLAIN.replace("gamma0_deg = 13.8", given)), cwd=tmp_path)
     assert (code, err.count("\n")) == (2, 1)
     assert "gamma0 must lie between 0 and 90 degrees, got " in err
-    assert err.endswith("; gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
+    assert err.endswith(": gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
 
 
 def test_a_refusal_stays_one_line_and_keeps_the_note():
@@ -242,9 +243,9 @@ def test_explain_names_the_tiers_that_are_lost_and_why():
 
 
 def test_names_that_are_none_get_a_hint():
-    with pytest.raises(SceneError, match="numerics: 'nonsense' is unknown; use one of"):
+    with pytest.raises(Refusal, match="numerics: 'nonsense' is unknown: use one of"):
         VISCOUS.with_numerics(nonsense=1)
-    with pytest.raises(SceneError, match="part: 'meduim' is unknown; did you mean 'medium'"):
+    with pytest.raises(Refusal, match="part: 'meduim' is unknown: did you mean 'medium'"):
         VISCOUS.changed(meduim=Coulomb())
     with pytest.raises(ValueError, match="a CCF is that of a Connection, .* got 'x'"):
         curvature.ccf("x")
@@ -307,7 +308,7 @@ def test_what_lacks_batch_axes_is_broadcast():
         ValueError, match=r"must return shape \(25, 8, 3\) for these alpha and alphadot, got \(25, 8, 1\)"
     ):
         connection.fit(lambda a, r: turning(a, r)[..., :1], AXES)
-    with pytest.raises(ValueError, match="what velocity returns must be numbers"):
+    with pytest.raises(ValueError, match="what velocity returns must be real numbers"):
         connection.fit(lambda a, r: None, AXES)
     with pytest.raises(KeyError, match="own"):
         connection.fit(lambda a, r: {}["own"], AXES)
@@ -358,7 +359,7 @@ def test_no_medium_of_ours_is_suspected(name):
         (
             '"circle"',
             '"circle"\n[numerics]\ngrid_deg = 9',
-            "[numerics] key: 'grid_deg' is unknown; did you mean 'grid'",
+            "[numerics] key: 'grid_deg' is unknown: did you mean 'grid'",
         ),
     ],
 )

@@ -11,11 +11,11 @@ import pytest
 from matplotlib import image
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.core.knob import Knob
 from geomech.study import accuracy, walking
 from geomech.study.sweep import sweep
 from rft.meshes import Spatial
+from rft.refusal import Refusal
 from rft.walking import Fineness, Mjcf, Tripod, Walker, engine
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")
@@ -144,8 +144,8 @@ WRONG = {
     "[gait]": ('actuators = ["zz"]\n[gait]', "has no actuator 'zz': it has fl, fr"),
     "frequency = 1.0": ("frequency = 0", "frequency must be"),
     "\n[gait]": ("phases = [0.5]\n[gait]", "phases must be 4 numbers"),
-    "geoms": ("goems", "'goems' is unknown; did you mean 'geoms'"),
-    "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file: drop one"),
+    "geoms": ("goems", "'goems' is unknown: did you mean 'geoms'"),
+    "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file; drop one"),
     "mjcf": ("legs = 3\nmjcf", "key: 'legs' is unknown"),
     "steps = 8": ('engine = "planar"', "use --engine mujoco"),
 }
@@ -220,7 +220,7 @@ def test_a_machine_written_is_the_machine_read(cart):
     assert copied == anew.robot and copied.geom_numbers.tolist() == [2, 3, 4, 5, 1]
     (cart / "parts" / "cart.xml").write_text(CART.replace("0.01", "0.011"))
     assert scenes.load(cart / "cart.toml").robot != scene.robot
-    with pytest.raises(SceneError, match="law: '2d' is unknown; did you mean '3d'"):
+    with pytest.raises(Refusal, match="law: '2d' is unknown: did you mean '3d'"):
         scenes.parse(SCENE.replace("grazing_deg = 5", 'law = "2d"'), str(cart / "cart.toml"))
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from registry import SYSTEMS
 
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import coordinates, metric
 from geomech.scene import Scene
@@ -16,6 +15,7 @@ from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame
 from geomech.tiers.base import Numerics
+from rft.refusal import Refusal
 
 OVAL = Ellipse(semi_axes=(0.9, 0.5), centre=(0.7, -0.2), tilt=0.3)
 AFLOAT = FloatingChain((0.8, 1.3, 1.0), 0.4, "mean", (1.0, 0.5, 2.0), (0.1, 0.2, 0.05))
@@ -178,7 +178,7 @@ WRONG = {
 
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_is_refused_in_a_line(what):
-    with pytest.raises((ValueError, SceneError)) as caught:
+    with pytest.raises((ValueError, Refusal)) as caught:
         WRONG[what]()
     assert "\n" not in str(caught.value)
 

@@ -12,7 +12,6 @@ from registry import BODIES, SYSTEMS
 
 from geomech import scene as scenes
 from geomech.commands import formats
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse, Fourier, Sine
 from geomech.geometry import reconstruct
 from geomech.output import animate, plots, trajectories
@@ -33,6 +32,7 @@ from rft import (
     se2,
     time_steps,
 )
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 SAND = Granular(1.8, 0.24)
@@ -246,22 +246,22 @@ def test_long_tables_are_written_piece_by_piece(monkeypatch):
 def test_too_much_is_refused_before_it_begins(tmp_path):
     scene = scenes.load("sandfish-transient")
     for cycles in (0, 10_001, 1.5, True, "2", None):
-        with pytest.raises(SceneError, match="whole number from 1 to 10000"):
+        with pytest.raises(Refusal, match="whole number from 1 to 10000"):
             moving.motion(scene, cycles)
-    with pytest.raises(SceneError, match="a motion is that of a Scene, got 'sandfish'"):
+    with pytest.raises(Refusal, match="a motion is that of a Scene, got 'sandfish'"):
         moving.motion("sandfish")
-    with pytest.raises(SceneError, match="say --yes"):
+    with pytest.raises(Refusal, match="say --yes"):
         moving.cost(scene, 10_000).check("scene", False)
     moving.cost(scene, 10).check("scene", False)
     for name, balances in (("swimmer", 33), ("slope", 100 * 32)):  # cycles that repeat are solved once
         assert moving.cost(SCENES[name], 100).balances == balances
         assert moving.cost(SCENES[name], 100).seconds > moving.cost(SCENES[name], 1).seconds
-    with pytest.raises(SceneError, match="say --yes"):
+    with pytest.raises(Refusal, match="say --yes"):
         animate.cost(256, 2000).check("scene", False)
     for name, cure in (("out.txt", "end the name in .gif or .mp4"), ("out", "end the name")):
-        with pytest.raises(SceneError, match=cure):
+        with pytest.raises(Refusal, match=cure):
             animate.check_format(tmp_path / name)
-    with pytest.raises(SceneError, match="end the name of a table in .csv"):
+    with pytest.raises(Refusal, match="end the name of a table in .csv"):
         formats.csv(tmp_path / "out.nc")
 
 
@@ -421,7 +421,7 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
 
 def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SceneError, match="takes ffmpeg, which is not installed: end the name in .gif"):
+    with pytest.raises(Refusal, match="takes ffmpeg, which is not installed; end the name in .gif"):
         animate.check_format(tmp_path / "out.mp4")
 
 
@@ -430,7 +430,7 @@ def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
 )
 def test_an_mp4_that_ffmpeg_refuses_is_not_left(does, chain, tmp_path, monkeypatch):
     installed(tmp_path, monkeypatch, does)
-    with pytest.raises(SceneError, match=r"cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif"):
+    with pytest.raises(Refusal, match=r"cannot write out.mp4: ffmpeg failed: no such codec; end the name in .gif"):
         animate.save(tmp_path / "out.mp4", *chain)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bin", "said"]
 

@@ -12,10 +12,10 @@ from geomech.scene import WalkerScene
 from geomech.study.walking import walked
 from rft.ground import Aeration, GrainInertia
 from rft.meshes import Spatial, wrench
+from rft.metres import GRAVITY
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, rolling
 from rft.walking.facets import Grains, Surface
-from rft.walking.planar import GRAVITY
 from rft.walking.planar_walk import walk as planar_walk
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra: pip install 'geomech[mujoco]'")

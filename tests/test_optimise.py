@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier, Sine
 from geomech.geometry.reconstruct import displacement, slopes
 from geomech.geometry.traits import Traits
@@ -28,6 +27,7 @@ from geomech.tiers.base import Numerics
 from rft import Chain, Granular, Viscous
 from rft.bodies import ConstantCurvature, Serpenoid
 from rft.effects import SkinFriction
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8))
@@ -405,7 +405,7 @@ def test_a_gait_drawn_together_is_kept_clear_of_them_too():
 
 def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
     with pytest.raises(
-        SceneError, match="three-link-viscous: its limits let a gait repeat more than 10000 times a second"
+        Refusal, match="three-link-viscous: its limits let a gait repeat more than 10000 times a second"
     ):
         optimise(viscous(), "speed", rate=1e6)
 
@@ -441,7 +441,7 @@ def test_a_rate_that_no_gait_can_keep_is_refused_before_the_search():
     ],
 )
 def test_requests_that_make_no_sense(name, asked, said):
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(Refusal, match=said) as caught:
         checked(geomech.load(name), **{"aim": "displacement", **asked})
     assert "\n" not in str(caught.value)
 
@@ -449,7 +449,7 @@ def test_requests_that_make_no_sense(name, asked, said):
 def test_a_table_that_never_turns_is_refused_too(tmp_path):
     drive = geomech.load("differential-drive").with_numerics(extent=2.0, grid=7)
     fields.save_connection(tmp_path / "drive.nc", Study(drive))
-    with pytest.raises(SceneError, match="no gait turns it: the table's file tells a body whose heading"):
+    with pytest.raises(Refusal, match="no gait turns it: the table's file tells a body whose heading"):
         checked(Scene(Table(tmp_path / "drive.nc"), Circle()), "turning")
     for name in ("three-link-viscous", "three-link-floating", "no-slip-snake"):
         assert checked(geomech.load(name), "turning")
@@ -482,7 +482,7 @@ def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     assert cheap.value <= found.start.value * (1 + 1e-6)
     assert found.value == pytest.approx(cheap.value, rel=1e-3)
     assert abs(found.best.displacement[1]) < 0.3 * abs(cheap.best.displacement[1])
-    with pytest.raises(SceneError, match="outside the field that the scene has"):
+    with pytest.raises(Refusal, match="outside the field that the scene has"):
         checked(scene, "efficiency", within=3.0)
 
 
@@ -622,7 +622,7 @@ def test_limits_as_they_are_typed(text, limits):
     found = joint_limits(text, viscous())
     assert found == limits if limits is None else np.asarray(found) == pytest.approx(np.asarray(limits))
     for wrong in ("", "x", "1:2:3", "1:", ":2"):
-        with pytest.raises(SceneError, match="--within"):
+        with pytest.raises(Refusal, match="--within"):
             joint_limits(wrong, viscous())
 
 
@@ -653,7 +653,7 @@ def test_a_table_is_searched_like_its_scene(name, tmp_path):
     if None not in metrics:
         own, found = (metric.squared_speed([0.3, -0.5], [1.0, 2.0]) for metric in metrics)
         assert found == pytest.approx(own, rel=1e-4)
-    with pytest.raises(SceneError, match="outside the field that the scene has: -2.5 to 2.5"):
+    with pytest.raises(Refusal, match="outside the field that the scene has: -2.5 to 2.5"):
         checked(table, "displacement", within=3.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 from commands import geomech
 
 import geomech as library
-from geomech.core.errors import SceneError, VelocityWarning
+from geomech.core.errors import VelocityWarning
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry.traits import Traits
 from geomech.io import tables
@@ -22,6 +22,7 @@ from geomech.study.bench import Study
 from geomech.study.single import single
 from geomech.systems.base import Cycle, integrated
 from geomech.text.explain import explain
+from rft.refusal import Refusal
 from rft.registry import REGISTRIES
 
 HEAD = "from dataclasses import dataclass\nimport numpy as np\nimport geomech\n"
@@ -221,7 +222,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
         assert (found <= 1e-9 + np.array(table["estimate"][tier])).all(), tier
     framed = study.in_frame("minimum-perturbation")
     assert framed.displacement("direct", None, [0.5]).shape == (1, 3)
-    with pytest.raises(SceneError, match="has one frame, 'mean'"):
+    with pytest.raises(Refusal, match="has one frame, 'mean'"):
         study.in_frame("link-1")
     found = optimise(scene, harmonics=1, within=1.2)
     assert found.value > np.hypot(*truth[-1, :2])
@@ -233,7 +234,7 @@ def test_five_members_and_functions_go_through_everything(system, tmp_path):
 
 
 def test_a_function_says_what_it_does_not_take():
-    with pytest.raises(SceneError, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"):
+    with pytest.raises(Refusal, match=r"the velocity of <lambda> must take \(alpha, alphadot\)"):
         Scene(lambda alpha: alpha, Circle())
     with pytest.warns(VelocityWarning, match="not odd"):
         _ = Study(Scene(lambda a, u: sled(a, u) + 0.1, Circle(), Numerics(grid=7, extent=1.5))).fitted

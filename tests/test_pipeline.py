@@ -9,13 +9,13 @@ import xarray
 
 from geomech import scene as scenes
 from geomech.commands import pipeline
-from geomech.core.errors import SceneError
 from geomech.core.variables import Result, Variable
 from geomech.io.results import to_xarray, write_csv, write_netcdf
 from geomech.run import jobs
 from geomech.run.cost import Cost
 from geomech.study.accuracy import slope
 from geomech.study.question import Question
+from rft.refusal import Refusal
 
 PHASE = Variable("phase", ("phase",), np.array([0.0, 1.5, 3.0]), "rad", "of the gait")
 SPEED = Variable(
@@ -43,7 +43,7 @@ class Asked(Question):
     def note(self, what):
         self.told.append(what)
         if what == self.fails:
-            raise SceneError(f"{what} refuses")
+            raise Refusal(f"{what} refuses")
 
     def check(self):
         self.note("check")
@@ -91,7 +91,7 @@ def test_every_command_has_one_order(asked, monkeypatch, capsys):
 @pytest.mark.parametrize("fails", ["name out.csv", "check", "cost", "answer", "write out.csv"])
 def test_what_is_refused_ends_there_and_leaves_nothing(fails, asked):
     question = asked(fails=fails)
-    with pytest.raises(SceneError, match=f"{fails} refuses"):
+    with pytest.raises(Refusal, match=f"{fails} refuses"):
         pipeline.execute(question, output(question))
     assert question.told[-1] == fails and list(Path().iterdir()) == []
 
@@ -99,7 +99,7 @@ def test_what_is_refused_ends_there_and_leaves_nothing(fails, asked):
 def test_too_much_takes_yes_beforehand_and_on_the_way(asked):
     for seconds, last in ((100.0, "cost"), (10.0, "answer")):
         question = asked(seconds=seconds)
-        with pytest.raises(SceneError, match="say --yes, or ask for less"):
+        with pytest.raises(Refusal, match="say --yes, or ask for less"):
             pipeline.execute(question, output(question))
         assert question.told[-1] == last
         pipeline.execute(question, output(question), yes=True, silent=True)
@@ -114,7 +114,7 @@ def test_outputs_are_refused_before_computing(asked):
     ):
         question = asked()
         question = dataclasses.replace(question, scene=scenes.load("s.toml"))
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             pipeline.execute(question, *(output(question, name) for name in names))
         assert "cost" not in question.told
 

@@ -9,10 +9,10 @@ import pytest
 
 import rft
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.study.bench import Study
 from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GOOD = """
@@ -77,18 +77,18 @@ def test_every_key_arrives():
 
 BAD = [
     ("[medium", "scene is not TOML"),
-    (GOOD + "[water]\nx = 1", "table: 'water' is unknown; use one of medium, body, effects, system, gait"),
-    (GOOD.replace("[gait]", "[giat]"), "table: 'giat' is unknown; did you mean 'gait'"),
+    (GOOD + "[water]\nx = 1", "table: 'water' is unknown: use one of medium, body, effects, system, gait"),
+    (GOOD.replace("[gait]", "[giat]"), "table: 'giat' is unknown: did you mean 'gait'"),
     ("x = 1", "table: 'x' is unknown"),
     (GOOD.split("[gait]")[0], r"the table \[gait\] is missing"),
     ("gait = 3" + GOOD.split("[gait]")[0], r"gait must be a table"),
     (
         GOOD.replace('law = "granular"', 'law = "granluar"'),
-        r"\[medium\] law: 'granluar' is unknown; did you mean 'granular'",
+        r"\[medium\] law: 'granluar' is unknown: did you mean 'granular'",
     ),
     (GOOD.replace('law = "granular"', ""), r"\[medium\] has no 'law'"),
-    (GOOD.replace('law = "granular"', 'name = "glass"'), r"'C' is unknown; use one of name \(no 'law'\)"),
-    (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown; use one of C, gamma0"),
+    (GOOD.replace('law = "granular"', 'name = "glass"'), r"'C' is unknown: use one of name \(no 'law'\)"),
+    (GOOD.replace("C = 1.8", "c = 1.8"), r"\[medium\] key: 'c' is unknown: use one of C, gamma0"),
     (GOOD.replace("C = 1.8", ""), r"\[medium\] has no `C`: add C = "),
     (GOOD.replace("C = 1.8", 'C = "big"'), r"\[medium\] Expected `float`, got `str` - at `.C`"),
     (GOOD.replace("C = 1.8", "C = nan"), r"\[medium\] C must be a number from 0"),
@@ -96,7 +96,7 @@ BAD = [
     (GOOD.replace("gamma0_deg = 13.8", "gamma0_deg = 13.8\ngamma0 = 0.2"), "gamma0 is given twice"),
     (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, -2, 1]"), r"\[body\] lengths must all be finite and > 0"),
     (GOOD.replace("lengths = [1, 2, 1]", "lengths = [1, 2]"), r"ellipse moves 2 joints but \[body\] has 1"),
-    (GOOD.replace("length = 0.4", "lenght = 0.4"), "'lenght' is unknown; did you mean 'length"),
+    (GOOD.replace("length = 0.4", "lenght = 0.4"), "'lenght' is unknown: did you mean 'length"),
     (GOOD.replace("link-2", "link-9"), "frame must be 'mean' or 'link-1' ... 'link-3', got 'link-9'"),
     (GOOD.replace("tilt_deg = 45", "tilt_deg = inf"), r"\[gait\] tilt must be a number"),
     (GOOD.replace("grid = 21", "grid = 3"), r"\[numerics\] grid must be a whole number from 4"),
@@ -121,16 +121,16 @@ BAD += [
 
 @pytest.mark.parametrize(("text", "said"), BAD)
 def test_bad_scenes_are_refused_in_one_line(text, said):
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(Refusal, match=said) as caught:
         scenes.parse(text)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 450
 
 
 def test_unknown_names_and_files():
-    with pytest.raises(SceneError, match="did you mean 'three-link-glass'"):
+    with pytest.raises(Refusal, match="did you mean 'three-link-glass'"):
         scenes.load("three-link-glas")
-    with pytest.raises(SceneError, match="cannot read scene 'nowhere.toml': No such file"):
+    with pytest.raises(Refusal, match="cannot read scene 'nowhere.toml': No such file"):
         scenes.load("nowhere.toml")
 
 
@@ -174,7 +174,7 @@ def test_four_links_have_an_area_tier_and_two_have_none():
     assert Study(four).methods == ("area", "path", "direct")
     assert np.isfinite(Study(four).displacement("direct")).all()
     two = scenes.parse(text.replace("[1, 1, 1, 1]", "[1, 1]") + '[gait]\nkind = "wave"\njoints = 1\n')
-    with pytest.raises(SceneError, match="the area tier takes two joints and more"):
+    with pytest.raises(Refusal, match="the area tier takes two joints and more"):
         Study(two).displacement("area")
 
 

@@ -11,10 +11,10 @@ from artists import curve, curves, drawn
 from scipy.spatial.transform import Rotation
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.output import plots
 from geomech.study.grid import changed
 from rft.plates import StressMap
+from rft.refusal import Refusal
 from rft.walking import Fineness, Screws, Tripod, Walker, cruise
 from rft.walking.craft import PER_SQUARE
 
@@ -122,7 +122,7 @@ WRONG = {
 def test_what_makes_no_craft_is_refused_with_one_line(right):
     wrong, said = WRONG[right]
     assert right in SMALL
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(Refusal) as caught:
         scenes.parse(SMALL.replace(right, wrong, 1), "small")
     assert said in str(caught.value) and str(caught.value).startswith("small") and "\n" not in str(caught.value)
 
@@ -132,7 +132,7 @@ def test_sizes_of_screws_are_swept():
     assert tables["robot"]["screw"]["pitch"] == 0.04 and scenes.from_tables(tables).robot.screw.core == 0.02
     assert changed(tables, "robot.track", 0.2)["robot"]["track"] == 0.2
     for wrong in ("robot.legs.width", "robot.mass.kg"):
-        with pytest.raises(SceneError, match="name a parameter such as"):
+        with pytest.raises(Refusal, match="name a parameter such as"):
             changed(tables, wrong, 1.0)
     results = {"over": {"robot.screw.pitch": [0.04, 0.06]}, "speed": np.ones(2), "estimate": np.zeros(2)}
     (ax,) = plots.sweep_figure(SCENE, results | {"status": np.full(2, "walking")}).axes
@@ -142,11 +142,11 @@ def test_sizes_of_screws_are_swept():
 def test_a_craft_without_screws_is_told_so():
     bare = SMALL[: SMALL.index("[robot.screw]")] + SMALL[SMALL.index("[gait]") :]
     asked = {
-        bare: r"\[robot\]: the table \[robot.screw\] is missing: add it",
+        bare: r"\[robot\] the table \[robot.screw\] is missing: add it",
         bare.replace("mass = 1.0", "screw = 3\nmass = 1.0"): r"robot.screw must be a table \[robot.screw\], got int",
     }
     for text, said in asked.items():
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             scenes.parse(text)
 
 

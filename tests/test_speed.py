@@ -11,7 +11,6 @@ from commands import geomech
 from registry import GAITS
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle
 from geomech.study import report, sweep, undulation
 from geomech.study.bench import Study
@@ -19,6 +18,7 @@ from geomech.study.choose import cheapest
 from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import BodyInertia, GrainInertia
+from rft.refusal import Refusal
 
 CHAIN = """[medium]
 name = "glass-0.3mm-loose"
@@ -74,7 +74,7 @@ def test_the_gaits_frequency_is_that_of_effects_which_need_one():
     ],
 )
 def test_contradictions_are_named(text, said):
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(Refusal, match=said) as caught:
         scenes.parse(text)
     assert "\n" not in str(caught.value)
 
@@ -85,7 +85,7 @@ def test_from_python_too():
         lambda: scene.changed(gait=Circle(frequency=2.0)),
         lambda: Study(scene).study([0.5], ["direct"], Circle(frequency=2.0)),
     ):
-        with pytest.raises(SceneError, match=r"\[gait\] frequency = 2, but the effects of the swimmer have 2.5"):
+        with pytest.raises(Refusal, match=r"\[gait\] frequency = 2, but the effects of the swimmer have 2.5"):
             contradict()
     assert Study(scene).study([0.5], ["direct"], Circle())["frequency"] == 2.5
     assert [g.frequency for g in report._gaits(scene)] == [2.5] * 3  # those that `run` adds, too

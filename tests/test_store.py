@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from geomech.core.errors import SceneError
 from geomech.run import store
 from geomech.run.store import Store, beside, decoded, encoded, in_cache
+from rft.refusal import Refusal
 
 
 class Row(NamedTuple):
@@ -115,7 +115,7 @@ def test_what_is_there_is_kept_by_a_request_that_adds_nothing(tmp_path):
 def test_one_at_a_time(tmp_path):
     first = Store(tmp_path / "p", hold=True)
     for again in (lambda: Store(tmp_path / "p", hold=True), lambda: _elsewhere(tmp_path / "p")):
-        with pytest.raises(SceneError, match="another computation has .*p open"):
+        with pytest.raises(Refusal, match="another computation has .*p open"):
             again()
     second = Store(tmp_path / "p")  # which need not store
     assert second.lost
@@ -129,7 +129,7 @@ def test_one_at_a_time(tmp_path):
 def _elsewhere(path):
     code = f"from pathlib import Path; from geomech.run.store import Store; Store(Path({str(path)!r}), hold=True)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    raise SceneError(done.stderr.splitlines()[-1])
+    raise Refusal(done.stderr.splitlines()[-1])
 
 
 def test_the_mark_of_a_file_stays(tmp_path):
@@ -259,7 +259,7 @@ def test_what_is_no_file_is_refused(kind, tmp_path):
         path.mkdir()
     else:
         path.symlink_to("/dev/zero" if kind == "device" else tmp_path / "nothing")
-    with pytest.raises(SceneError, match="it is no ordinary file; remove it"):
+    with pytest.raises(Refusal, match="it is no ordinary file; remove it"):
         Store(path)
 
 

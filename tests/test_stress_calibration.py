@@ -491,7 +491,7 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path):
     assert stress_calibration.law_of("dem-rod-drag") == stress_calibration.law_of("nowhere.csv") == "granular"
     for law, said in (
         ("granular", "the header has no column psi_deg"), ("zeta", "the header has no column depth"),
-        ("stres-map", "--law: 'stres-map' is unknown; did you mean 'stress-map'?"),
+        ("stres-map", "--law: 'stres-map' is unknown: did you mean 'stress-map'?"),
     ):  # fmt: skip
         code, _, err = geomech("calibrate", file, "--law", law)
         assert code == 2 and said in err and err.count("\n") == 1

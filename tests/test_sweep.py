@@ -6,10 +6,10 @@ import xarray
 from commands import geomech
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.study import cycles, estimate, sweep
 from geomech.study.bench import Study
 from rft import CATALOGUE, Granular
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
@@ -107,7 +107,7 @@ def test_a_scene_changed_since_it_was_read_is_swept_as_it_is():
     found = sweep.sweep(plain, {"gait.amplitude": [0.1], "medium.C": [1.8, 3.0]})["displacement"]
     assert Study(plain).displacement("direct", None, 0.1) == pytest.approx(found[0, 0], abs=1e-9)
     assert np.abs(found[0, 0] - Study(fish).displacement("direct", None, 0.1))[0] > 0.01
-    with pytest.raises(SceneError, match="the scene has no effect 'end-caps'"):
+    with pytest.raises(Refusal, match="the scene has no effect 'end-caps'"):
         sweep.sweep(plain, {"effects.end-caps.radius": [0.1]})
 
 
@@ -119,11 +119,11 @@ def test_one_frequency_for_all_effects(without_estimates):
     found = sweep.sweep(swimmer, {"effects.frequency": [0.0, 3.0, 9.0]})["displacement"]
     np.testing.assert_allclose(found[1], Study(swimmer).displacement("direct"), atol=1e-9)
     assert np.abs(found[0] - found[2]).max() > 3e-3
-    with pytest.raises(SceneError, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
+    with pytest.raises(Refusal, match="body-inertia gives frequency = 3.0 and grain-inertia 2.0: it is one swimmer"):
         sweep.sweep(scenes.parse(both), {"effects.grain-inertia.frequency": [2.0]})
-    with pytest.raises(SceneError, match=r"\[body\] gives length = 0.2 and body-inertia 0.1"):
+    with pytest.raises(Refusal, match=r"\[body\] gives length = 0.2 and body-inertia 0.1"):
         sweep.sweep(scenes.parse(both), {"body.length": [0.2]})
-    with pytest.raises(SceneError, match="no effect of the scene gives 'speed'"):
+    with pytest.raises(Refusal, match="no effect of the scene gives 'speed'"):
         sweep.sweep(scenes.parse(both), {"effects.speed": [2.0]})
 
 
@@ -165,7 +165,7 @@ def test_an_interrupted_sweep_resumes_from_the_file_it_is_given(over, tmp_path, 
     more = {**over, "gait.amplitude": [*over["gait.amplitude"], 1.1]}
     sweep.sweep(GLASS, more, partial)
     assert len(calls) > count
-    with pytest.raises(SceneError, match="partial must be the path of a file"):
+    with pytest.raises(Refusal, match="partial must be the path of a file"):
         sweep.sweep(GLASS, over, "")
 
 
@@ -195,5 +195,5 @@ def test_the_command_writes_netcdf_and_a_plot(tmp_path):
     ],
 )
 def test_bad_sweeps_are_refused_before_computing(over, said):
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         sweep.sweep(GLASS, over)

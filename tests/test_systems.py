@@ -10,7 +10,6 @@ from registry import GAITS, SYSTEMS
 
 from geomech import scene as scenes
 from geomech import symbolic
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates
 from geomech.geometry.connection import crossed
@@ -28,6 +27,7 @@ from geomech.text.explain import explain
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
 from rft.balance.newton import to_element
+from rft.refusal import Refusal
 
 AWAY = Ellipse(semi_axes=(0.6, 0.4), tilt=0.3, centre=(1.0, -0.7))  # from alpha_1 = alpha_2
 
@@ -133,20 +133,20 @@ def test_singular_shapes_are_left_out_of_fields(lengths):
 def test_singular_shapes_are_refused_by_name_in_integrals():
     study, crossing = snake(), Circle(amplitude=0.9, centre=(0.6, 0.0))
     for tier in study.tiers:
-        with pytest.raises(SceneError, match=r"the gait meets the singular shape near alpha = \(.*axles meet"):
+        with pytest.raises(Refusal, match=r"the gait meets the singular shape near alpha = \(.*axles meet"):
             study.displacement(tier, crossing)
-        with pytest.raises(SceneError, match="meets the singular shape"):
+        with pytest.raises(Refusal, match="meets the singular shape"):
             study.study([0.9], [tier], crossing)
         assert np.isfinite(study.displacement(tier, crossing, [0.3])).all()
     with pytest.raises(ValueError, match="meets the singular shape"):
         study.scene.cycle(crossing)
-    with pytest.raises(SceneError, match="the area tier sums a field up, and the no-slip-snake has singular shapes"):
+    with pytest.raises(Refusal, match="the area tier sums a field up, and the no-slip-snake has singular shapes"):
         study.displacement("area")
     with pytest.raises(ValueError, match="a field with singular shapes is not looked up"):
         study.fitted([1.0, -1.0])
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
-    with pytest.raises(SceneError, match="numerics: 'regularisation' is unknown"):
+    with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
         study.turned(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
@@ -208,7 +208,7 @@ def test_whatever_has_a_velocity_is_a_system():
     truth = study.displacement("direct", None, [0.2])
     for tier in study.tiers:
         np.testing.assert_allclose(study.displacement(tier, None, [0.2]), truth, atol=0.02 * np.hypot(*truth[0, :2]))
-    with pytest.raises(SceneError, match="of no kind that a scene file can name"):
+    with pytest.raises(Refusal, match="of no kind that a scene file can name"):
         scenes.toml(Scene(Disc(), GAITS["ellipse"]))
 
 

@@ -17,7 +17,6 @@ from scipy.io import loadmat, netcdf_file, savemat
 
 import rft
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Fourier
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -35,6 +34,7 @@ from geomech.text import accuracy as text
 from geomech.text.explain import explain
 from geomech.text.system import described
 from rft.laws import CATALOGUE
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS, CLOSE = (CATALOGUE[f"glass-0.3mm-{x}"].medium for x in ("loose", "close"))
@@ -119,7 +119,7 @@ def test_a_mat_file_takes_two_joints_and_says_why(links, tmp_path, monkeypatch):
     scene = Scene(Swimmer(rft.Viscous(2.0), rft.Chain((1,) * links)), gait, Numerics(grid=5))
     Path("mine.toml").write_text(scenes.toml(scene))
     said = f"sysplotter's layout, which is of two joints, and this body has {links - 1}: write a .nc file"
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         mat.save_connection("a.mat", Study(scene))
     for more in ((), ("--plot", "a.png")):
         code, _, err = geomech("connection", "mine.toml", "-o", "a.mat", *more)
@@ -184,7 +184,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
 )
 def test_intervals_that_are_none_are_refused(error, said, made, tmp_path):
     plain_mat(tmp_path / "a.mat", made[1].fitted, geomech_A_error=error, geomech_about=json.dumps({"sign": "+"}))
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         tables.load(tmp_path / "a.mat")
 
 
@@ -233,7 +233,7 @@ def test_a_sign_that_is_made_out_is_noted_once(args, tmp_path, monkeypatch):
 def test_a_sign_that_cannot_be_made_out_is_asked_for(tmp_path):
     c = study().fitted
     plain_mat(tmp_path / "a.mat", Connection(c.axes, np.ones_like(c.A), c.residual, c.speed))
-    with pytest.raises(SceneError, match=r"a\.mat does not tell the sign of A: say sign = '\+'"):
+    with pytest.raises(Refusal, match=r"a\.mat does not tell the sign of A: say sign = '\+'"):
         tables.load(tmp_path / "a.mat")
     assert tables.load(tmp_path / "a.mat", "-").connection.A[0, 0, 0, 0] == -1
 
@@ -243,11 +243,11 @@ def test_rows_of_angles_need_an_order(tmp_path):
     plain_mat(tmp_path / "a.mat", c)
     found = {k: v for k, v in loadmat(tmp_path / "a.mat").items() if k[0] != "_"}
     savemat(tmp_path / "a.mat", {**found, "alpha1": c.axes[0], "alpha2": c.axes[1]})
-    with pytest.raises(SceneError, match="leave the order open: say order"):
+    with pytest.raises(Refusal, match="leave the order open: say order"):
         tables.load(tmp_path / "a.mat")
     np.testing.assert_array_equal(tables.load(tmp_path / "a.mat", order="ndgrid").connection.A, c.A)
     plain_mat(tmp_path / "a.mat", c)
-    with pytest.raises(SceneError, match="arrays that run as ndgrid's"):
+    with pytest.raises(Refusal, match="arrays that run as ndgrid's"):
         tables.load(tmp_path / "a.mat", order="meshgrid")
 
 
@@ -538,11 +538,11 @@ def test_bad_netcdf_is_refused_in_one_line(name, made, tmp_path):
     (tmp_path / "a.nc").write_bytes(altered(raw))
     tables.load(tmp_path / "a.nc")  # as it is it is good
     (tmp_path / "a.nc").write_bytes(altered(raw, **changes))
-    with pytest.raises(SceneError, match=said) as caught:
+    with pytest.raises(Refusal, match=said) as caught:
         tables.load(tmp_path / "a.nc")
     assert str(caught.value).startswith(f"the table {tmp_path / 'a.nc'} ")
     text = f'[system]\nkind = "table"\nfile = "{tmp_path}/a.nc"\n[gait]\nkind = "circle"\n'
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         scenes.parse(text, "s.toml")
 
 
@@ -551,7 +551,7 @@ def test_a_metric_of_a_file_is_a_quadratic_form(tmp_path):
     raw = (tmp_path / "a.nc").read_bytes()
     assert tables.load(tmp_path / "a.nc").metric is not None
     (tmp_path / "a.nc").write_bytes(altered(raw, metric=put((0, 1, 2, 3), 9.0)))
-    with pytest.raises(SceneError, match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric"):
+    with pytest.raises(Refusal, match=r"a metric of shape \(2, 2, 5, 5\) where it must be .* and symmetric"):
         tables.load(tmp_path / "a.nc")
 
 
@@ -579,7 +579,7 @@ def read(path):
     """(table, "") or (None, what is wrong with the file)."""
     try:
         return tables.load(path), ""
-    except SceneError as error:
+    except Refusal as error:
         return None, str(error)
 
 
@@ -599,12 +599,12 @@ def test_endings_that_lie(made, tmp_path):
         ("a.csv", b"t,x,y\n1,2,3\n", r"end the name in .mat or .nc"),
     ):
         (tmp_path / name).write_bytes(raw)
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             Connection.load(tmp_path / name)
-    with pytest.raises(SceneError, match="cannot read the table .*No such file"):
+    with pytest.raises(Refusal, match="cannot read the table .*No such file"):
         Connection.load(tmp_path / "none.nc")
     (tmp_path / "d.nc").mkdir()
-    with pytest.raises(SceneError, match="no ordinary file"):
+    with pytest.raises(Refusal, match="no ordinary file"):
         Connection.load(tmp_path / "d.nc")
 
 
@@ -631,7 +631,7 @@ def test_bad_mat_is_refused_in_one_line(changes, said, made, tmp_path):
     found = {k: v for k, v in {**found, **changes}.items() if v is not None}
     for compressed in (False, True):
         savemat(tmp_path / "a.mat", found, do_compression=compressed)
-        with pytest.raises(SceneError, match=said):
+        with pytest.raises(Refusal, match=said):
             tables.load(tmp_path / "a.mat")
 
 
@@ -646,7 +646,7 @@ def test_a_mat_file_may_be_compressed_or_of_version_4_but_no_bomb(made, tmp_path
     assert matlab.arrays((tmp_path / "a.mat").read_bytes())["deep"] == 2.5
     monkeypatch.setattr("geomech.io.tables.matlab.LARGEST", 100_000)
     savemat(tmp_path / "a.mat", {**found, "more": np.zeros(10**6)}, do_compression=True)
-    with pytest.raises(SceneError, match="is damaged, cut short, or no MATLAB file"):
+    with pytest.raises(Refusal, match="is damaged, cut short, or no MATLAB file"):
         tables.load(tmp_path / "a.mat")
 
 
@@ -673,5 +673,5 @@ def test_what_accuracy_costs_includes_the_tables_own_error(made, monkeypatch):
     assert all(own < c["error"] <= c["tolerance"] for c in found["cheapest"] if c["tier"])
     assert f"the table's own, {own:.1e} BL" in text.table(found)
     monkeypatch.setattr(choose, "MOST_PHASES", 256)
-    with pytest.raises(SceneError, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-06 .*: raise --tol, or take a finer table"):
         choose.cheapest(scene, [0.5], 1e-6)

@@ -7,7 +7,6 @@ import pytest
 from registry import GAITS, MEDIA
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Fourier, Wave
 from geomech.geometry import connection, family, harmonics
 from geomech.output import plots
@@ -20,6 +19,7 @@ from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
 from rft import BodyInertia, Chain, Granular, se2
 from rft.balance.listening import listening
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
@@ -287,7 +287,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
     assert "leading" in study.tiers and "leading" in study.methods and "leading" in study.lookups
     assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
-    with pytest.raises(SceneError, match="the leading tier takes a body of joints, this body has 4: use direct"):
+    with pytest.raises(Refusal, match="the leading tier takes a body of joints, this body has 4: use direct"):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")
 
 
@@ -331,9 +331,9 @@ def test_what_the_solver_left_counts_in_the_estimate():
 
 
 def test_impossible_tolerances_are_refused():
-    with pytest.raises(SceneError, match="no tier gets to 1e-15 body lengths"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-15 body lengths"):
         cheapest(GLASS.with_numerics(regularisation=1e-4), [1.0], 1e-15)
-    with pytest.raises(SceneError, match="--tol must be"):
+    with pytest.raises(Refusal, match="--tol must be"):
         cheapest(GLASS, [1.0], 0.0)
 
 
@@ -359,7 +359,7 @@ def test_the_map_of_a_family_gives_each_shape_its_own_value():
 def test_every_amplitude_must_meet_the_tolerance(monkeypatch):
     """The refinement goes on to the largest number of phases that is allowed, for the worst of the amplitudes."""
     monkeypatch.setattr("geomech.study.choose.MOST_PHASES", 128)
-    with pytest.raises(SceneError, match="no tier gets to 1e-09 body lengths .* with 128 phases"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-09 body lengths .* with 128 phases"):
         cheapest(GLASS, [0.0, 1.0], 1e-9)
 
 

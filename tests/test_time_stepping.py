@@ -6,7 +6,6 @@ from registry import BODIES, MEDIA
 from scipy.integrate import solve_ivp
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.geometry.reconstruct import displacement
 from geomech.scene import Scene
@@ -36,6 +35,7 @@ from rft import (
 from rft.balance.solver import Accuracy
 from rft.bodies.base import half_lengths
 from rft.contact import assemble
+from rft.refusal import Refusal
 from rft.se2 import compose, exp
 from rft.stepping import Stepping
 
@@ -230,7 +230,7 @@ def test_cycles_that_do_not_repeat_are_not_taken_for_periodic():
 
 def test_a_tolerance_below_what_time_stepping_repeats_to_is_refused():
     slowed = scenes.load("sandfish-transient")
-    with pytest.raises(SceneError, match="repeat to 1e-06 only: raise --tol"):
+    with pytest.raises(Refusal, match="repeat to 1e-06 only: raise --tol"):
         cheapest(slowed, [0.2], 1e-7)
 
 
@@ -394,7 +394,7 @@ def test_a_tolerance_refines_pieces_or_is_refused(monkeypatch):
     assert (off <= found["estimate"][found["tier"]]).all()
     assert max(found["estimate"][found["tier"]]) <= 1e-5
     monkeypatch.setattr("geomech.study.choose.FINEST_PIECES", 40)
-    with pytest.raises(SceneError, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
+    with pytest.raises(Refusal, match="no tier gets to 1e-08 body lengths .* with .* phases and 40 pieces"):
         cheapest(scene, [1.2], 1e-8)
 
 
@@ -413,7 +413,7 @@ def test_a_knob_for_pieces():
     assert -np.polyfit(np.log(knob.values), np.log(errors), 1)[0] == pytest.approx(2, abs=0.35)
     with pytest.raises(ValueError, match="pieces must be a whole number from 1 to 10000, got 0"):
         body_velocity(GLASS, Chain(), [0.1, 0.2], [1, 0], effects=depth.system.effects, pieces=0)
-    with pytest.raises(SceneError, match="pieces must be a whole number from 1 to 10000, got 0.5"):
+    with pytest.raises(Refusal, match="pieces must be a whole number from 1 to 10000, got 0.5"):
         depth.with_numerics(pieces=0.5)
 
 

@@ -5,7 +5,6 @@ import pytest
 import xarray
 
 import geomech
-from geomech.core.errors import SceneError
 from geomech.gaits import Circle, Fourier
 from geomech.geometry import connection, curvature
 from geomech.geometry.connection import Connection
@@ -15,6 +14,7 @@ from geomech.systems import Swimmer, Table
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous
+from rft.refusal import Refusal
 
 SYSTEM = Swimmer(Viscous(2.3), Chain((0.7, 1.4, 0.9, 0.6)))
 GAIT = Fourier(
@@ -131,5 +131,5 @@ def test_a_file_with_pairs_that_are_none_is_refused(name, spoilt, said, tmp_path
     with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as file:
         rest = file.drop_vars(["ccf_pairs", "ccf_pairs_error", "pair_joints"]).assign({name: spoilt(file[name])})
         rest.to_netcdf(tmp_path / "b.nc", engine="scipy", format="NETCDF3_64BIT")
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(Refusal, match=said):
         Table(tmp_path / "b.nc")

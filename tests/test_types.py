@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from registry import GAITS, OUTLINES, STRESSES, SYSTEMS
 
 import rft
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import KINDS, Centreline, Circle, Sine
 from geomech.geometry import connection, curvature, family, harmonics, reconstruct
 from geomech.geometry.field import Field
@@ -26,6 +26,7 @@ from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity, ground, meshes, se2
 from rft.plates import SHAPES, Drag, Path, Penetrate, Rotate
+from rft.refusal import Refusal, located
 from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
@@ -94,7 +95,7 @@ def test_no_constructor_takes_a_wrong_type(kind, field):
 
 def test_every_public_class_is_in_the_table():
     public = [getattr(rft, name) for name in rft.__all__] + list(KINDS.values())
-    outputs = {rft.Solution, rft.TimeSteps, rft.Work}
+    outputs = {rft.Refusal, rft.Solution, rft.TimeSteps, rft.Work}
     made = {c for c in public if isinstance(c, type) and not getattr(c, "_is_protocol", False)} - outputs
     assert made - {type(part) for part in PARTS.values()} == {Coulomb, Centreline}  # without parameters; with a file
 
@@ -257,4 +258,13 @@ def test_the_place_is_named():
         with pytest.raises(ValueError, match=".") as caught:
             call()
         assert said in str(caught.value)
-    assert issubclass(SceneError, ValueError)
+    assert issubclass(Refusal, ValueError)
+
+
+def test_refusals_carry_facts_and_go_to_other_processes():
+    with pytest.raises(Refusal) as caught, located("own.toml"), located("own.toml: [medium]"):
+        raise Refusal("C must be > 0", value=-3, because="it is a stress", instead="give a positive one")
+    refusal = pickle.loads(pickle.dumps(caught.value))
+    assert (refusal.what, refusal.value, refusal.where) == ("C must be > 0", -3, ("own.toml: [medium]",))
+    assert (refusal.because, refusal.instead) == ("it is a stress", "give a positive one")
+    assert str(refusal) == "own.toml: [medium] C must be > 0, got -3: it is a stress; give a positive one"

@@ -9,7 +9,6 @@ import xarray
 from commands import geomech
 
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.gaits import Butterfly, Ellipse
 from geomech.io.results import write_netcdf
 from geomech.output import plots
@@ -21,6 +20,7 @@ from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import Chain, Granular, SkinFriction, Transient, Viscous
+from rft.refusal import Refusal
 
 pytestmark = pytest.mark.usefixtures("fastest")
 GAIT = Ellipse(semi_axes=(1.0, 0.6), tilt=0.4, centre=(0.3, -0.2))  # moves along, sideways and turns
@@ -219,14 +219,14 @@ def test_a_covariance_that_reaches_no_medium_is_refused_before_computing(monkeyp
     wide = scene(Granular(1.49, 0.22, covariance=((4.0, 0.0), (0.0, 1e-4))))
     monkeypatch.setattr(Swimmer, "run", lambda *args: pytest.fail("computed"))
     with pytest.raises(
-        SceneError, match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C "
+        Refusal, match=r"sand: \[medium\] covariance: a standard deviation away there is no medium \(C "
     ):
         Study(wide).study([1.0], ["direct"])
-    with pytest.raises(SceneError, match="there is no medium"):
+    with pytest.raises(Refusal, match="there is no medium"):
         cheapest(wide, [1.0], 1e-2)
-    with pytest.raises(SceneError, match="there is no medium"):
+    with pytest.raises(Refusal, match="there is no medium"):
         sweep.sweep(wide, {"gait.amplitude": [1.0]})
-    with pytest.raises(SceneError, match="there is no medium"):  # at one end only
+    with pytest.raises(Refusal, match="there is no medium"):  # at one end only
         sweep.sweep(scene(granular()), {"medium.C": [2.0, 1.0, 0.05]})
 
 

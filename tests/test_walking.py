@@ -12,7 +12,6 @@ from scipy.io import netcdf_file
 
 from figures.walking_sensitivity import Sheet
 from geomech import scene as scenes
-from geomech.core.errors import SceneError
 from geomech.output import walks
 from geomech.scene import WalkerScene
 from geomech.study import walking
@@ -20,11 +19,13 @@ from geomech.text import walk as walk_text
 from geomech.text.explain import explain
 from rft.balance.backend import preferring
 from rft.ground import Aeration, GrainInertia, Slope
+from rft.metres import GRAVITY
 from rft.plates import VERTICAL, CLeg, RoundRod, StressMap, Wheel, loads
+from rft.refusal import Refusal
 from rft.walking import Fineness, Rhex, Roller, Tripod, Walker, engine, rolling
 from rft.walking.limit import Limit, LimitCycles, _Search, _with_means, limit_cycles
 from rft.walking.march import march, step
-from rft.walking.planar import GRAVITY, State
+from rft.walking.planar import State
 from rft.walking.planar_walk import _limit_fields, _strides, rerun, walk
 from rft.walking.robot import intervals
 from rft.walking.sdirk import EFFORT, Effort
@@ -384,7 +385,7 @@ def test_what_a_walk_takes_is_told_from_its_first_steps(geomech, tmp_path):
     (tmp_path / "light.toml").write_text(SMALL.replace("mass = 0.15", "mass = 1e-6").replace("= 2.0\n", "= 2000.0\n"))
     code, out, err = geomech("walk", "light.toml")
     assert (code, out) == (2, "") and "say --yes" in err and err.count("\n") == 1, err
-    with pytest.raises(SceneError, match=r"xplorer: after 0 s of computing \d+% is done, and no cycle repeats itself"):
+    with pytest.raises(Refusal, match=r"xplorer: after 0 s of computing \d+% is done, and no cycle repeats itself"):
         walking.run(dataclasses.replace(XPLORER, numerics=QUICK), longest=0.0)
 
 
@@ -538,7 +539,7 @@ WRONG = {
     "height = 0.03 ": ("heigth = 0.03 ", "did you mean 'height'"),
     "radius = 0.0205 ": ("radius = 20.5 ", "radius must be a number from 1e-06 to 10 m"),
     "[gait]": ("[gate]", "did you mean 'gait'"),
-    "[robot.legs]": ("[robot.legz]", "key: 'legz' is unknown; did you mean 'legs'"),
+    "[robot.legs]": ("[robot.legz]", "key: 'legz' is unknown: did you mean 'legs'"),
     "sweep_deg = 180": ("sweep_deg = 400", "sweep must be a number"),
     "width = 0.01 ": ("", "width"),
 }  # fmt: skip
@@ -590,7 +591,7 @@ def test_a_walker_written_is_the_walker_read(name):
     anew = dataclasses.replace(scene, text="", medium=dataclasses.replace(scene.medium, **weaker))
     assert scenes.parse(scenes.toml(anew), name) == anew
     assert scenes.inputs(scene) == []
-    with pytest.raises(SceneError, match="numerics must be Fineness"):
+    with pytest.raises(Refusal, match="numerics must be Fineness"):
         dataclasses.replace(scene, numerics=3)
 
 

@@ -19,7 +19,7 @@ from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, 
 
 from geomech import scene as scenes
 from geomech import terminal
-from geomech.core.errors import Note, SceneError, UnitWarning
+from geomech.core.errors import Note, UnitWarning
 from geomech.geometry import connection, metric
 from geomech.optimise import checked, search
 from geomech.run import executors, jobs
@@ -31,6 +31,7 @@ from geomech.study.bench import Study
 from rft import threads as threaded
 from rft.balance import backend
 from rft.laws import LAWS
+from rft.refusal import Refusal
 from rft.threads import cores, thread_count
 
 GLASS = scenes.load("three-link-glass").with_numerics(phases=32)
@@ -92,7 +93,7 @@ def test_an_ended_worker_loses_nothing(tmp_path):
 
 
 def test_errors_and_notes_come_back_and_what_is_printed_is_no_answer(two):
-    with pytest.raises(SceneError, match="no such thing as 2"):
+    with pytest.raises(Refusal, match="no such thing as 2"):
         each(two, fails, None, range(4))
     with pytest.raises(RuntimeError, match="Odd: 1 and 5"):
         each(two, fails_oddly, None, [5])

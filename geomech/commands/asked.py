@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geomech.core.errors import SceneError, check_angle
+from geomech.core.errors import check_angle
+from rft.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scene import Intruding, Scene, WalkerScene
 
 
 def scene_with_gait(name: str | Scene) -> Scene:
-    """Return the scene of that name, or one that is loaded; SceneError for one without a gait."""
+    """Return the scene of that name, or one that is loaded; Refusal for one without a gait."""
     from geomech.scene import Scene, load
 
     scene = load(name) if isinstance(name, str) else name
@@ -20,10 +21,14 @@ def scene_with_gait(name: str | Scene) -> Scene:
     if isinstance(scene, Scene):
         return scene
     if hasattr(scene, "robot"):
-        raise SceneError(
-            f"{name}: a robot that walks has no shape space: give it to 'geomech walk', 'sweep' or 'accuracy'"
+        raise Refusal(
+            "a robot that walks has no shape space",
+            where=name,
+            instead="give it to 'geomech walk', 'sweep' or 'accuracy'",
         )
-    raise SceneError(f"{name}: an intruder scene has no gait: give it to 'geomech intrude' or 'geomech accuracy'")
+    raise Refusal(
+        "an intruder scene has no gait", where=name, instead="give it to 'geomech intrude' or 'geomech accuracy'"
+    )
 
 
 def loaded(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
@@ -35,7 +40,9 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
     scene = scene_with_gait(name)
     own = stored(scene.system, "connection")
     if (grid, extent) != (None, None) and own:
-        raise SceneError(f"{scene.name}: the field of a table has its file's own grid: drop --grid and --extent")
+        raise Refusal(
+            "the field of a table has its file's own grid", where=scene.name, instead="drop --grid and --extent"
+        )
     if scene.system.traits.joint_angles and not own:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
@@ -43,27 +50,31 @@ def loaded(name: str | Scene, grid: int | None = None, extent: float | None = No
 
 
 def loaded_intruder(name: str):
-    """Return the intruder scene of that name; SceneError for one with a gait."""
+    """Return the intruder scene of that name; Refusal for one with a gait."""
     from geomech.scene import Scene, WalkerScene, load
 
     scene = load(name)
     if isinstance(scene, (Scene, WalkerScene)):
-        raise SceneError(f"{name}: a scene with a gait has no [intruder]: see 'geomech scenes' for those that have")
+        raise Refusal(
+            "a scene with a gait has no [intruder]", where=name, instead="see 'geomech scenes' for those that have"
+        )
     return scene
 
 
 def loaded_walker(name: str):
-    """Return the scene of that name; SceneError for one without a robot."""
+    """Return the scene of that name; Refusal for one without a robot."""
     from geomech.scene import WalkerScene, load
 
     scene = load(name)
     if not isinstance(scene, WalkerScene):
-        raise SceneError(f"{name}: a scene without a [robot] does not walk: see 'geomech scenes' for those that do")
+        raise Refusal(
+            "a scene without a [robot] does not walk", where=name, instead="see 'geomech scenes' for those that do"
+        )
     return scene
 
 
 def loaded_moving(name: str) -> Scene | WalkerScene:
-    """Return the scene of that name; SceneError for one with neither a gait nor a robot."""
+    """Return the scene of that name; Refusal for one with neither a gait nor a robot."""
     from geomech.scene import load
 
     scene = load(name)  # once: it may come through a pipe

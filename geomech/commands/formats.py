@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geomech.core.errors import SceneError
+from rft.refusal import Refusal
 
 
 def netcdf(path: Path) -> None:
     if path.suffix != ".nc":
-        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc")
+        raise Refusal(f"cannot write {path}", instead="end the name of a NetCDF file in .nc")
 
 
 def netcdf_or_matlab(path: Path) -> None:
     if path.suffix not in (".nc", ".mat"):
-        raise SceneError(f"cannot write {path}: end the name of a NetCDF file in .nc, or that of a MATLAB file in .mat")
+        raise Refusal(
+            f"cannot write {path}", instead="end the name of a NetCDF file in .nc, or that of a MATLAB file in .mat"
+        )
 
 
 def csv(path: Path) -> None:
     if path.suffix.lower() != ".csv":
-        raise SceneError(f"cannot write {path}: end the name of a table in .csv")
+        raise Refusal(f"cannot write {path}", instead="end the name of a table in .csv")
 
 
 def toml(path: Path) -> None:
     if path.suffix != ".toml":
-        raise SceneError(f"cannot write {path}: end the name of a scene in .toml")
+        raise Refusal(f"cannot write {path}", instead="end the name of a scene in .toml")

@@ -9,7 +9,7 @@ import typer
 
 from geomech.commands.names import section_names
 from geomech.commands.options import PluginOption, load_plugins
-from geomech.core.errors import SceneError
+from rft.refusal import Refusal
 
 
 def keys(
@@ -26,5 +26,5 @@ def keys(
 
     load_plugins(plugin)
     if json_schema and section is not None:
-        raise SceneError("--json-schema is that of whole scene files: drop SECTION")
+        raise Refusal("--json-schema is that of whole scene files", instead="drop SECTION")
     print(json.dumps(schema(), indent=1) if json_schema else text(section), end="\n" if json_schema else "")

@@ -13,7 +13,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands.names import intruder_names, scene_names, walker_names
-from geomech.core.errors import SceneError, named
+from rft.refusal import Refusal, located
 
 
 def _scene(names: Callable[[], list[str]]):
@@ -148,11 +148,13 @@ def numbers(option: str, text: str, count: int | None = None, angle: str | None 
         if count not in (None, len(values)):
             raise ValueError
     except _NoAngle as no_angle:
-        raise SceneError(f"{option}: {text!r} is in degrees, but {no_angle}: give a number without 'deg'") from None
+        raise Refusal(
+            f"{text!r} is in degrees, but {no_angle}", where=option, instead="give a number without 'deg'"
+        ) from None
     except ValueError:
         such = "0.5,0.3 or 30deg,20deg" if angle is None else "0.5,0.3"
-        raise SceneError(
-            f"{option}: {text!r} is not {'a number' if count else f'a list of numbers such as {such}'}"
+        raise Refusal(
+            f"{text!r} is not {('a number' if count else f'a list of numbers such as {such}')}", where=option
         ) from None
     return values
 
@@ -167,7 +169,7 @@ def an_angle(text: str | float) -> float:
 
 def angles(scene, option: str, text: str | None) -> tuple[float, ...] | None:
     """Return 0.3,-20deg in rad; None for an option that is left out."""
-    with named(scene.name):
+    with located(scene.name):
         return None if text is None else tuple(numbers(option, text, angle=None))
 
 
@@ -179,7 +181,7 @@ def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] |
     for part in text.split(","):
         ends = [number for end in part.split(":") for number in numbers("--within", end, 1, None)]
         if len(ends) > 2:
-            raise SceneError(f"--within: {part!r} is no limit: give one such as 2.5, 120deg or -0.5:2")
+            raise Refusal(f"{part!r} is no limit", where="--within", instead="give one such as 2.5, 120deg or -0.5:2")
         pairs.append((-ends[0], ends[0]) if len(ends) == 1 else tuple(ends))
     if len(pairs) == 1:
         return pairs[0][1] if ":" not in text else pairs * scene.system.joints
@@ -230,9 +232,9 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
         count = int(parts[2])
         values = [start + (stop - start) * k / max(1, count - 1) for k in range(count)]
     else:
-        raise SceneError(f"{option}: {text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10")
+        raise Refusal(f"{text!r} is neither a list such as 0.5,1.0 nor START:STOP:COUNT such as 0.2:2:10", where=option)
     if not all(map(math.isfinite, values)):
-        raise SceneError(f"{option}: {text!r} must be finite")
+        raise Refusal(f"{text!r} must be finite", where=option)
     return values
 
 
@@ -242,10 +244,10 @@ def parameters(over: Sequence[str], scene, most: int | None = None) -> dict[str,
     for text in over:
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
-            raise SceneError(f"--over {text!r}: give each parameter once, as PARAM=START:STOP:COUNT")
+            raise Refusal(f"--over {text!r}", instead="give each parameter once, as PARAM=START:STOP:COUNT")
         axes[parameter] = values
     if most is not None and len(axes) > most:
-        raise SceneError(f"cannot draw {len(axes)} parameters: sweep one or two, or leave --plot out")
+        raise Refusal(f"cannot draw {len(axes)} parameters", instead="sweep one or two, or leave --plot out")
     return {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
 
 
@@ -256,4 +258,4 @@ def caps(text: str) -> float | str:
     try:
         return float(text)
     except ValueError:
-        raise SceneError(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None
+        raise Refusal(f"--end-caps {text!r} is neither left-out, fitted nor a number") from None

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geomech import terminal
-from geomech.core.errors import Note, SceneError
+from geomech.core.errors import Note
 from geomech.io.files import note, refuse_inputs, whole_file, whole_folder
+from rft.refusal import Refusal
 
 if TYPE_CHECKING:  # commands start without NumPy
     from geomech.core.variables import Result
@@ -62,7 +63,7 @@ def show(lines: Iterable[str]) -> None:
 
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
-    """Say what is to come if it takes long or otherwise than expected; SceneError, which says what to do else, if it takes
+    """Say what is to come if it takes long or otherwise than expected; Refusal, which says what to do else, if it takes
     too long to be begun without --yes: here, or in its first second (`geomech.run.cost.decide`). From here on "auto" is the
     back end for that many balances."""
     from geomech.run.backend import prefer_for
@@ -89,11 +90,11 @@ def _note(scene: Any) -> None:
 
 
 def _check_outputs(outputs: list[Output], inputs: list[Path]) -> None:
-    """SceneError unless all outputs can be written and none is an input, or another one."""
+    """Refusal unless all outputs can be written and none is an input, or another one."""
     files = [output.path for output in outputs if not output.folder]
     for k, path in enumerate(files):
         if path in files[:k]:
-            raise SceneError(f"cannot write {path} twice: give --plot, or another output, another name")
+            raise Refusal(f"cannot write {path} twice", instead="give --plot, or another output, another name")
     refuse_inputs(files, inputs)
     for k, path in enumerate(files):
         refuse_inputs([path], files[:k])
@@ -130,7 +131,7 @@ def _quiet(done: float) -> None: ...
 
 @contextlib.contextmanager
 def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iterator[None]:
-    """Store what is computed in the body of the statement; at its end nothing is stored any more. SceneError while another
+    """Store what is computed in the body of the statement; at its end nothing is stored any more. Refusal while another
     computation to the output is under way."""
     from geomech.run import jobs, store
     from geomech.run.digest import digest

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib.metadata
 from importlib.metadata import EntryPoint
 
-from geomech.core.errors import SceneError, choose
+from geomech.core.errors import choose
+from rft.refusal import Refusal, located
 from rft.registry import Registry
 
 
@@ -26,15 +27,16 @@ def unloaded(registry: Registry) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def choose_part(registry: Registry, where: str, word: object) -> str:
-    """Return word if it names a part, or one that an installed package offers, which is then loaded; else SceneError."""
+    """Return word if it names a part, or one that an installed package offers, which is then loaded; else Refusal."""
     if isinstance(word, str) and word in registry:
         return word
     packages = offered(registry)
     try:
         name = choose(where, word, [*registry, *packages])
-    except SceneError as error:
-        own = " (or add --plugin FILE.py, a file that has it)" if isinstance(word, str) else ""
-        raise SceneError(f"{error}{own}") from None
+    except Refusal as error:
+        if isinstance(word, str):
+            error.instead += " (or add --plugin FILE.py, a file that has it)"
+        raise
     _load(registry, where, name, packages[name])
     return name
 
@@ -42,19 +44,19 @@ def choose_part(registry: Registry, where: str, word: object) -> str:
 def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) -> None:
     who = " and ".join(map(_package, entries))
     if len(entries) > 1:
-        raise SceneError(f"{where}: {name!r} is offered by {who}: uninstall one")
+        raise Refusal(f"{name!r} is offered by {who}", where=where, instead="uninstall one")
     try:
         part = entries[0].load()
     except (Exception, SystemExit) as error:
-        raise SceneError(f"{where}: {name!r} of {who} cannot be loaded: {type(error).__name__}: {error}") from error
-    try:
+        raise Refusal(
+            f"{name!r} of {who} cannot be loaded", where=where, because=f"{type(error).__name__}: {error}"
+        ) from error
+    with located(where), located(f"{name!r} of {who}"):
         if not registry.admits(part):
-            raise ValueError(f"{getattr(part, '__name__', part)} is not {registry.told}")
+            raise Refusal(f"{getattr(part, '__name__', part)} is not {registry.told}")
         if getattr(part, registry.key, name) != name:
-            raise ValueError(f"its {registry.key} is {getattr(part, registry.key)!r}: give both one name")
+            raise Refusal(f"its {registry.key} is {getattr(part, registry.key)!r}", instead="give both one name")
         registry.put(part, name)
-    except ValueError as error:
-        raise SceneError(f"{where}: {name!r} of {who}: {error}") from None
 
 
 def _package(entry: importlib.metadata.EntryPoint) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.core.errors import short
+from rft.refusal import formatted
 
 ROWS = ("x", "y", "theta")
 
@@ -16,7 +16,7 @@ def part(kind: str, thing) -> str:
     """Return a part of a scene with its numbers, as a scene has them; a covariance only where there is one."""
     names = [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
     given = [name for name in names if name != "covariance" or thing.covariance is not None]
-    values = [f"{name} = {short(getattr(thing, name))}" for name in given]
+    values = [f"{name} = {formatted(getattr(thing, name))}" for name in given]
     return f"{kind} ({', '.join(values)})" if values else kind
 
 

@@ -10,11 +10,12 @@ from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import Note, UnitWarning, short
+from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import frames, midline
 from geomech.geometry.gait import GAITS, LARGEST, Gait
 from geomech.io.rows import LARGEST_NUMBER
 from rft.checks import Number
+from rft.refusal import Refusal
 
 LARGEST_GAP = 0.25  # of the period, between neighbouring frames
 UNEQUAL = 0.05  # spread of the frames' spacing, over its mean, that still counts as equal
@@ -86,16 +87,16 @@ class Centreline(Gait):
 
     def __post_init__(self):
         if not isinstance(self.file, (str, Path)):
-            raise ValueError(f"file must be the name of a CSV file, got {short(self.file)}")
+            raise Refusal("file must be the name of a CSV file", value=self.file)
         object.__setattr__(self, "file", str(self.file))
         super().__post_init__()
         if self.centre:
-            raise ValueError("a measured centreline takes no centre: it undulates about the straight body")
+            raise Refusal("a measured centreline takes no centre", because="it undulates about the straight body")
         if not isinstance(self.sha256, str):
-            raise ValueError(f"sha256 must be text, got {short(self.sha256)}")
+            raise Refusal("sha256 must be text", value=self.sha256)
         data = frames.read(self.file)
         if self.sha256.lower() not in ("", data.sha256):
-            raise data.wrong("the file is not the one whose sha256 is given: restore it, or leave sha256 out")
+            raise data.wrong("the file is not the one whose sha256 is given", instead="restore it, or leave sha256 out")
         object.__setattr__(self, "sha256", data.sha256)
         phase, bends = one_period(data, midline.bends(data, self.elements, self.keep_modes), self.period)
         object.__setattr__(self, "_curve", self._through(data, phase, bends))
@@ -121,7 +122,7 @@ class Centreline(Gait):
         most = min((len(bends) - 1) // 2, int(np.pi / np.diff(phase).max() * (1 + 1e-9)))
         if self.keep_harmonics not in range(most + 1):
             told = f"keep_harmonics must be a whole number from 0 to {most} for these {len(bends)} frames"
-            raise data.wrong(f"{told}, got {self.keep_harmonics!r}")
+            raise data.wrong(told, value=self.keep_harmonics)
         if not self.keep_harmonics:
             return CubicSpline(phase, np.concatenate([bends, bends[:1]]), bc_type="periodic")
         return partial(_series, np.linalg.lstsq(_waves(phase[:-1], self.keep_harmonics, 0), bends, rcond=None)[0])
@@ -183,7 +184,9 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
     else:
         repeats = abs(t[-1] - period) <= 1e-6 * period
         if t[-1] > period and not repeats:
-            raise data.wrong(f"the frames run over {t[-1]:g} in t, more than period = {period:g}: keep one period")
+            raise data.wrong(
+                f"the frames run over {t[-1]:g} in t, more than period = {period:g}", instead="keep one period"
+            )
     if repeats:
         t, bends = t[:-1], bends[:-1]
     gaps = np.diff(t, append=period) / period
@@ -191,8 +194,10 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
     allowed = moves.max() if repeats else 3 * moves.max() * max(1.0, gaps[-1] / gaps[:-1].max())
     if back > allowed + 1e-9:
         raise data.wrong(
-            f"the gait does not close: bends of the first and the last frame differ by up to {back:.2g} rad, those of "
-            f"neighbouring frames by up to {moves.max():.2g}: keep just one period, or give the right period"
+            "the gait does not close",
+            because=f"bends of the first and the last frame differ by up to {back:.2g} rad, those of neighbouring "
+            f"frames by up to {moves.max():.2g}",
+            instead="keep just one period, or give the right period",
         )
     return 2 * np.pi * np.append(t / period, 1.0), bends
 
@@ -220,15 +225,15 @@ def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np
     if again.size:
         lag = (again[0] + int((np.diff(differ[again[0] :]) > 0).argmax())) / PLACES
         raise data.wrong(
-            f"the body does the same again after {lag * period:.3g} in t, {1 / lag:.2g} times in the period of {period:.4g}: "
-            "give the frames of just one period"
+            f"the body does the same again after {lag * period:.3g} in t, {1 / lag:.2g} times in the period of {period:.4g}",
+            instead="give the frames of just one period",
         )
     off, moves = _size(heading - heading[0]), _size(np.diff(heading, axis=0))
     near = int(off.argmax()) + int(off[off.argmax() :].argmin())
     if off[near] < 0.5 * off[-1] and off[-1] > FURTHER * moves.max():
         raise data.wrong(
-            f"the frame at t = {data.t[near]:g} repeats the first, and {len(off) - 1 - near} more come after it: give the "
-            "frames of just one period"
+            f"the frame at t = {data.t[near]:g} repeats the first, and {len(off) - 1 - near} more come after it",
+            instead="give the frames of just one period",
         )
 
 
@@ -239,11 +244,14 @@ def _size(heading: np.ndarray) -> np.ndarray:
 def _inferred(data: frames.Frames, t, moves, back) -> float:
     """The period of equally spaced frames of which the last is one spacing before the first comes again."""
     if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
-        raise data.wrong("the last frame does not repeat the first, and they are not equally spaced in t: give period")
+        raise data.wrong(
+            "the last frame does not repeat the first, and they are not equally spaced in t", instead="give period"
+        )
     if back < moves.min() / 3:
         raise data.wrong(
-            f"the last frame all but repeats the first (bends differ by up to {back:.2g} rad, those of neighbouring "
-            f"frames by {moves.min():.2g} or more): give period"
+            f"the last frame all but repeats the first (bends differ by up to {back:.2g} rad, "
+            f"those of neighbouring frames by {moves.min():.2g} or more)",
+            instead="give period",
         )
     return t[-1] * len(t) / (len(t) - 1)
 
@@ -253,15 +261,19 @@ def _check_turned(data: frames.Frames, bends: np.ndarray) -> None:
     between = (np.roll(bends, 1, 0) + np.roll(bends, -1, 0)) / 2
     off, off_turned = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
     if (bad := np.flatnonzero(3 * off_turned < off)).size:
-        raise data.wrong(f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail: turn its rows round")
+        raise data.wrong(
+            f"the frame at t = {data.t[bad[0]]:g} seems to run from head to tail", instead="turn its rows round"
+        )
 
 
 def _check_gaps(data: frames.Frames, gaps: np.ndarray) -> None:
     widest, least = int(gaps.argmax()), int(gaps.argmin())
     if gaps[widest] > LARGEST_GAP * (1 + 1e-6):
         raise data.wrong(
-            f"after t = {data.t[widest]:g} there is no frame for {gaps[widest]:.3g} of the period, more than "
-            f"{LARGEST_GAP:g}: give more frames, or the right period"
+            f"after t = {data.t[widest]:g} there is no frame for {gaps[widest]:.3g} of the period, more than {LARGEST_GAP:g}",
+            instead="give more frames, or the right period",
         )
     if gaps[least] < 0.01 / len(gaps):
-        raise data.wrong(f"the frame after t = {data.t[least]:g} comes at almost the same time: drop one of the two")
+        raise data.wrong(
+            f"the frame after t = {data.t[least]:g} comes at almost the same time", instead="drop one of the two"
+        )

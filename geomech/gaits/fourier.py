@@ -8,9 +8,9 @@ from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import short
 from geomech.geometry.gait import GAITS, LARGEST, Gait, finite_array
 from rft.checks import Number
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ class Ellipse(Series):
     def __post_init__(self):
         axes = finite_array("semi_axes", self.semi_axes, 1)
         if axes.size != 2:
-            raise ValueError(f"an ellipse needs two semi_axes, got {short(self.semi_axes)}")
+            raise Refusal("an ellipse needs two semi_axes", value=self.semi_axes)
         super().__post_init__()
 
     def coefficients(self) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +128,7 @@ class Fourier(Series):
     def __post_init__(self):
         cos, sin = finite_array("cos", self.cos, 2), finite_array("sin", self.sin, 2)
         if cos.shape != sin.shape:
-            raise ValueError(f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}")
+            raise Refusal(f"cos and sin must have one shape (joints, harmonics), got {cos.shape} and {sin.shape}")
         for name, x in (("cos", cos), ("sin", sin)):
             object.__setattr__(self, name, tuple(map(tuple, x.tolist())))
         super().__post_init__()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from geomech.io.rows import Rows
 from geomech.io.rows import read as read_rows
+from rft.refusal import Refusal
 
 HEADERS = (("t", "s", "curvature"), ("t", "point", "x", "y"), ("t", "x", "y"))
 UNTIMED = ("frame", "phase")  # names that may stand for t, and are no s
@@ -36,9 +38,9 @@ class Frames:
     starts: np.ndarray
     timed: bool = True
 
-    def wrong(self, what: str, row: int | None = None) -> ValueError:
-        """To be raised for what is wrong in a row, or in the whole file."""
-        return ValueError(f"{self.name}{'' if row is None else f', line {self.lines[row]}'}: {what}")
+    def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
+        """Return what to raise if something is wrong in a row, or in the whole file. facts: as `Refusal` has them."""
+        return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
 
     @property
     def counts(self) -> np.ndarray:
@@ -72,13 +74,13 @@ def _header(rows: Rows) -> tuple[str, ...]:
         known = " or ".join(",".join(h) for h in HEADERS)
         quoted = rows.filled[0][1][:40] if rows.filled else ""
         found = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
-        raise ValueError(f"{rows.name}, line {line}: the header must be {known}{found}")
+        raise Refusal(f"the header must be {known}{found}", where=f"{rows.name}, line {line}")
     return columns
 
 
 def _check_counts(frames: Frames) -> None:
     if not FEWEST <= len(frames.t) <= MOST_FRAMES:
-        raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t), got {len(frames.t)}")
+        raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t)", value=len(frames.t))
     if (frames.counts < FEWEST).any():
         k = int(frames.counts.argmin())
         what = "values of s" if frames.columns[1] == "s" else "points"
@@ -92,7 +94,9 @@ def _check_grid(frames: Frames) -> None:
     twice = np.flatnonzero((np.diff(frames.rows[:, :2], axis=0) == 0).all(1))
     if twice.size:
         row = max(twice[0], twice[0] + 1, key=lambda r: frames.lines[r])
-        raise frames.wrong(f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice: keep one", row)
+        raise frames.wrong(
+            f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice", row, instead="keep one"
+        )
     known = np.unique(keys)
     if (frames.counts != len(known)).any():
         k = int(frames.counts.argmin())

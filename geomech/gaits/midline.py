@@ -22,8 +22,9 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     worst = np.unravel_index(np.abs(found).argmax(), found.shape)
     if not abs(found[worst]) <= LARGEST_BEND:
         raise frames.wrong(
-            f"at t = {frames.t[worst[0]]:g} and s = {(worst[1] + 1) / elements:.3g} neighbouring elements bend by "
-            f"{abs(found[worst]):.3g} rad, more than {LARGEST_BEND:.3g}: mend that frame, or take more elements"
+            f"at t = {frames.t[worst[0]]:g} and s = {(worst[1] + 1) / elements:.3g} neighbouring "
+            f"elements bend by {abs(found[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
+            instead="mend that frame, or take more elements",
         )
     return found
 
@@ -33,7 +34,7 @@ def _check_modes(frames: Frames, modes: int) -> None:
     count = int(frames.counts.min())
     most = min(int(2 * np.sqrt(count)), count - 1)
     if modes not in range(most + 1):
-        raise frames.wrong(f"keep_modes must be a whole number from 0 to {most} for {count} places, got {modes!r}")
+        raise frames.wrong(f"keep_modes must be a whole number from 0 to {most} for {count} places", value=modes)
 
 
 def _from_curvature(frames: Frames, centres, modes: int) -> np.ndarray:
@@ -87,13 +88,13 @@ def _check_points(frames: Frames, start: int, points: np.ndarray) -> None:
     chord = np.diff(points)
     same = np.flatnonzero(np.abs(chord) <= 1e-9 * np.abs(chord).sum())
     if same.size:
-        raise frames.wrong("the point is where its neighbour is: drop one of the two", start + same[0] + 1)
+        raise frames.wrong("the point is where its neighbour is", start + same[0] + 1, instead="drop one of the two")
     turn = np.abs(np.angle(chord[1:] / chord[:-1]))
     if turn.max() > LARGEST_BEND:
         raise frames.wrong(
-            f"the midline turns by {turn.max():.3g} rad at this point, more than {LARGEST_BEND:.3g}: order the points "
-            "from tail to head, mend the frame, or give more points",
+            f"the midline turns by {turn.max():.3g} rad at this point, more than {LARGEST_BEND:.3g}",
             start + turn.argmax() + 1,
+            instead="order the points from tail to head, mend the frame, or give more points",
         )
 
 
@@ -102,7 +103,8 @@ def _check_lengths(frames: Frames, lengths: np.ndarray) -> None:
     k = int(np.abs(share - 1).argmax())
     if abs(share[k] - 1) > LENGTH_SPREAD:
         raise frames.wrong(
-            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as the mean of all frames, off by "
-            f"more than {LENGTH_SPREAD:.0%}: mend or drop that frame",
+            f"the midline at t = {frames.t[k]:g} is {share[k]:.3g} times as long as the mean of "
+            f"all frames, off by more than {LENGTH_SPREAD:.0%}",
             frames.starts[k],
+            instead="mend or drop that frame",
         )

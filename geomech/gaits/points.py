@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.core.errors import short
 from geomech.geometry.gait import GAITS, Gait, finite_array
+from rft.refusal import Refusal
 
 
 @GAITS.register
@@ -28,7 +28,7 @@ class Points(Gait):
             points = points[:-1]
         steps = np.linalg.norm(np.diff(points, axis=0, append=points[:1]), axis=1)
         if len(points) < 3 or not (steps > 1e-12 * steps.sum()).all():
-            raise ValueError(f"points must be at least 3 shapes, neighbours distinct, got {short(self.points)}")
+            raise Refusal("points must be at least 3 shapes, neighbours distinct", value=self.points)
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
         super().__post_init__()
 

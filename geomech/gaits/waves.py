@@ -7,10 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import real_array
 from geomech.gaits.fourier import Series
 from geomech.geometry.gait import GAITS, LARGEST, Gait
-from rft.checks import Number, in_range
+from rft.checks import Number, in_range, real_array
+from rft.refusal import Refusal
 
 
 @GAITS.register
@@ -110,10 +110,10 @@ class Sine(Gait):
     def __post_init__(self):
         super().__post_init__()
         if self.centre:
-            raise ValueError("a sine wave takes no centre: it undulates about the straight body")
+            raise Refusal("a sine wave takes no centre", because="it undulates about the straight body")
         in_range("waves", self.waves, 0, self.elements / 4)
         if not self.waves > 0:
-            raise ValueError(f"waves must be > 0 and at most elements / 4, got {self.waves!r}")
+            raise Refusal("waves must be > 0 and at most elements / 4", value=self.waves)
 
     @property
     def joints(self) -> int:
@@ -126,7 +126,7 @@ class Sine(Gait):
     def _slopes(self, amplitudes) -> np.ndarray:
         a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
         if not (np.abs(a) <= 10).all():
-            raise ValueError(f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}")
+            raise Refusal(f"amplitudes (A / lambda) must lie from -10 to 10, got {a.ravel()[:4]}")
         return 2 * np.pi * a
 
     def _headings(self, t, amplitudes):

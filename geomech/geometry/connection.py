@@ -14,13 +14,14 @@ from functools import cached_property, partial
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import is_whole, number, real_array, short
 from geomech.core.face import Faced
 from geomech.core.work import Map, each
 from geomech.geometry.field import UNTOLD, Field, as_axes, half_of
 from geomech.geometry.images import Image, images, to_solve
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import Telling, Velocity, evaluate, tried
+from rft.checks import in_range, is_whole, real_array
+from rft.refusal import Refusal
 
 EVEN_DIRECTIONS, EVEN_SHAPES = 4, 16  # a joint, and in all, at which `even_part` looks
 EVEN = 1e-6  # of the largest velocity: a solver's rounding is below it
@@ -74,29 +75,27 @@ class Connection(Faced):
 
 def grid(joints: int, points: int = 31, extent: float = 2.5) -> tuple[np.ndarray, ...]:
     """``joints`` equal axes of ``points`` angles from -extent to extent (rad)."""
-    number("joints", joints, 1, 10_000, whole=True)
-    number("grid", points, 4, 1e6, whole=True)
-    number("extent", extent, 1e-9, 1e6)
+    in_range("joints", joints, 1, 10_000, whole=True)
+    in_range("grid", points, 4, 1e6, whole=True)
+    in_range("extent", extent, 1e-9, 1e6)
     axis = np.linspace(-extent, extent, int(points))
     return ((axis - axis[::-1]) / 2,) * int(joints)  # symmetric to the last digit, for `fit`'s mirror
 
 
 def check_knobs(degree, progress) -> None:
     """ValueError for no degree of a spline, or nothing to be told the fraction done."""
-    number("degree", degree, 1, 5, whole=True)
+    in_range("degree", degree, 1, 5, whole=True)
     if not (progress is None or callable(progress)):
-        raise ValueError(f"progress must be a function of the fraction done, got {short(progress)}")
+        raise Refusal("progress must be a function of the fraction done", value=progress)
 
 
 def directions(joints: int, count: int) -> np.ndarray:
     """Unit alphadot (count, joints), spread evenly over half of all directions: exactly for two joints, by a
     low-discrepancy sequence for more."""
-    number("joints", joints, 1, 10_000, whole=True)
+    in_range("joints", joints, 1, 10_000, whole=True)
     least = joints if joints <= 2 else 4 * joints  # a scattered set of fewer may nearly miss a direction
     if not (is_whole(count) and count >= least):
-        raise ValueError(
-            f"directions must be a whole number of at least {least} for {joints} joints, got {short(count)}"
-        )
+        raise Refusal(f"directions must be a whole number of at least {least} for {joints} joints", value=count)
     if joints == 1:
         return np.ones((1, 1))
     if joints == 2:
@@ -142,7 +141,7 @@ def sampled(
     """`sampled_at` at every shape of a grid; arrays are (..., N_1, ..., N_d)."""
     for a in axes:
         if a.ndim != 1 or len(a) <= degree or not (np.diff(a) > 0).all():
-            raise ValueError(f"each axis must be more than {degree} ascending angles, got {a}")
+            raise Refusal(f"each axis must be more than {degree} ascending angles, got {a}")
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     alike = images(axes, unit, traits)
     return sampled_on(velocity, alpha, unit, keep, progress, alike, traits.singularity, map)

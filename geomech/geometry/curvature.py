@@ -14,20 +14,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from geomech.core.errors import is_whole, short
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field, every_second
 from geomech.geometry.tube import Tube
 from rft import se2
+from rft.checks import is_whole
+from rft.refusal import Refusal, formatted
 
 
 def _checked(connection, i, j) -> None:
     """ValueError for no connection, or no two of its joints."""
     if not isinstance(connection, Connection):
-        raise ValueError(f"a CCF is that of a Connection, such as connection.fit gives, got {short(connection)}")
+        raise Refusal("a CCF is that of a Connection, such as connection.fit gives", value=connection)
     joints = connection.field.joints
     if not (is_whole(i) and is_whole(j) and i != j and 0 <= min(i, j) and max(i, j) < max(joints, 2)):
-        raise ValueError(f"i and j must be two of the joints 0 to {joints - 1}, got {short(i)} and {short(j)}")
+        raise Refusal(f"i and j must be two of the joints 0 to {joints - 1}, got {formatted(i)} and {formatted(j)}")
 
 
 def exterior_derivative(connection: Connection, i: int = 0, j: int = 1) -> np.ndarray:
@@ -48,7 +49,7 @@ def ccf(connection: Connection, i: int = 0, j: int = 1) -> Field:
     """CCF_ij on the grid, values (3, N_1, ..., N_d): displacement per rad^2, in the connection's length unit and rad."""
     _checked(connection, i, j)
     if connection.field.joints < 2:
-        raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
+        raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
     if isinstance(connection, Tube) and connection.field.joints == 2:
         known = connection.known.ccf if (i, j) == (0, 1) else lambda shapes: -connection.known.ccf(shapes)
         return Field(connection.axes, connection.at_grid(known), connection.degree, **connection.size)

@@ -22,12 +22,13 @@ from functools import cached_property, partial
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import number, real_array
 from geomech.core.work import Map, each
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import Gait, checked_gait
 from geomech.geometry.reconstruct import displacement, turning
 from rft import se2
+from rft.checks import in_range, real_array
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ class Family:
         a = real_array("amplitudes", amplitudes)
         low, high = self.amplitudes[[0, -1]]
         if not ((a >= low * (1 + 1e-12)) & (a <= high * (1 + 1e-12))).all():
-            raise ValueError(f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}")
+            raise Refusal(f"amplitudes must lie from {low:g} to the family's {high:g}, got {a.ravel()[:4]}")
         moved, start = displacement(self.xi), self.heading[:, 0]
         integral = np.zeros((*a.shape, 4))
         for sign, _, spline in self._sides(np.stack([*se2.rotated(start, *moved.T[:2]), moved[:, 2], start], -1)):
@@ -115,10 +116,10 @@ def fit(
     map: of some curves after others, as the builtin.
     """
     checked_gait(gait)
-    number("least amplitude", least, -1e300, 0.0)
-    number("largest amplitude", largest, 0.0 if least < 0 else 1e-300, 1e300)
-    number("curves", count, 4, 1e6, whole=True)
-    number("phases", phases, 4, 1e9, whole=True)
+    in_range("least amplitude", least, -1e300, 0.0)
+    in_range("largest amplitude", largest, 0.0 if least < 0 else 1e-300, 1e300)
+    in_range("curves", count, 4, 1e6, whole=True)
+    in_range("phases", phases, 4, 1e9, whole=True)
     count, phases = int(count), int(phases)
     below, above = (x * np.arange(1, count + 1) / count if x else np.zeros(0) for x in (least, largest))
     amplitudes = np.concatenate([below[::-1], [0.0], above])

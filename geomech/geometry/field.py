@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import number, real_array, short
 from geomech.core.face import Faced
+from rft.checks import in_range, real_array
+from rft.refusal import Refusal
 
 UNTOLD = "length"  # stands for the unit of lengths where nothing says it
 
@@ -36,12 +37,12 @@ class Field(Faced):
     def __post_init__(self):
         object.__setattr__(self, "axes", as_axes(self.axes))
         object.__setattr__(self, "values", real_array("values", self.values))
-        number("degree", self.degree, 0, 5, whole=True)
+        in_range("degree", self.degree, 0, 5, whole=True)
         shape = tuple(len(a) for a in self.axes)
         if self.values.shape[-len(shape) :] != shape:
-            raise ValueError(f"values {self.values.shape} do not end in the grid's shape {shape}")
+            raise Refusal(f"values {self.values.shape} do not end in the grid's shape {shape}")
         if min(shape) <= self.degree:
-            raise ValueError(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
+            raise Refusal(f"a spline of degree {self.degree} needs more than that many grid points, got {shape}")
 
     def __repr__(self) -> str:
         lead = self.values.shape[: -self.joints]
@@ -69,7 +70,7 @@ class Field(Faced):
 
     def derivative(self, axis: int) -> np.ndarray:
         """d values / d alpha_axis on the grid, of the spline."""
-        number("axis", axis, 0, self.joints - 1, whole=True)
+        in_range("axis", axis, 0, self.joints - 1, whole=True)
         if self.masked:
             return self._between_masks(axis)
         return np.moveaxis(self._along(axis).derivative()(self.axes[axis]), 0, axis - self.joints)
@@ -111,7 +112,9 @@ class Field(Faced):
 
     def _refuse_masks(self) -> None:
         if self.masked:
-            raise ValueError("a field with singular shapes is not looked up between its points: use the direct tier")
+            raise Refusal(
+                "a field with singular shapes is not looked up between its points", instead="use the direct tier"
+            )
 
     def inside(self, alpha) -> np.ndarray:
         """alpha as an array, or ValueError naming the first angle that leaves the grid."""
@@ -125,7 +128,7 @@ def as_axes(axes) -> tuple[np.ndarray, ...]:
     except TypeError:
         arrays = ()
     if not arrays or any(a.ndim != 1 for a in arrays):
-        raise ValueError(f"axes must be rows of ascending angles, one for each joint, got {short(axes)}")
+        raise Refusal("axes must be rows of ascending angles, one for each joint", value=axes)
     return arrays
 
 
@@ -134,16 +137,16 @@ def inside(axes, alpha, names: Sequence[str] = ()) -> np.ndarray:
     ``names`` where these are given."""
     alpha = real_array("alpha", alpha)
     if alpha.ndim == 0 or alpha.shape[-1] != len(axes) or not np.isfinite(alpha).all():
-        raise ValueError(f"alpha must be finite and of shape (..., {len(axes)}), got {alpha.shape}")
+        raise Refusal(f"alpha must be finite and of shape (..., {len(axes)})", value=alpha.shape)
     for k, axis in enumerate(axes):
         low, high = alpha[..., k].min(initial=np.inf), alpha[..., k].max(initial=-np.inf)
         slack = 1e-9 * (axis[-1] - axis[0])
         if low < axis[0] - slack or high > axis[-1] + slack:
             worst = low if axis[0] - low > high - axis[-1] else high
             name = names[k] if names else f"alpha_{k + 1}"
-            raise ValueError(
-                f"{name} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}: "
-                "widen the extent or lower the amplitude"
+            raise Refusal(
+                f"{name} = {worst:.4g} rad lies outside the field's {axis[0]:g} to {axis[-1]:g}",
+                instead="widen the extent or lower the amplitude",
             )
     return alpha
 

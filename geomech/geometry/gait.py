@@ -8,8 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from geomech.core.errors import is_whole, real_array, short
-from rft.checks import Number, check_numbers
+from rft.checks import Number, check_numbers, is_whole, real_array
+from rft.refusal import Refusal
 from rft.registry import Registry, subclasses
 
 LARGEST = 1e6  # rad or scale: beyond it an angle has few digits left
@@ -53,12 +53,12 @@ class Gait:
         object.__setattr__(self, "amplitude", float(self.amplitude))
         centre = real_array("centre", self.centre)
         if centre.ndim != 1 or centre.size not in (0, self.joints):
-            raise ValueError(f"centre must have {self.joints} angles, got {short(self.centre)}")
+            raise Refusal(f"centre must have {self.joints} angles", value=self.centre)
         if not np.isfinite(centre).all():
-            raise ValueError(f"centre must be finite, got {short(self.centre)}")
+            raise Refusal("centre must be finite", value=self.centre)
         object.__setattr__(self, "centre", tuple(centre.tolist()))
         if not isinstance(self.reverse, (bool, np.bool_)):
-            raise ValueError(f"reverse must be True or False, got {short(self.reverse)}")
+            raise Refusal("reverse must be True or False", value=self.reverse)
         if self.frequency is not None:
             object.__setattr__(self, "frequency", float(self.frequency))
 
@@ -98,14 +98,14 @@ class Gait:
     def _times(self, amplitudes, curve):
         a = real_array("amplitudes", self.amplitude if amplitudes is None else amplitudes)
         if not (np.abs(a) <= LARGEST).all():
-            raise ValueError(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
+            raise Refusal(f"amplitudes must be finite and at most {LARGEST:g}, got {a.ravel()[:4]}")
         return a[(..., *([None] * curve.ndim))] * curve
 
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
         """(alpha, alphadot) at ``phases`` equally spaced phases from 0, each (B..., phases, joints)."""
         least = max(4, 2 * self.harmonics + 1)
         if not (is_whole(phases) and phases >= least):
-            raise ValueError(f"phases must be a whole number of at least {least} for this gait, got {short(phases)}")
+            raise Refusal(f"phases must be a whole number of at least {least} for this gait", value=phases)
         t = 2 * np.pi * np.arange(phases) / phases
         return self._shape_and_rate(t, amplitudes)
 
@@ -120,12 +120,12 @@ def finite_array(name: str, values: Sequence, ndim: int) -> np.ndarray:
     """values as a float array of that many dimensions, or ValueError naming it."""
     array = real_array(name, values)
     if array.ndim != ndim or not array.size or not (np.abs(array) <= LARGEST).all():
-        raise ValueError(f"{name} must be {ndim}-dimensional, finite and not empty, got {short(values)}")
+        raise Refusal(f"{name} must be {ndim}-dimensional, finite and not empty", value=values)
     return array
 
 
 def checked_gait(gait) -> Gait:
     """gait, or ValueError if it is nothing of the kind."""
     if isinstance(gait, type) or not (hasattr(gait, "joints") and hasattr(gait, "cycle")):
-        raise ValueError(f"gait must be a gait such as Circle(amplitude=0.5), got {short(gait)}")
+        raise Refusal("gait must be a gait such as Circle(amplitude=0.5)", value=gait)
     return gait

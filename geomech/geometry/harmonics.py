@@ -24,11 +24,12 @@ from math import comb, factorial, prod
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import is_whole, number, real_array, short
 from geomech.core.work import Map, each
 from geomech.geometry.connection import Velocity, check_knobs, directions, sampled
 from geomech.geometry.field import Field, as_axes, half_of
 from geomech.geometry.traits import NOTHING, Traits
+from rft.checks import in_range, is_whole, real_array
+from rft.refusal import Refusal
 
 VALUES_TOGETHER = 1 << 21  # coefficients of one component looked up in one call
 
@@ -131,16 +132,16 @@ def fit(
     it (k onto 2 count - k); so keep ``highest`` well below. Of more than two joints a fit takes as many directions as it has
     `terms`, and better twice that. ValueError if ``highest`` is even or asks for more directions.
     """
-    number("directions", count, 2, 1e6, whole=True)
+    in_range("directions", count, 2, 1e6, whole=True)
     if not is_whole(highest) or highest % 2 == 0 or not 1 <= highest < count:
-        raise ValueError(f"harmonics must be odd and below the number of directions ({count}), got {short(highest)}")
+        raise Refusal(f"harmonics must be odd and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
     check_knobs(degree, progress)
     d = len(axes)
     if d < 2:
-        raise ValueError("harmonics are those of two joint rates or more, got 1 joint")
+        raise Refusal("harmonics are those of two joint rates or more, got 1 joint")
     if d > 2 and count < terms(d, highest):
-        raise ValueError(
+        raise Refusal(
             f"harmonics of {d} joints up to {highest} take {terms(d, highest)} directions or more, got {count}"
         )
     unit = directions(d, count)

@@ -20,11 +20,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from geomech.core.errors import is_whole, real_array, short
 from geomech.core.work import Map, each
 from geomech.geometry.connection import SAMPLES_TOGETHER, directions
 from geomech.geometry.field import Field, as_axes
 from geomech.geometry.gait import Gait, checked_gait
+from rft.checks import is_whole, real_array
+from rft.refusal import Refusal
 
 Power = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -121,10 +122,10 @@ def fit_norm(
 ) -> Finsler:
     """Even harmonics up to ``highest`` of a norm (...,), from ``count`` directions at each shape of two joints."""
     if not is_whole(highest) or highest % 2 or not 0 <= highest < count:
-        raise ValueError(f"harmonics must be even and below the number of directions ({count}), got {short(highest)}")
+        raise Refusal(f"harmonics must be even and below the number of directions ({count})", value=highest)
     axes = as_axes(axes)
     if len(axes) != 2:
-        raise ValueError(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
+        raise Refusal(f"harmonics are those of a plane of two joint rates, got {len(axes)} joints")
     unit = directions(2, count)
     return of_samples(_sampled(norm, axes, unit, progress, map), axes, unit, degree, highest=highest)
 
@@ -155,7 +156,7 @@ def _powers(asked: tuple, alpha: np.ndarray) -> np.ndarray:
     power, unit = asked
     found = np.asarray(power(alpha, unit))
     if found.shape != (len(alpha), len(unit)) or not np.isfinite(found).all():
-        raise ValueError(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates, got {found.shape}")
+        raise Refusal(f"power must be finite, of shape {(len(alpha), len(unit))} for these rates", value=found.shape)
     return found
 
 

@@ -18,11 +18,12 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import real_array
 from geomech.geometry.connection import Connection
 from geomech.geometry.coordinates import change_connection
 from geomech.geometry.field import Field
 from rft import se2
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 ROUNDING = 1e-10  # of A^theta: above what the linear solve leaves of a gradient
 TOLERANCE, STEPS = 1e-12, 1000  # of conjugate gradients: residual over the right side; some twenty steps are usual
@@ -74,7 +75,9 @@ def minimum_perturbation(connection: Connection) -> Frame:
     singular shapes, RuntimeError if a linear system is not solved.
     """
     if connection.field.masked:
-        raise ValueError("no minimum-perturbation frame of a field with singular shapes: shrink the extent around them")
+        raise Refusal(
+            "no minimum-perturbation frame of a field with singular shapes", instead="shrink the extent around them"
+        )
     basis = Basis(connection.axes, connection.degree)
     w = connection.A[0] + 1j * connection.A[1], connection.A[2]
     flat, a = (basis.at_nodes(basis.coefficients(x)) for x in w)  # (d, nodes)

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import is_whole, real_array, short
 from geomech.core.work import Map, each
 from geomech.geometry.connection import Connection, Velocity, as_axes, directions, least_squares, sampled_on
 from geomech.geometry.curvature import ccf, error
@@ -18,6 +17,8 @@ from geomech.geometry.gait import Gait
 from geomech.geometry.images import mirrored
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.tube import Tube
+from rft.checks import is_whole, real_array
+from rft.refusal import Refusal, formatted
 
 IN_PLANE = 1e-9  # rad that the joints which are held may move
 
@@ -71,7 +72,9 @@ class Seen:
 def checked_pair(pair: Sequence[int], joints: int) -> tuple[int, int]:
     """pair as two different joints from 0; ValueError, which counts them from 1, for any other."""
     if len(pair) != 2 or not all(is_whole(k) and 0 <= k < joints for k in pair) or pair[0] == pair[1]:
-        raise ValueError(f"a pair must be two of the joints 1 to {joints}, got {', '.join(short(k + 1) for k in pair)}")
+        raise Refusal(
+            f"a pair must be two of the joints 1 to {joints}, got {', '.join(formatted(k + 1) for k in pair)}"
+        )
     return int(pair[0]), int(pair[1])
 
 
@@ -100,7 +103,7 @@ def plane(
     it has: fitted over all directions of alphadot, the others' too."""
     at, axes = real_array("at", at), as_axes(axes)
     if at.ndim != 1 or not np.isfinite(at).all():
-        raise ValueError(f"at must be one finite shape, got {short(at.tolist())}")
+        raise Refusal("at must be one finite shape", value=at.tolist())
     pair = checked_pair(pair, len(at))
     alpha = shapes_of(axes, pair, at)
     rates = directions(len(at), count)
@@ -122,8 +125,9 @@ def looked_up(fitted: Connection, pair: tuple[int, int], at) -> Plane:
     if np.isnan(A).all():
         held = ", ".join(f"alpha_{k + 1} = {x:.3g}" for k, x in enumerate(at) if k not in pair)
         there = ",".join(f"{x:.3f}" for x in fitted.known.loop.shape(np.array(0.0)))
-        raise ValueError(
-            f"the data do not reach the plane of {held}: slice it at a shape of the mean gait, --slice {there}"
+        raise Refusal(
+            f"the data do not reach the plane of {held}",
+            instead=f"slice it at a shape of the mean gait, --slice {there}",
         )
     A = np.moveaxis(A, (-2, -1), (0, 1))[:, list(pair)]
     told = np.isfinite(fitted.residual).all()  # files from elsewhere tell nothing of their fit

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import real_array, short
 from rft import se2
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 
 class _Waves(NamedTuple):
@@ -44,7 +45,7 @@ def turning(xi) -> np.ndarray:
     """Heading (..., N) gained at the phases, less its mean growth, of zero mean over the cycle; xi as in `displacement`."""
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3:
-        raise ValueError(f"xi must be of shape (..., N, 3), got {xi.shape}")
+        raise Refusal("xi must be of shape (..., N, 3)", value=xi.shape)
     n = xi.shape[-2]
     return np.fft.irfft(np.fft.rfft(xi[..., 2]) * _waves(n).integral[n // 2 :], n)
 
@@ -69,7 +70,7 @@ def trajectory(xi, phases) -> np.ndarray:
     """Poses (..., P, 3) at phases t (P,) from the start of the cycle; arguments as in `displacement`."""
     s, t = _spectrum(xi), real_array("phases", phases)
     if t.ndim != 1 or not np.isfinite(t).all():
-        raise ValueError(f"phases must be a list of finite numbers, got {short(t)}")
+        raise Refusal("phases must be a list of finite numbers", value=t)
     turns = (s.mean_turn + s.k)[..., None, :]
     span = t[:, None]
     reach = span * np.exp(0.5j * turns * span) * np.sinc(turns * span / (2 * np.pi))
@@ -108,9 +109,9 @@ def repeated(path: np.ndarray, cycles: int) -> np.ndarray:
 def _spectrum(xi) -> _Spectrum:
     xi = real_array("xi", xi)
     if xi.ndim < 2 or xi.shape[-1] != 3 or xi.shape[-2] < 3:
-        raise ValueError(f"xi must have shape (..., N >= 3, 3), got {xi.shape}")
+        raise Refusal("xi must have shape (..., N >= 3, 3)", value=xi.shape)
     if not np.isfinite(xi).all():
-        raise ValueError("xi must be finite")
+        raise Refusal("xi must be finite")
     waves, swing = _waves(xi.shape[-2]), turning(xi)
     wave = waves.of(np.exp(1j * (swing - swing[..., :1])) * (xi[..., 0] + 1j * xi[..., 1]))
     return _Spectrum(xi[..., 2].mean(-1, keepdims=True), waves.k, wave)

@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import number
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
+from rft.checks import in_range
+from rft.refusal import Refusal
 
 POINTS = 61  # an axis, at most: what a picture shows
 STEPS, TOLERANCE = 200, 1e-12  # of the least squares; relative change of the sum of squares
@@ -59,9 +60,9 @@ def stretch(metric: Metric | Finsler, points: int | None = None) -> Stretch:
     """The plane in which lengths come nearest to those of ``metric``, of two joints. points: an axis of the grid, POINTS or
     those of the metric's own grid if these are fewer."""
     if len(metric.axes) != 2:
-        raise ValueError(f"shape space is redrawn on a plane: two joints, got {len(metric.axes)}")
+        raise Refusal("shape space is redrawn on a plane", because=f"two joints, got {len(metric.axes)}")
     own = [len(a) for a in metric.axes]
-    number("points", own[0] if points is None else points, 5, 401, whole=True)
+    in_range("points", own[0] if points is None else points, 5, 401, whole=True)
     counts = [min(n, POINTS) if points is None else int(points) for n in own]
     axes = tuple(np.interp(np.linspace(0, len(a) - 1, n), np.arange(len(a)), a) for a, n in zip(metric.axes, counts))
     alpha = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
@@ -90,7 +91,7 @@ def _lengths(metric, alpha: np.ndarray, ends: np.ndarray) -> np.ndarray:
     along = [w / 2 * metric.norm(here + (x + 1) / 2 * step, step) for x, w in zip(*NODES)]
     length = np.sum(along, axis=0)
     if not (length > 0).all():
-        raise ValueError("shape space is not redrawn where a change of shape costs nothing: narrow the extent")
+        raise Refusal("shape space is not redrawn where a change of shape costs nothing", instead="narrow the extent")
     return length
 
 

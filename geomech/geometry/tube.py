@@ -13,11 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import real_array
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
 from geomech.geometry.reconstruct import displacement
 from rft import se2
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 BEYOND = "nan, where the data of the log do not reach"
 PLACES = 512  # of the gait, at which the nearest one is looked for, and normals are kept
@@ -259,9 +260,9 @@ class Tube(Connection):
         far = self.reach(alpha)
         if (far > 1 + 1e-9).any():
             shape = ", ".join(f"{x:.3g}" for x in alpha[far > 1 + 1e-9][0])
-            raise ValueError(
-                f"the data do not reach alpha = ({shape}), {far.max():.2g} times as far from the mean gait as they go: "
-                "keep near that gait, or measure more varied cycles"
+            raise Refusal(
+                f"the data do not reach alpha = ({shape}), {far.max():.2g} times as far from the mean gait as they go",
+                instead="keep near that gait, or measure more varied cycles",
             )
         return alpha
 

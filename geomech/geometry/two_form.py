@@ -22,13 +22,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import number, real_array
 from geomech.geometry.connection import SAMPLES_TOGETHER, Connection
 from geomech.geometry.curvature import ccf
 from geomech.geometry.curvature import error as ccf_error
 from geomech.geometry.field import Field
 from geomech.geometry.gait import Gait, checked_gait
 from rft import se2
+from rft.checks import in_range, real_array
+from rft.refusal import Refusal
 
 RADII = 6  # nodes of Gauss's rule along a cone
 
@@ -46,7 +47,7 @@ class TwoForm:
     def pair(self, i: int, j: int) -> Field:
         """CCF_ij, values (3, N_1, ..., N_d); that of (j, i) has the other sign."""
         if {i, j} not in map(set, self.pairs) or i == j:
-            raise ValueError(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
+            raise Refusal(f"i and j must be two of the joints 0 to {self.field.joints - 1}, got {i} and {j}")
         sign = 1.0 if i < j else -1.0
         values = sign * self.field.values[self.pairs.index((min(i, j), max(i, j)))]
         return replace(self.field, values=values)
@@ -87,7 +88,7 @@ def error(connection: Connection) -> TwoForm:
 def _of_pairs(made: Callable, connection: Connection) -> TwoForm:
     pairs = tuple(combinations(range(len(connection.axes)), 2))
     if not pairs:
-        raise ValueError("a CCF needs at least two joints: a loop of one joint encloses no area")
+        raise Refusal("a CCF needs at least two joints", because="a loop of one joint encloses no area")
     values = np.stack([made(connection, i, j).values for i, j in pairs])
     return TwoForm(replace(connection.field, values=values), pairs)
 
@@ -105,10 +106,10 @@ class Spanned(NamedTuple):
 def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 4) -> Spanned:
     """The area tier of a gait of any number of joints, for amplitudes (B,) or its own, and how much hangs on the surface, by
     ``tips`` others. ValueError where the gait leaves the field, whose box holds every cone over a loop in it."""
-    number("phases", phases, 8, 1e6, whole=True)
-    number("tips", tips, 0, phases, whole=True)
+    in_range("phases", phases, 8, 1e6, whole=True)
+    in_range("tips", tips, 0, phases, whole=True)
     if checked_gait(gait).joints != form.joints:
-        raise ValueError(f"the gait moves {gait.joints} joints, the field has {form.joints}")
+        raise Refusal(f"the gait moves {gait.joints} joints, the field has {form.joints}")
     amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
     at_once = max(1, SAMPLES_TOGETHER // int(phases))
     groups = [amplitudes[k : k + at_once] for k in range(0, max(1, len(amplitudes)), at_once)]
@@ -119,8 +120,8 @@ def spanned(form: TwoForm, gait: Gait, amplitudes=None, phases: int = 256, tips:
 def spanned_by(A: Callable, gait: Gait, amplitudes=None, phases: int = 256, tips: int = 2, around: int = 64) -> Spanned:
     """`spanned` without a field: A (..., 3, d) is asked for at shapes (..., d) of the cones. By Stokes's theorem the integral
     of dA is that of A along the loop, of ``phases``, whatever the surface; left on each cone is [A, A], at ``around``."""
-    number("phases", phases, 8, 1e6, whole=True)
-    number("tips", tips, 0, around, whole=True)
+    in_range("phases", phases, 8, 1e6, whole=True)
+    in_range("tips", tips, 0, around, whole=True)
     amplitudes = np.atleast_1d(real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes))
     alpha, alphadot = checked_gait(gait).cycle(int(phases), amplitudes)
     along = np.einsum("...ij,...j->...i", A(alpha), alphadot).mean(1)

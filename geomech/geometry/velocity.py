@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.core.errors import VelocityWarning, real_array, short
+from geomech.core.errors import VelocityWarning
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 Velocity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -85,7 +87,7 @@ def one_by_one(velocity: Callable) -> Callable:
         pairs = zip(alpha.reshape(-1, alpha.shape[-1]), alphadot.reshape(-1, alphadot.shape[-1]))
         xi = [np.asarray(velocity(a.copy(), r.copy()), float) for a, r in pairs]
         if any(x.shape != (3,) for x in xi):
-            raise ValueError("velocity must return (3,) for one shape and rate")
+            raise Refusal("velocity must return (3,) for one shape and rate")
         return np.array(xi).reshape(*alpha.shape[:-1], 3)
 
     return each
@@ -104,13 +106,13 @@ def evaluate(velocity: Velocity, alpha, alphadot, masked: bool = False) -> np.nd
     unless ``masked``."""
     shape = (*np.broadcast_shapes(alpha.shape, alphadot.shape)[:-1], 3)
     if not callable(velocity):
-        raise ValueError(f"velocity must be a function of alpha and alphadot, got {short(velocity)}")
+        raise Refusal("velocity must be a function of alpha and alphadot", value=velocity)
     xi = real_array("what velocity returns", velocity(*np.broadcast_arrays(alpha, alphadot)))
     if xi.shape != shape and fits(xi, shape):
         xi = np.broadcast_to(xi, shape).copy()
     if xi.shape != shape:
-        raise ValueError(f"velocity must return shape {shape} for these alpha and alphadot, got {xi.shape}")
+        raise Refusal(f"velocity must return shape {shape} for these alpha and alphadot", value=xi.shape)
     if not masked and not np.isfinite(xi).all():
         where = np.broadcast_to(alpha, (*shape[:-1], alpha.shape[-1]))[~np.isfinite(xi).all(-1)][0]
-        raise ValueError(f"velocity is not finite at alpha = {where}")
+        raise Refusal(f"velocity is not finite at alpha = {where}")
     return xi

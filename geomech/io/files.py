@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from geomech.core.errors import SceneError, plain
+from rft.refusal import Refusal, printable
 
 try:
     import fcntl
@@ -29,7 +29,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 def note(text: str) -> None:
     """A line on standard error that is no failure."""
-    print("note: " + plain(" ".join(text.split())), file=sys.stderr)
+    print("note: " + printable(" ".join(text.split())), file=sys.stderr)
 
 
 def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
@@ -79,20 +79,22 @@ def _longest_name(folder: Path) -> int:
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """SceneError if an output is the same file as an input, by whatever name or link."""
+    """Refusal if an output is the same file as an input, by whatever name or link."""
     inputs = list(inputs)
     for output in outputs:
         for source in inputs:
             with contextlib.suppress(OSError):
                 if os.path.samefile(output, source):
-                    raise SceneError(f"cannot write {output}: it is an input, {source}; choose another output")
+                    raise Refusal(
+                        f"cannot write {output}", because=f"it is an input, {source}", instead="choose another output"
+                    )
 
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """A path to write to, of the same name; moved to ``path`` on success, removed on failure. SceneError if nothing can
+    """A path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing can
     be written there."""
-    refused = lambda error: SceneError(f"cannot write {path}: {why(error)}; choose another output")
+    refused = lambda error: Refusal(f"cannot write {path}", because=why(error), instead="choose another output")
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
@@ -117,8 +119,10 @@ def write_text(path: str | Path, text: str) -> None:
 @contextlib.contextmanager
 def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
-    SceneError if that cannot be, or if one would replace an input."""
-    refused = lambda error: SceneError(f"cannot write the folder {path}: {why(error)}; choose another with -o")
+    Refusal if that cannot be, or if one would replace an input."""
+    refused = lambda error: Refusal(
+        f"cannot write the folder {path}", because=why(error), instead="choose another with -o"
+    )
     try:
         target = Path(path).resolve()
         if os.path.lexists(target) and not target.is_dir():
@@ -137,7 +141,9 @@ def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path
 def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -> None:
     replaced = [file.name for file in files if os.path.lexists(target / file.name)]
     if blocked := [name for name in replaced if not (target / name).is_file()]:
-        raise SceneError(f"cannot write {path / blocked[0]}: it is no ordinary file; choose another with -o")
+        raise Refusal(
+            f"cannot write {path / blocked[0]}", because="it is no ordinary file", instead="choose another with -o"
+        )
     refuse_inputs([path / name for name in replaced], inputs)
     target.mkdir(parents=True, exist_ok=True)
     for file in files:
@@ -150,7 +156,7 @@ def _unwritten(what: object, error: OSError) -> Exception:
     """A full disk, with the name of what does not fit; other errors as they are."""
     if error.errno not in FULL:
         return error
-    return SceneError(f"cannot write {what}: {error.strerror}; make room, or choose another output")
+    return Refusal(f"cannot write {what}", because=error.strerror, instead="make room, or choose another output")
 
 
 class _Workshop:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.io import files
+from rft.refusal import Refusal
 
 LARGEST_NUMBER = 1e12
 
@@ -52,7 +53,7 @@ def read(path: str | Path, largest: int, what: str) -> Rows:
             raise ValueError
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
-        raise ValueError(f"cannot read {str(path)!r}: {reason}; {what}") from None
+        raise Refusal(f"cannot read {str(path)!r}", because=reason, instead=what) from None
     parts = [line.partition("#") for line in text.split("\n")]
     filled = [(k, line.strip()) for k, (line, _, _) in enumerate(parts, 1) if line.strip()]
     comments = [comment.strip() for _, _, comment in parts if comment.strip()]
@@ -69,7 +70,7 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
     at = next(
         (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
     )
-    raise ValueError(f"{name}, line {line}: a row must be {said}, got {text[:40]!r}" + f", column {at}" * bool(at))
+    raise Refusal(f"a row must be {said}" + f", column {at}" * bool(at), value=text[:40], where=f"{name}, line {line}")
 
 
 def _cell(text: str) -> float:

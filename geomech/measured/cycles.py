@@ -26,7 +26,7 @@ REFINED = 3  # times the phase is that of the nearest point of the mean gait
 
 
 def period(log: Log) -> float:
-    """Of the joints, in units of t; SceneError, with the place, for too few or too thin cycles, gaps and two gaits."""
+    """Of the joints, in units of t; Refusal, with the place, for too few or too thin cycles, gaps and two gaits."""
     t = np.linspace(log.t[0], log.t[-1], len(log.t))
     alpha = np.stack([np.interp(t, log.t, a) for a in log.alpha.T], -1)
     found = phase.period_of(t, alpha)
@@ -35,44 +35,47 @@ def period(log: Log) -> float:
         first, last = (phase.period_of(t[k], alpha[k]) for k in (slice(0, quarter), slice(-quarter, None)))
         if first and last and max(first, last) > APART * min(first, last):
             raise log.wrong(
-                f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last: two "
-                "gaits are in it, give each a file"
+                f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last",
+                because="two gaits are in it, give each a file",
             )
     count = (log.t[-1] - log.t[0]) / found if found else 0.0
     if count < FEWEST + 1:
         said = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
-        raise log.wrong(f"{said}: give at least {ENOUGH} cycles of one gait, some dozens are better")
+        raise log.wrong(said, instead=f"give at least {ENOUGH} cycles of one gait, some dozens are better")
     if found * FASTEST < 1.0:
-        raise log.wrong(f"the joints repeat every {found:.3g} where t is in s: give t in s, or in any longer unit")
+        raise log.wrong(
+            f"the joints repeat every {found:.3g} where t is in s", instead="give t in s, or in any longer unit"
+        )
     if (rows := len(log.t) / count) < ROWS:
-        raise log.wrong(f"{rows:.1f} rows a cycle are too few: give at least {ROWS}")
+        raise log.wrong(f"{rows:.1f} rows a cycle are too few", instead=f"give at least {ROWS}")
     gaps = np.diff(log.t)
     k = int(gaps.argmax())
     if many := int((gaps > max(GAP * found, 2.5 * np.median(gaps))).sum()):
         here = "its one gap" if many == 1 else f"the longest of {many} gaps"
         raise log.wrong(
-            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle, {here}: cut the "
-            f"log and give the longest part, or fill what is longer than {GAP:g} of a cycle",
+            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle, {here}",
             k,
+            instead=f"cut the log and give the longest part, or fill what is longer than {GAP:g} of a cycle",
         )
     check_rows(log)
     return found
 
 
 def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
-    """SceneError if a joint does nothing but noise, or if all joints are one: what goes to and fro on a line is no loop. rows:
+    """Refusal if a joint does nothing but noise, or if all joints are one: what goes to and fro on a line is no loop. rows:
     a cycle."""
     off, left = joints.values - joints.values.mean(0), _noise(joints, rows)
     for name, size, noise in zip(log.joints, off.std(0), left):
         if size <= noise:
-            raise log.wrong(f"{name} does not move beyond its noise: leave it out with --columns")
+            raise log.wrong(f"{name} does not move beyond its noise", instead="leave it out with --columns")
     _, size, ways = np.linalg.svd(off, full_matrices=False)
     if size[1] > max(THIN * size[0], np.sqrt(len(off)) * left.max()):
         return
     first, last, slope = log.joints[0], log.joints[-1], ways[0, -1] / ways[0, 0]
     raise log.wrong(
-        f"{last} is {slope:.3g} times {first}, but for a constant and noise: one shape variable recorded "
-        f"{len(log.joints)} times goes to and fro, and is no loop; name the columns of joints that move apart, by --columns"
+        f"{last} is {slope:.3g} times {first}, but for a constant and noise",
+        because=f"one shape variable recorded {len(log.joints)} times goes to and fro, and is no loop",
+        instead="name the columns of joints that move apart, by --columns",
     )
 
 
@@ -122,15 +125,15 @@ def _start(at: np.ndarray, alpha: np.ndarray) -> float:
 
 
 def _check_growing(log: Log, at: np.ndarray, period: float) -> None:
-    """SceneError where the phase stands or runs back for long: over half a cycle it grows by a fifth of one, at least."""
+    """Refusal where the phase stands or runs back for long: over half a cycle it grows by a fifth of one, at least."""
     inside = np.flatnonzero((log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period))
     ahead = np.interp(log.t[inside] + period / 2, log.t, at) - at[inside]
     if (bad := np.flatnonzero(ahead < 0.4 * np.pi)).size:
         row = inside[bad[0]]
         raise log.wrong(
-            f"the gait stands, slips or runs back after this row (t = {log.t[row]:.6g}): cut pauses and starts out, and give "
-            "each gait a file",
+            f"the gait stands, slips or runs back after this row (t = {log.t[row]:.6g})",
             row,
+            instead="cut pauses and starts out, and give each gait a file",
         )
 
 
@@ -144,7 +147,7 @@ def whole(log: Log, at: np.ndarray, period: float) -> np.ndarray:
 
 
 def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
-    """SceneError for a joint that runs on from cycle to cycle, by more than it swings in one."""
+    """Refusal for a joint that runs on from cycle to cycle, by more than it swings in one."""
     c = np.arange(number.max() + 1)
     for name, x in zip(log.joints, alpha.T):
         each = [x[number == k] for k in c]
@@ -152,13 +155,14 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
         slope, start = np.polyfit(c, means, 1)
         if abs(slope) * c[-1] > max(swing, STEADY * (means - start - slope * c).std()):
             raise log.wrong(
-                f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log and swings by {swing:.2g} in a cycle: "
-                "what drifts is no part of a gait; leave it out with --columns"
+                f"{name} drifts from {means[0]:.3g} to {means[-1]:.3g} over the log and swings by {swing:.2g} in a cycle",
+                because="what drifts is no part of a gait",
+                instead="leave it out with --columns",
             )
 
 
 def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray) -> None:
-    """SceneError if the cycles fall into two kinds: by their first harmonics, along the direction in which these differ most,
+    """Refusal if the cycles fall into two kinds: by their first harmonics, along the direction in which these differ most,
     almost all of the spread is that between two groups."""
     count = number.max() + 1
     w = waves(at, 2)
@@ -179,7 +183,9 @@ def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarr
         change = int(np.flatnonzero(kind != kind[0])[0])
         row = int(np.flatnonzero(number == change)[0])
         raise log.wrong(
-            f"two gaits: {k[best]} cycles are of one kind and {count - k[best]} of another, which begins here "
-            f"(t = {log.t[row]:.6g}): give each a file",
+            "two gaits",
             row,
+            because=f"{k[best]} cycles are of one kind and {count - k[best]} of another, which begins "
+            f"here (t = {log.t[row]:.6g})",
+            instead="give each a file",
         )

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import number
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Known, Loop, Tube, grid_of, series, tube
@@ -19,6 +18,7 @@ from geomech.measured.left import left
 from geomech.measured.log import Log, read
 from geomech.measured.reach import spread
 from rft import se2
+from rft.checks import in_range
 
 HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
 PHASES = 128  # of the mean gait, at which it is integrated
@@ -99,17 +99,17 @@ def fit_log(
     harmonics: int | None = None, within: float | None = None, body_length: float = 1.0,
 ) -> Fitted:  # fmt: skip
     """The connection near the mean gait of a log (`geomech.measured.log.read` says how ``columns`` and ``degrees`` are meant);
-    SceneError, one line, for a log that does not tell it.
+    Refusal, one line, for a log that does not tell it.
 
     level: share of cases in which an interval is to cover the truth. harmonics: of the connection in the phase; by
     cross-validation if left out. within (rad): distance from the mean gait up to which the connection is given; as far as
     the data reach if left out. body_length (m): of a log in m; 1 for one in body lengths."""
-    number("--level", level, 0.5, 0.999)
-    number("--body-length", body_length, 1e-9, 1e9)
+    in_range("--level", level, 0.5, 0.999)
+    in_range("--body-length", body_length, 1e-9, 1e9)
     if harmonics is not None:
-        number("--harmonics", harmonics, 1, HARMONICS, whole=True)
+        in_range("--harmonics", harmonics, 1, HARMONICS, whole=True)
     if within is not None:
-        number("--within", within, 1e-6, 10)
+        in_range("--within", within, 1e-6, 10)
     log = log if isinstance(log, Log) else read(log, columns, degrees)
     period = cycles.period(log)
     joints, pose = (smooth.smoothed(log.t, x, period) for x in (log.alpha, log.pose))
@@ -120,7 +120,8 @@ def fit_log(
     count = cycles.whole(log, phase, period)
     if count.max() + 1 < cycles.FEWEST:
         raise log.wrong(
-            f"{count.max() + 1} whole cycles, without the log's ends, are too few: give at least {cycles.ENOUGH} in all"
+            f"{count.max() + 1} whole cycles, without the log's ends, are too few",
+            instead=f"give at least {cycles.ENOUGH} in all",
         )
     cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
@@ -148,7 +149,9 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         held, varies = unknowns.settled(loop, samples, most, harmonics, varies, size)
         found, errors = regression.solution(held)
     except np.linalg.LinAlgError:
-        raise log.wrong("its cycles do not settle so many unknowns: lower --harmonics, or give more cycles") from None
+        raise log.wrong(
+            "its cycles do not settle so many unknowns", instead="lower --harmonics, or give more cycles"
+        ) from None
     across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
     if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
         combined = {}  # nothing is gained by leaving them out
@@ -161,7 +164,8 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     )  # fmt: skip
     if (largest := max(np.abs(known.whole).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
         raise log.wrong(
-            f"entries of A come out as large as {largest:.1g}: give x and y in body lengths or m, and joints that move"
+            f"entries of A come out as large as {largest:.1g}",
+            instead="give x and y in body lengths or m, and joints that move",
         )
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
     mean, mean_off = mean_of(measured, level)

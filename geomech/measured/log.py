@@ -7,12 +7,14 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import SceneError, UnitWarning, short
+from geomech.core.errors import UnitWarning
 from geomech.io.rows import read as read_rows
 from geomech.io.tables.base import LARGEST_ANGLE
+from rft.refusal import Refusal, formatted
 
 LARGEST_FILE = 100_000_000  # bytes
 MOST_ROWS, FEWEST_ROWS = 500_000, 100
@@ -46,13 +48,13 @@ class Log:
     seconds: bool = True
     metres: bool = False
 
-    def wrong(self, what: str, row: int | None = None) -> SceneError:
-        """To be raised for what is wrong in a row, or in the whole file."""
-        return SceneError(f"{self.name}{'' if row is None else f', line {self.lines[row]}'}: {what}")
+    def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
+        """Return what to raise if something is wrong in a row, or in the whole file. facts: as `Refusal` has them."""
+        return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
 
 
 def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -> Log:
-    """The log in a file; SceneError, one line, for one that cannot be used.
+    """The log in a file; Refusal, one line, for one that cannot be used.
 
     columns: names of the time, of all joint angles, of x, y and the heading, in this order; known ones if left out
     (`POSE`, `JOINT`; a log of phases for want of times has those). degrees: joint angles and heading are in degrees, and
@@ -62,11 +64,14 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
         line, header = source.header
         picked = _picked(source.name, line, header, [c.strip().lower() for c in columns])
         if len(source.filled) - 1 > MOST_ROWS:
-            raise ValueError(f"{source.name}: {len(source.filled) - 1} rows, more than {MOST_ROWS}: thin them out")
+            raise Refusal(
+                f"{len(source.filled) - 1} rows, more than {MOST_ROWS}", where=source.name, instead="thin them out"
+            )
         rows = source.numbers(header, picked)
     except ValueError as error:
-        cure = ": mend that row, or drop it" if "a row must be" in str(error) else ""
-        raise SceneError(f"{error}{cure}") from None
+        if "a row must be" in error.what:
+            error.instead = "mend that row, or drop it"
+        raise
     turn = np.where([degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0)
     turn[[0, -3, -2]] = 1.0
     rows = rows * turn
@@ -80,20 +85,23 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
 def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
     """The columns of the time, the joints, x, y and the heading; ValueError if one is missing or ambiguous."""
     if twice := [c for k, c in enumerate(header) if c in header[:k]]:
-        raise ValueError(f"{name}, line {line}: the column {short(twice[0])} is there twice: rename one")
+        raise Refusal(
+            f"the column {formatted(twice[0])} is there twice", where=f"{name}, line {line}", instead="rename one"
+        )
     if columns:
         if missing := [c for c in columns if c not in header]:
-            raise ValueError(
-                f"{name}, line {line}: no column {short(missing[0])}; it has {short(', '.join(header), 200)}"
+            raise Refusal(
+                f"no column {formatted(missing[0])}; it has {formatted(', '.join(header), 200)}",
+                where=f"{name}, line {line}",
             )
         if len(columns) < 6 or len({*columns}) < len(columns):
-            raise ValueError(
-                f"{name}: --columns are those of t, two joint angles or more, x, y and heading, in this order"
+            raise Refusal(
+                "--columns are those of t, two joint angles or more, x, y and heading, in this order", where=name
             )
         return _of_joints(name, columns)
     if len(header) < 2:
         other = "; columns must be parted by commas" if re.search("[;\\t]", header[0]) else ""
-        raise ValueError(f"{name}, line {line}: no header of columns{other}: {WHAT}")
+        raise Refusal(f"no header of columns{other}", where=f"{name}, line {line}", instead=WHAT)
     bare = {c: re.sub("_(rad|deg)$", "", c) for c in header}
     found = {role: next((c for c in header if bare[c] in names), None) for role, names in POSE.items()}
     found["t"] = found["t"] or ("phase" if "phase" in header else None)
@@ -105,32 +113,35 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
         few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
         what = f"no column {missing[0]}" if missing else few
         cure = "name them t,alpha_1,alpha_2,x,y,heading, or say --columns"
-        raise ValueError(f"{name}, line {line}: {what}; it has {short(', '.join(header), 120)}: {cure}")
+        raise Refusal(f"{what}; it has {formatted(', '.join(header), 120)}", where=f"{name}, line {line}", instead=cure)
     return _of_joints(name, [found["t"], *joints, found["x"], found["y"], found["heading"]])
 
 
 def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
     if len(columns) - 4 > MOST_JOINTS:
-        raise ValueError(
-            f"{name}: {len(columns) - 4} joint angles, more than {MOST_JOINTS}: give the shape in a few modes as columns"
+        raise Refusal(
+            f"{len(columns) - 4} joint angles, more than {MOST_JOINTS}",
+            where=name,
+            instead="give the shape in a few modes as columns",
         )
     if other := [m for c in (columns[0], *columns[-3:-1]) if (m := ELSEWHERE.fullmatch(c))]:
-        raise ValueError(
-            f"{name}: {other[0][0]} is in {other[0][1]} by its name: give t in s, x and y in body lengths, or in m with "
-            "--body-length"
+        raise Refusal(
+            f"{other[0][0]} is in {other[0][1]} by its name",
+            where=name,
+            instead="give t in s, x and y in body lengths, or in m with --body-length",
         )
     return tuple(columns)
 
 
 def _check_times(log: Log) -> None:
     if len(log.t) < FEWEST_ROWS:
-        raise log.wrong(f"{len(log.t)} rows are too few: give at least {FEWEST_ROWS}, of many cycles")
+        raise log.wrong(f"{len(log.t)} rows are too few", instead=f"give at least {FEWEST_ROWS}, of many cycles")
     step = np.diff(log.t)
     if (bad := np.flatnonzero(step <= 0)).size:
         k = bad[0]
         if step[k] == 0:
-            raise log.wrong(f"t = {log.t[k]:.6g} is given twice: keep one of the rows", k + 1)
-        raise log.wrong(f"t = {log.t[k + 1]:.6g} comes after {log.t[k]:.6g}: sort the rows by time", k + 1)
+            raise log.wrong(f"t = {log.t[k]:.6g} is given twice", k + 1, instead="keep one of the rows")
+        raise log.wrong(f"t = {log.t[k + 1]:.6g} comes after {log.t[k]:.6g}", k + 1, instead="sort the rows by time")
 
 
 def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
@@ -138,33 +149,35 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     step = np.abs(np.diff(log.pose[:, 2]))
     if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
         k = jumps[0] + 1
-        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees: say --degrees", k)
+        raise log.wrong(f"{picked[-1]} jumps by {step[k - 1]:.4g}, a turn in degrees", k, instead="say --degrees")
     for k, name in enumerate(log.joints):
         row = int(np.abs(log.alpha[:, k]).argmax())
         if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
             said = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
-            raise log.wrong(f"{said}: say --degrees if these are degrees", row)
+            raise log.wrong(said, row, instead="say --degrees if these are degrees")
         if abs(log.alpha[row, k]) > LARGEST_ANGLE:
-            raise log.wrong(f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees: no joint turns so far", row)
+            raise log.wrong(
+                f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
+            )
     if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
         said = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
         warnings.warn(f"{log.name}: {said}", UnitWarning, stacklevel=3)
 
 
 def _checked(log: Log) -> Log:
-    """The log without jumps of a turn; SceneError for a column that does not move."""
+    """The log without jumps of a turn; Refusal for a column that does not move."""
     pose = np.column_stack([log.pose[:, :2], np.unwrap(log.pose[:, 2])])
     alpha = np.unwrap(log.alpha, axis=0)
     for name, values in zip(log.joints, alpha.T):
         if np.ptp(values) < 1e-6:
-            raise log.wrong(f"{name} does not move: leave it out with --columns")
+            raise log.wrong(f"{name} does not move", instead="leave it out with --columns")
     if (np.ptp(pose, axis=0) == 0).all():
-        raise log.wrong("x, y and heading do not move: nothing was measured of the body's motion")
+        raise log.wrong("x, y and heading do not move", because="nothing was measured of the body's motion")
     return replace(log, alpha=alpha, pose=pose)
 
 
 def check_rows(log: Log) -> None:
-    """SceneError for a row that is off, or after which a column goes on elsewhere."""
+    """Refusal for a row that is off, or after which a column goes on elsewhere."""
     step = np.diff(log.t)
     part = step[:-1] / (step[:-1] + step[1:])
     near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
@@ -174,7 +187,11 @@ def check_rows(log: Log) -> None:
         if abs(off[k]) <= max(SPIKE * np.quantile(np.abs(off), 0.9), LARGE * np.ptp(v)):
             continue
         if abs(off[k]) > abs(v[k + 2] - v[k]):
-            raise log.wrong(f"{name} is {off[k]:.3g} off the rows before and after: mend that row, or drop it", k + 1)
+            raise log.wrong(
+                f"{name} is {off[k]:.3g} off the rows before and after", k + 1, instead="mend that row, or drop it"
+            )
         jump = k + 1 if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]) else k + 2
         what = "two gaits are in the file, or the tracking slipped" if name in log.joints else "the tracking slipped"
-        raise log.wrong(f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row: {what}; cut the log there", jump)
+        raise log.wrong(
+            f"{name} jumps by {v[jump] - v[jump - 1]:.3g} to this row", jump, because=what, instead="cut the log there"
+        )

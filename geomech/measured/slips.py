@@ -43,7 +43,7 @@ def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length
 
 
 def check_right_handed(log: Log, loop: Loop, phase: np.ndarray, joints: Smoothed, pose: Smoothed, count) -> None:
-    """SceneError for a pose of which the mirror image makes far more sense. In the body's frame the velocity follows from phase
+    """Refusal for a pose of which the mirror image makes far more sense. In the body's frame the velocity follows from phase
     and pace; where y or the heading has the other sign, that holds for what is turned by the heading the wrong way."""
     rows = np.flatnonzero(count >= 0)
     known = regression.columns(
@@ -55,6 +55,7 @@ def check_right_handed(log: Log, loop: Loop, phase: np.ndarray, joints: Smoothed
     plain, mirrored = (left**2).sum(0)
     if mirrored < MIRRORED * plain:
         raise log.wrong(
-            f"x, y and heading do not fit each other, {plain / mirrored:.3g} times worse than mirrored: give y upwards "
-            "(in pictures it runs down), x and y in this order, and a heading counter-clockwise from x that does not drift"
+            f"x, y and heading do not fit each other, {plain / mirrored:.3g} times worse than mirrored",
+            instead="give y upwards (in pictures it runs down), x and y in this order, and a heading "
+            "counter-clockwise from x that does not drift",
         )

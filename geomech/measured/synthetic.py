@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import number
 from geomech.gaits import Gait
 from geomech.io.files import whole_file
+from rft.checks import in_range
 
 FINER = 4  # steps of the integration between two rows
 MEMORY = 0.25  # cycles over which the deviations of a body's joints forget
@@ -35,7 +35,7 @@ def made(
     cycle. jitter: relative standard deviation of the rate of the phase, over a cycle. noise (rad), pose_noise (the velocity's
     length, and rad): of each row, white."""
     for name, value, low in (("cycles", cycles, 2), ("samples", samples, 8), ("seed", seed, 0)):
-        number(name, value, low, 1e7, whole=True)
+        in_range(name, value, low, 1e7, whole=True)
     rng, count = np.random.default_rng(seed), int(cycles * samples * FINER) + 1
     t = np.arange(count) / (samples * FINER * frequency)
     smooth = lambda width, columns: _smooth(rng, count, width * samples * FINER, columns)

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.core.errors import SceneError, choose, number
+from geomech.core.errors import choose
 from geomech.optimise.cycles import Brought
+from rft.checks import in_range
+from rft.refusal import Refusal
 
 AIMS = ("displacement", "efficiency", "turning", "speed")
 DIRECTIONS = ("x", "y")
@@ -35,12 +37,12 @@ class Aim:
         if not (isinstance(self.direction, str) and self.direction == ""):
             choose("--direction", self.direction, DIRECTIONS)
             if self.name == "turning":
-                raise SceneError("--direction is that of a displacement: turning takes none, drop it")
+                raise Refusal("--direction is that of a displacement", because="turning takes none, drop it")
         for name in ("rate", "power"):
             if getattr(self, name) is not None:
-                number(f"--{name}", getattr(self, name), 1e-9, 1e9)
+                in_range(f"--{name}", getattr(self, name), 1e-9, 1e9)
                 if self.name != "speed":
-                    raise SceneError(f"--{name} limits speed: say --for speed, or drop it")
+                    raise Refusal(f"--{name} limits speed", instead="say --for speed, or drop it")
 
     straight = property(lambda self: self.name != "turning", doc="Whether turning is no part of it.")
     costs = property(lambda self: self.name == "efficiency" or self.power is not None, doc="Whether it asks for power.")

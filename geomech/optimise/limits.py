@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from geomech.core.errors import SceneError, check_angle, is_number, number, real_array, short
+from geomech.core.errors import check_angle
 from geomech.scene.model import Scene
 from geomech.systems.base import System
 from geomech.systems.capabilities import stored
 from geomech.systems.framed import Framed
+from rft.checks import in_range, is_number, real_array
+from rft.refusal import Refusal, formatted
 
 LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
 Within = float | tuple[tuple[float, float], ...]
@@ -31,7 +33,7 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
             max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
         )
     if is_number(within):
-        number("--within", within, LEAST, MOST)
+        in_range("--within", within, LEAST, MOST)
         pairs = np.array([[-float(within), float(within)]] * system.joints)
     else:
         pairs = _pairs(within, system.joints)
@@ -40,7 +42,7 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
     slack = 1e-9 * (1 + np.abs(pairs))
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
-        raise SceneError(f"--within {_text(within)} lies outside the field that the scene has: {field}")
+        raise Refusal(f"--within {_text(within)} lies outside the field that the scene has", instead=field)
     return _told(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
 
@@ -57,8 +59,8 @@ def _pairs(within, joints: int) -> np.ndarray:
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
     good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
     if not good:
-        raise SceneError(
-            f"--within takes a number, one for each of {joints} joints, or as many from low to high, got {short(within)}"
+        raise Refusal(
+            f"--within takes a number, one for each of {joints} joints, or as many from low to high", value=within
         )
     return x
 
@@ -71,4 +73,4 @@ def _told(low: np.ndarray, high: np.ndarray) -> Within:
 
 
 def _text(within) -> str:
-    return f"{within:g}" if is_number(within) else short(within)
+    return f"{within:g}" if is_number(within) else formatted(within)

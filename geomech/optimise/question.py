@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from geomech.core.errors import SceneError
 from geomech.core.variables import Result, Variable
 from geomech.optimise.limits import Asked
 from geomech.optimise.request import Request, checked
@@ -15,6 +14,7 @@ from geomech.scene.model import Scene
 from geomech.study.effort import why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Optimize(Question):
         _ = self.request  # refuses what makes no sense
         name, joints = self.scene.name, self.scene.system.joints
         if self.stretch and joints != 2:
-            raise SceneError(f"{name}: --stretch takes two joints, this one has {joints}: drop it")
+            raise Refusal(f"--stretch takes two joints, this one has {joints}", where=name, instead="drop it")
         if self.stretch and (reason := why_none(self.scene.system)):
-            raise SceneError(f"{name}: {reason}: drop --stretch")
+            raise Refusal(reason, where=name, instead="drop --stretch")
 
     def cost(self) -> Cost:
         return self.request.cost()

@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named, number
 from geomech.gaits import Gait, Sine
 from geomech.geometry.connection import evaluate
 from geomech.optimise.aims import Aim
@@ -24,7 +23,9 @@ from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near, stored
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
+from rft.checks import in_range
 from rft.premise import ALL, Premise
+from rft.refusal import Refusal, located
 
 JOINTS = 12  # more make more numbers than a search without a model of them can find
 PHASES = 128  # of a cycle in the search
@@ -96,10 +97,10 @@ class Request:
         aim, system = self.aim, self.system
         if self.power is None:
             instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
-            raise ValueError(f"--for {aim.name} asks for power, which {told_by(system)} does not tell: {instead}")
+            raise Refusal(f"--for {aim.name} asks for power, which {told_by(system)} does not tell", instead=instead)
         if capability(system, OwnMetric) is not None:
             if aim.power is not None:
-                raise ValueError(f"--power is that of drag, and the {kind_of(system)} has none: say --rate")
+                raise Refusal(f"--power is that of drag, and the {kind_of(system)} has none", instead="say --rate")
             return 2.0
         if self.stored:
             return system.traits.power_degree
@@ -113,9 +114,10 @@ class Request:
         slow, fast = (self.power(alpha, u, evaluate(self.system.velocity, alpha, u)) for u in (rate, 2 * rate))
         degrees = np.log2(fast / slow)
         if np.ptp(degrees) > DEGREES:
-            raise ValueError(
-                f"no path has a length with {listed(self.system, ALL)}: its power is of no one degree in the rate; "
-                "optimize for displacement"
+            raise Refusal(
+                f"no path has a length with {listed(self.system, ALL)}",
+                because="its power is of no one degree in the rate",
+                instead="optimize for displacement",
             )
         return float(np.round(degrees.mean(), 3))
 
@@ -171,14 +173,16 @@ def checked(
     scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: Asked = None,
     starts: int | None = None, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
-    """The request, or SceneError, one line, for one that makes no sense."""
-    with named(checked_scene(scene).name):
-        number("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
+    """The request, or Refusal, one line, for one that makes no sense."""
+    with located(checked_scene(scene).name):
+        in_range("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
         if near(system):
-            raise SceneError(
-                f"no gait but one to search: A is known near {near(system)} alone; measure more varied cycles"
+            raise Refusal(
+                "no gait but one to search",
+                because=f"A is known near {near(system)} alone",
+                instead="measure more varied cycles",
             )
         wanted = Aim(aim, towards, system.length, **limits)
         if wanted.timed:
@@ -190,26 +194,34 @@ def checked(
                 wanted = Aim(aim, towards, system.length, **own)
         loops = _loops(scene, harmonics, within)
         if isinstance(loops, Undulations) and not wanted.straight:
-            raise SceneError("a sine along a straight axis does not turn: --for turning takes a gait of few joints")
+            raise Refusal(
+                "a sine along a straight axis does not turn", because="--for turning takes a gait of few joints"
+            )
         if isinstance(loops, Undulations) and wanted.direction == "y" and system.traits.mirror:
-            raise SceneError("a sine along a straight axis brings nothing across it: drop --direction, or say x")
+            raise Refusal("a sine along a straight axis brings nothing across it", instead="drop --direction, or say x")
         if isinstance(loops, Undulations) and wanted.rate is not None:
-            raise SceneError("a wave is as fast as its power allows: say --power, a limit of rate is that of joints")
+            raise Refusal(
+                "a wave is as fast as its power allows", instead="say --power, a limit of rate is that of joints"
+            )
         request = Request(scene, wanted, loops, 1 if starts is None else int(starts))
         if starts is None and request.looks_up:
             request = dataclasses.replace(request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request))
         if wanted.costs:
             request.degree  # noqa: B018 - refuses what has none
         if wanted.straight and _stays(system):
-            raise SceneError(
-                f"the {kind_of(system)} goes nowhere: its mean frame stays where it is; optimize for turning"
+            raise Refusal(
+                f"the {kind_of(system)} goes nowhere",
+                because="its mean frame stays where it is",
+                instead="optimize for turning",
             )
         if wanted.name == "turning" and _never_turns(request):
             whose = (
                 f"{told_by(system)} tells a body whose" if stored(system, "connection") else f"the {kind_of(system)}'s"
             )
-            raise SceneError(
-                f"no gait turns it: {whose} heading follows from its shape and comes back with it; optimize for displacement"
+            raise Refusal(
+                "no gait turns it",
+                because=f"{whose} heading follows from its shape and comes back with it",
+                instead="optimize for displacement",
             )
         return request
 
@@ -263,11 +275,17 @@ def _loops(scene: Scene, harmonics: int | None, within: Asked) -> Loops | Undula
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("within", within)):
             if value is not None:
-                raise SceneError(f"--{name} is that of joints: of a sine, amplitude and waves are sought; drop it")
+                raise Refusal(
+                    f"--{name} is that of joints",
+                    because="of a sine, amplitude and waves are sought",
+                    instead="drop it",
+                )
         return Undulations(gait, max(64, min(n.phases, PHASES)))
     if system.joints > JOINTS:
-        raise SceneError(f"a loop of {system.joints} joints is too much to search: at most {JOINTS}, or a sine gait")
-    number("--harmonics", 5 if harmonics is None else harmonics, 1, 32, whole=True)
+        raise Refusal(
+            f"a loop of {system.joints} joints is too much to search", because=f"at most {JOINTS}, or a sine gait"
+        )
+    in_range("--harmonics", 5 if harmonics is None else harmonics, 1, 32, whole=True)
     harmonics = 5 if harmonics is None else int(harmonics)
     return Loops(system.joints, harmonics, limits(scene, within, PHASES), max(PHASES, 16 * harmonics))
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.gaits import Gait
 from geomech.geometry.connection import check_knobs
 from geomech.geometry.gait import FASTEST
@@ -40,6 +39,7 @@ from geomech.optimise.request import (
 from geomech.optimise.telling import told
 from geomech.run.jobs import runner
 from geomech.scene.model import Scene
+from rft.refusal import Refusal, located
 
 NEAR_TOLERANCE, TOLERANCE = 1e-7, 1e-5  # at which a search ends: change of the value of a step
 NO_TURN = 1e-7  # rad: a net turn that is none
@@ -58,7 +58,7 @@ def optimise(
     """The gait of a scene with the largest displacement, efficiency, turning or speed (`Aim`), among Fourier series up to
     ``harmonics`` (5) that keep every shape variable ``within`` (the field's extent) of 0, or of (lowest, highest) for each,
     searched for from the scene's own gait and ``starts`` - 1 others: by default none, and for two joints in a dry medium, where
-    many a gait is the best near by, `OUTLINES` of the limits. A sine is sought among sines. SceneError for what makes no
+    many a gait is the best near by, `OUTLINES` of the limits. A sine is sought among sines. Refusal for what makes no
     sense."""
     request = checked(scene, aim, direction, harmonics, within, starts, rate, power)
     return search(request, progress)
@@ -67,7 +67,7 @@ def optimise(
 def search(request: Request, progress: Callable | None = None) -> Optimum:
     """`optimise` of a request that is checked."""
     check_knobs(1, progress)
-    with named(request.scene.name):
+    with located(request.scene.name):
         return _Search(request, progress).optimum()
 
 
@@ -310,8 +310,8 @@ class _Search:
     def _timed(self, this: Told) -> Gait:
         """With the frequency that its limits allow."""
         if self.r.aim.timed and 0 < this.time < 1 / (2 * np.pi * FASTEST):
-            raise SceneError(
-                f"its limits let a gait repeat more than {FASTEST:g} times a second: lower --rate, or --power"
+            raise Refusal(
+                f"its limits let a gait repeat more than {FASTEST:g} times a second", instead="lower --rate, or --power"
             )
         frequency = 1 / (2 * np.pi * this.time) if self.r.aim.timed and this.time else self.r.scene.gait.frequency
         return dataclasses.replace(this.gait, frequency=frequency)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.core.variables import Result
 from geomech.io.files import whole_file
 from geomech.output import plots
@@ -19,6 +18,7 @@ from geomech.run.progress import progress as shown
 from geomech.run.progress import told
 from geomech.scene.model import Scene
 from geomech.study.motion import Motion, Picture
+from rft.refusal import Refusal
 
 FILMS, STRIPS = (".gif", ".mp4"), (".png", ".pdf", ".svg")
 FRAMES = 48  # of a cycle, at most
@@ -29,12 +29,18 @@ FRAME = 4e5  # bytes a frame holds until the film is written
 
 
 def check_format(path: Path) -> None:
-    """SceneError for a name that does not end as a film or a figure, or for a film that nothing here can write."""
+    """Refusal for a name that does not end as a film or a figure, or for a film that nothing here can write."""
     ending = path.suffix.lower()
     if ending not in FILMS + STRIPS:
-        raise SceneError(f"cannot draw {path}: end the name in .gif or .mp4 for a film, .png, .pdf or .svg for a strip")
+        raise Refusal(
+            f"cannot draw {path}", instead="end the name in .gif or .mp4 for a film, .png, .pdf or .svg for a strip"
+        )
     if ending == ".mp4" and shutil.which("ffmpeg") is None:
-        raise SceneError(f"cannot write {path}: an .mp4 takes ffmpeg, which is not installed: end the name in .gif")
+        raise Refusal(
+            f"cannot write {path}",
+            because="an .mp4 takes ffmpeg, which is not installed",
+            instead="end the name in .gif",
+        )
 
 
 def is_film(path: Path) -> bool:
@@ -114,7 +120,7 @@ def _gif(path: Path, frames: Iterator[np.ndarray]) -> None:
 
 
 def _mp4(path: Path, frames: Iterator[np.ndarray]) -> None:
-    """Pictures handed to ffmpeg one by one; SceneError with its own last words if it fails."""
+    """Pictures handed to ffmpeg one by one; Refusal with its own last words if it fails."""
     first = next(frames)
     tall, wide = (2 * (x // 2) for x in first.shape[:2])  # of which its usual colours take even numbers
     taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(RATE), "-i", "-"]
@@ -132,7 +138,7 @@ def _mp4(path: Path, frames: Iterator[np.ndarray]) -> None:
             raise
     if ffmpeg.returncode or not path.exists():
         words = said.decode(errors="replace").strip().splitlines()[-1:] or ["it says nothing"]
-        raise SceneError(f"cannot write {path.name}: ffmpeg failed: {words[0]}; end the name in .gif")
+        raise Refusal(f"cannot write {path.name}", because=f"ffmpeg failed: {words[0]}", instead="end the name in .gif")
 
 
 def _hand(pipe, first: np.ndarray, rest: Iterator[np.ndarray], tall: int, wide: int) -> None:

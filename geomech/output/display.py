@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from geomech.core.errors import plain
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.output import plots
@@ -18,6 +17,7 @@ from geomech.study.results import Displacements
 from geomech.study.sweep import Swept
 from geomech.study.tables import position_spread
 from geomech.text.system import described
+from rft.refusal import printable
 
 MOST_ROWS = 40
 DPI = 90
@@ -25,8 +25,8 @@ DPI = 90
 
 def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None) -> str:
     """A line, a table of at most MOST_ROWS, a Figure."""
-    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(plain(_text(x)))}</{tag}>"
-    line = html.escape(plain(line))
+    rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(printable(_text(x)))}</{tag}>"
+    line = html.escape(printable(line))
     parts = [f"<p>{line}</p>"]
     if rows:
         lines = [("th", head)] * bool(head) + [("td", row) for row in rows[:MOST_ROWS]]

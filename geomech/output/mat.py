@@ -20,7 +20,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     """Write alpha1, alpha2, Ax1, Ax2, Ay1, Ay2, Atheta1, Atheta2, each (N, M), for xi = ``sign`` A alphadot; rows run over
     alpha1 as of ndgrid, or over alpha2 as of meshgrid. Beside them ABOUT, a JSON text of sign, frame, body length, unit
     and spline, and the fit residual (3, N, M); of a table that tells what A may be off by, half
-    widths of its intervals (3, 2, N, M). The file appears whole or not at all; SceneError for other than two joints."""
+    widths of its intervals (3, 2, N, M). The file appears whole or not at all; Refusal for other than two joints."""
     from scipy.io import savemat
 
     scene = study.scene

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from geomech.core.errors import SceneError, choose
+from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.io.files import note, write_text
 from geomech.io.results import write_netcdf
@@ -15,6 +15,7 @@ from geomech.io.tables import ORDERS, SIGNS
 from geomech.measured import results
 from geomech.output import mat
 from geomech.text import optimum
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Connection:
             if word is not None:
                 choose(option, word, known)
                 if self.ending == ".nc":
-                    raise SceneError(f"{option} is that of a .mat file: drop it, a .nc file says what it has")
+                    raise Refusal(f"{option} is that of a .mat file", instead="drop it, a .nc file says what it has")
 
     @property
     def matlab(self) -> bool:
@@ -55,9 +56,9 @@ def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Calla
 
     def check(path: Path) -> None:
         if path.suffix != ".toml":
-            raise SceneError(f"cannot write {path}: end the name of a scene in .toml")
+            raise Refusal(f"cannot write {path}", instead="end the name of a scene in .toml")
         if field is None:
-            raise SceneError("--scene names the field's file: say -o FIELD.nc, too")
+            raise Refusal("--scene names the field's file", instead="say -o FIELD.nc, too")
 
     return lambda result, path: write_text(path, results.scene_toml(result.subject, field, path)), check
 

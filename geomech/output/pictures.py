@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from geomech.core.errors import SceneError, choose
+from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.geometry import stretch
 from geomech.output import plots
 from geomech.study import tables
 from geomech.study.shape_space import Space
 from geomech.systems.base import shape_labels
+from rft.refusal import Refusal
 
 check = plots.check_format
 
@@ -59,7 +60,7 @@ class Optimum:
 
     def __post_init__(self) -> None:
         if self.stretch and self.plot is None:
-            raise SceneError("--stretch is a way to draw: say --plot FILE, too")
+            raise Refusal("--stretch is a way to draw", instead="say --plot FILE, too")
 
     def __call__(self, result: Result, path: Path) -> None:
         plots.save(plots.optimum_figure(result.subject, self.stretch), path)
@@ -77,7 +78,7 @@ class Connection:
 
     def __post_init__(self) -> None:
         if self.plot is None and not (self.style, self.pair, self.slice_, self.beside) == (None,) * 4:
-            raise SceneError("--style, --pair, --slice and --beside are those of a figure: say --plot FILE")
+            raise Refusal("--style, --pair, --slice and --beside are those of a figure", instead="say --plot FILE")
         if self.style is not None:
             choose("--style", self.style, plots.CONNECTION_STYLES)
 
@@ -106,9 +107,9 @@ class Ccf:
         if self.style is not None:
             choose("--style", self.style, plots.CCF_STYLES)
         if self.stretch and (self.metric or self.beside or self.style not in (None, "map")):
-            raise SceneError("--stretch is a map of its own: drop --style, --metric and --beside")
+            raise Refusal("--stretch is a map of its own", instead="drop --style, --metric and --beside")
         if self.metric and self.style not in (None, "map"):
-            raise SceneError(f"--metric draws on a map: drop --style {self.style}")
+            raise Refusal("--metric draws on a map", instead=f"drop --style {self.style}")
 
     def __call__(self, result: Result, path: Path) -> None:
         space: Space = result.subject

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from geomech import text
-from geomech.core.errors import SceneError
 from geomech.core.variables import Result
 from geomech.io.files import read, refuse_inputs
 from geomech.io.results import write_netcdf
@@ -20,16 +19,19 @@ from geomech.study import accuracy, fields, tables
 from geomech.study.report import Reported
 from geomech.systems.base import shape_labels
 from geomech.systems.framed import Framed
+from rft.refusal import Refusal
 
 SCENE, TABLES = "scene.toml", "displacement.json"
 
 
 def refuse_folder(scene: Scene, folder: Path) -> None:
-    """SceneError if the files of `write` would replace an input, or a scene that no `run` has left in ``folder``."""
+    """Refusal if the files of `write` would replace an input, or a scene that no `run` has left in ``folder``."""
     there = folder / SCENE
     refuse_inputs([there, folder / TABLES], inputs(scene))
     if os.path.lexists(there) and not os.path.lexists(folder / TABLES) and not _holds(there, toml(scene)):
-        raise SceneError(f"cannot write {there}: another scene stands there; choose another folder with -o")
+        raise Refusal(
+            f"cannot write {there}", because="another scene stands there", instead="choose another folder with -o"
+        )
 
 
 def _holds(path: Path, text: str) -> bool:

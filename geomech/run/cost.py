@@ -12,8 +12,8 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from geomech.core.errors import SceneError
 from geomech.run.backend import listen, listener, nobody, preferred
+from rft.refusal import Refusal
 
 LONGEST = 60.0  # s of computing that a command begins without being told to
 LARGEST = 2e9  # bytes of memory, likewise
@@ -31,7 +31,7 @@ BATCH = {"numpy": 2e-3, "numba": 5e-4}
 STEP = 200  # balances of large batches that take NumPy as long as one batch, however small
 
 
-class TooLong(SceneError):
+class TooLong(Refusal):
     """What is asked for takes more computing or memory than a command begins without being told to."""
 
 
@@ -67,7 +67,7 @@ class Cost(NamedTuple):
         """`TooLong` where it goes beyond the limits and ``yes`` does not allow that. less: what to do else."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
-            raise TooLong(f"{place}: {self}: to compute for more than {limits} say --yes, or {less}")
+            raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say --yes, or {less}")
 
 
 def assumed(samples: float, points: int, linear: bool, batches: float, back_end: str = "") -> float:

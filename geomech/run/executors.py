@@ -11,9 +11,9 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 
-from geomech.core.errors import SceneError, short
 from geomech.io.files import note
 from geomech.run.backend import BACKENDS, VERSION, fastest
+from rft.refusal import Refusal, formatted
 
 AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
 LONGEST_END = 2.0  # s for a pool whose processes are killed to see that
@@ -120,7 +120,7 @@ class Cluster:
         return SEEN
 
     def _connected(self, distributed):
-        """Return the client; SceneError if nothing answers, or something else does that says nothing."""
+        """Return the client; Refusal if nothing answers, or something else does that says nothing."""
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what is wrong is said in a line
         answer: Future = Future()
@@ -128,10 +128,12 @@ class Cluster:
         try:
             return answer.result(2 * WAIT)
         except Exception as error:
-            why = "nothing answers there" if isinstance(error, OSError) else short(str(error), 120)
-            raise SceneError(
-                f"{self.place}: {why}: give the address of a Dask scheduler, such as tcp://127.0.0.1:8786, that runs "
-                "('dask scheduler'), or leave it out"
+            why = "nothing answers there" if isinstance(error, OSError) else formatted(str(error), 120)
+            raise Refusal(
+                why,
+                where=self.place,
+                instead="give the address of a Dask scheduler, such as tcp://127.0.0.1:8786, that runs ('dask "
+                "scheduler'), or leave it out",
             ) from None
 
     def _connect(self, distributed, answer: Future) -> None:
@@ -144,22 +146,28 @@ class Cluster:
             answer.set_exception(error)
 
     def _checked(self) -> str:
-        """Return the back end that all workers have; SceneError unless there are some, all with this code."""
+        """Return the back end that all workers have; Refusal unless there are some, all with this code."""
         until = time.monotonic() + WAIT
         while not self._count():
             if time.monotonic() > until:
-                raise SceneError(f"{self.place}: it has no workers: start some ('dask worker {self.address}')")
+                raise Refusal(
+                    "it has no workers", where=self.place, instead=f"start some ('dask worker {self.address}')"
+                )
             time.sleep(0.05)
         try:
             found = self.client.run(_probe)
         except Exception as error:
-            raise SceneError(
-                f"{self.place}: its workers cannot load geomech ({short(str(error), 120)}): install it there"
+            raise Refusal(
+                f"its workers cannot load geomech ({formatted(str(error), 120)})",
+                where=self.place,
+                instead="install it there",
             ) from None
         for worker, (version, _) in found.items():
             if version != VERSION:
-                raise SceneError(
-                    f"{self.place}: the worker {worker} has {version}, this command {VERSION}: install the same there"
+                raise Refusal(
+                    f"the worker {worker} has {version}, this command {VERSION}",
+                    where=self.place,
+                    instead="install the same there",
                 )
         return min((back_end for _, back_end in found.values()), key=BACKENDS.index)
 
@@ -188,7 +196,7 @@ class Cluster:
         elif name in ("CancelledError", "FutureCancelledError", "CommClosedError", "ClosedClientError"):
             meaning = "the scheduler, or the connection to it, was lost"
         else:
-            meaning = f"{name}: {short(str(error), 120)}"
+            meaning = f"{name}: {formatted(str(error), 120)}"
         return RuntimeError(f"{self.place}: {meaning}")
 
     def close(self) -> None:
@@ -200,8 +208,8 @@ def _distributed():
     try:
         import distributed
     except ImportError as error:
-        raise SceneError(
-            f"--scheduler takes the package distributed ({error}): pip install 'geomech[distributed]'"
+        raise Refusal(
+            f"--scheduler takes the package distributed ({error})", instead="pip install 'geomech[distributed]'"
         ) from None
     return distributed
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Protocol
 
-from geomech.core.errors import Note, SceneError
+from geomech.core.errors import Note
 from geomech.core.work import working
 from geomech.run.backend import BACKENDS, VERSION, at_most, fastest, preferred
 from geomech.run.cost import TooLong, is_undecided
@@ -33,6 +33,7 @@ from geomech.run.digest import Undigestible, digest
 from geomech.run.executors import undisturbed
 from geomech.run.store import CHECKPOINT, Busy, Store
 from geomech.run.tasks import Alone, Order, here, opened, packed, perform
+from rft.refusal import Refusal
 
 WORTH = 3.0  # s of computing, below which other processes are not worth their start: a second of each
 TRIES = 3  # of a task whose process is ended from outside
@@ -226,7 +227,9 @@ class _Queue:
         except Alone as error:
             cure = "put it in a module, or in a file for --plugin"
             if self.executor.remote:
-                raise SceneError(f"a cluster cannot know what is to be computed: {error}: {cure}") from None
+                raise Refusal(
+                    "a cluster cannot know what is to be computed", because=str(error), instead=cure
+                ) from None
             if error.worth_saying:
                 warnings.warn(f"computed by one process, others cannot know it: {error}: {cure}", Note, stacklevel=6)
             self.executor = None
@@ -321,14 +324,15 @@ def storing(path: Path | None, context: tuple = (), output: Path | None = None, 
     ``keep``.
 
     context: all that they follow from besides the tasks, such as files and code of one's own. output: of which there may
-    be one computation at a time: SceneError while another is under way. A resumed request takes no back end that those who
+    be one computation at a time: Refusal while another is under way. A resumed request takes no back end that those who
     began it had not. What is raised, a signal among others, says in a note what is kept; an error leaves nothing, unless it
     came after the first write, and a refusal nothing at all."""
     try:
         store = Store(path, output is not None, BACKENDS.index(fastest()))
     except Busy:
-        raise SceneError(
-            f"another computation to {output} is under way: wait for it, stop it, or choose another output with -o"
+        raise Refusal(
+            f"another computation to {output} is under way",
+            instead="wait for it, stop it, or choose another output with -o",
         ) from None
     with at_most(BACKENDS[min(store.mark, len(BACKENDS) - 1)]):
         try:

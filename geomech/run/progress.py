@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 
-from geomech.core.errors import plain
+from rft.refusal import printable
 
 EVERY = 10.0  # s between lines
 REDRAWN = 0.5  # s between drawings of a notebook's bar, and before the first
@@ -24,7 +24,7 @@ class Course:
         self.begin(title)
 
     def begin(self, title: str) -> None:
-        self.title, self.fraction, self.start = plain(title), 0.0, time.monotonic()
+        self.title, self.fraction, self.start = printable(title), 0.0, time.monotonic()
 
     def reached(self, fraction: float) -> None:
         self.fraction = fraction

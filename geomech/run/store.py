@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.io.files import hidden, note
+from rft.refusal import Refusal
 
 CHECKPOINT = 2.0  # s between writes; a request that takes less writes nothing
 LARGEST = 6_000_000_000  # bytes of results in a file, as the largest sweep has; what is beyond is computed again
@@ -27,7 +27,7 @@ KINDS = "fiubcU"  # of dtypes of arrays
 T = TypeVar("T")
 
 
-class Busy(SceneError):
+class Busy(Refusal):
     """Another command has the file open."""
 
 
@@ -64,7 +64,7 @@ def _array(code: int, raw: memoryview) -> np.ndarray:
     dtype, shape, values = msgspec.msgpack.decode(raw)
     dtype = np.dtype(dtype)
     if code != ARRAY or dtype.kind not in KINDS:
-        raise ValueError("it is no array")
+        raise Refusal("it is no array")
     return np.frombuffer(values, dtype).reshape(shape).copy()
 
 
@@ -149,8 +149,10 @@ class Store:
 
     def _open(self) -> None:
         if os.path.lexists(self.path) and not self.path.is_file():
-            raise SceneError(
-                f"cannot keep what is done in {self.path}: it is no ordinary file; remove it, or choose another output"
+            raise Refusal(
+                f"cannot keep what is done in {self.path}",
+                because="it is no ordinary file",
+                instead="remove it, or choose another output",
             )
         self._try(self._connect)
         while self.db is not None and not self.path.exists():  # who had it has removed it a moment ago
@@ -191,7 +193,7 @@ class Store:
                 self.lost, self.new = True, {}
                 if self.hold:
                     raise Busy(
-                        f"another computation has {self.path} open: wait for it, stop it, or name another"
+                        f"another computation has {self.path} open", instead="wait for it, stop it, or name another"
                     ) from None
             elif isinstance(error, Foreign | UnicodeError) or code in DAMAGED:
                 self._disconnect()

@@ -12,8 +12,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from geomech.core.errors import SceneError
 from geomech.run.backend import VERSION, one_thread, preferring
+from rft.refusal import Refusal
 
 
 class Order(NamedTuple):
@@ -71,7 +71,7 @@ def here(task: Callable, common: Any, item: Any, back_end: str, one_of_many: boo
 def _known(order: Order) -> tuple[Callable, Any]:
     """Return (task, common), once all that they are made of is known here."""
     if order.version != VERSION:
-        raise SceneError(f"a worker has {VERSION}, this command {order.version}: install the same there")
+        raise Refusal(f"a worker has {VERSION}, this command {order.version}", instead="install the same there")
     if order.plugins or order.classes:
         _learn(order)
     return pickle.loads(order.work)

@@ -13,9 +13,10 @@ import contextlib
 import dataclasses
 from collections.abc import Iterator
 
-from geomech.core.errors import SceneError, number
 from geomech.run.backend import at_most, cores, fastest
 from geomech.run.jobs import Executor, runner, running
+from rft.checks import in_range
+from rft.refusal import Refusal
 
 __all__ = ["using"]
 
@@ -26,7 +27,7 @@ MOST = 1024  # processes
 def using(count: int | None = None, scheduler: str | None = None) -> Iterator[None]:
     """Compute what is large in the body of the statement by ``count`` processes, by default one a core, or on the Dask
     cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786". Processes start when something turns out to be
-    worth it. SceneError for what is none, and at once for a scheduler that does not answer."""
+    worth it. Refusal for what is none, and at once for a scheduler that does not answer."""
     executor = _executor(count, scheduler)
     try:
         with (
@@ -41,12 +42,9 @@ def using(count: int | None = None, scheduler: str | None = None) -> Iterator[No
 
 def _executor(count: int | None, scheduler: str | None) -> Executor | None:
     if count is not None:
-        try:
-            number("--workers", count, 1, MOST, whole=True)
-        except ValueError as error:
-            raise SceneError(str(error)) from None
+        in_range("--workers", count, 1, MOST, whole=True)
     if scheduler is not None and count is not None:
-        raise SceneError("--workers are processes of this machine, --scheduler has its own: give one of the two")
+        raise Refusal("--workers are processes of this machine, --scheduler has its own", instead="give one of the two")
     if scheduler is None and (count or cores()) == 1:
         return None
     from geomech.run.executors import Cluster, Processes

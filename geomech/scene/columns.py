@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError, short
 from geomech.io import rows
+from rft.refusal import Refusal, located
 
 LARGEST_FILE = 20_000_000  # bytes
 
 
 def columns(place: str, path, wanted: tuple, optional: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
     """The columns ``wanted``, and those of ``optional`` that are there. One of wanted may be a tuple of names for the same,
-    found under the first. SceneError, with ``place`` and the line, for what is no such file."""
+    found under the first. Refusal, with ``place`` and the line, for what is no such file."""
     if not isinstance(path, (str, Path)):
-        raise SceneError(f"{place} file must be the name of a CSV file, got {short(path)}")
+        raise Refusal("file must be the name of a CSV file", value=path, where=place)
     wanted = [(w,) if isinstance(w, str) else w for w in wanted]
     header = ",".join(w[0] for w in wanted)
-    try:
+    with located(place):
         source = rows.read(path, LARGEST_FILE, f"give a CSV file with the header {header}")
         line, names = source.header
         known = [n for w in wanted for n in w] + [*optional]
@@ -30,10 +30,8 @@ def columns(place: str, path, wanted: tuple, optional: tuple[str, ...] = ()) -> 
             or any(not {*w} & {*names} for w in wanted)
         ):
             more = f", and {','.join(optional)} if wanted" if optional else ""
-            raise ValueError(f"{source.name}, line {line}: the header must be {header}{more}")
+            raise Refusal(f"the header must be {header}{more}", where=f"{source.name}, line {line}")
         values = dict(zip(names, source.numbers(names).T))
-    except ValueError as error:
-        raise SceneError(f"{place}: {error}") from None
     found = {w[0]: next(values[n] for n in w if n in values) for w in wanted}
     return found | {n: values[n] for n in optional if n in values}
 

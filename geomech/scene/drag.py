@@ -13,6 +13,7 @@ import numpy as np
 from geomech.core.errors import choose
 from geomech.io.rows import Rows
 from geomech.io.rows import read as read_rows
+from rft.refusal import Refusal
 
 LARGEST_FILE = 10_000_000  # bytes
 MOST_ROWS = 100_000
@@ -69,10 +70,10 @@ def _measured(source: Rows) -> Measured:
     weighed = WEIGHT in columns
     rows = source.numbers(columns, tuple(x.lower() for x in NEEDED) + (WEIGHT,) * weighed).T
     if not 0 < rows.shape[1] <= MOST_ROWS:
-        raise ValueError(f"{source.name}: it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}")
+        raise Refusal(f"it must have 1 to {MOST_ROWS} rows of drag, got {rows.shape[1]}", where=source.name)
     if (far := np.flatnonzero(np.abs(rows[0]) > 360)).size:
         line = source.lines[far[0]]
-        raise ValueError(f"{source.name}, line {line}: {ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}")
+        raise Refusal(f"{ANGLE} must be from -360 to 360, got {rows[0, far[0]]:g}", where=f"{source.name}, line {line}")
     rows = rows if weighed else np.vstack([rows, np.ones(rows.shape[1])])
     return Measured(rows, sizes(source), source.name)
 
@@ -86,7 +87,11 @@ def header(source: Rows, needed: tuple[str, ...]) -> tuple[str, ...]:
             near = any(word.startswith(("psi", "f_")) for word in columns)
             found = f", got {source.filled[0][1][:60]!r}" if near and source.filled else ""
             told = f"has no column {name}" if not count else f"has {count} columns {name}"
-            raise ValueError(f"{source.name}, line {line}: the header {told}: it must have {','.join(needed)}{found}")
+            raise Refusal(
+                f"the header {told}",
+                where=f"{source.name}, line {line}",
+                because=f"it must have {','.join(needed)}{found}",
+            )
     return columns
 
 
@@ -106,7 +111,7 @@ def sizes(source: Rows) -> dict[str, float]:
     for name, values in found.items():
         if len(values) > 1:
             told = " and ".join(f"{x:g}" for x in sorted(values))
-            raise ValueError(f"{source.name}: the header lines give {name} = {told}: keep one")
+            raise Refusal(f"the header lines give {name} = {told}", where=source.name, instead="keep one")
     out = {name: value for name, values in found.items() for value in values}
     packing = out.pop("packing", 1.0)
     return {name: x * packing if name == "density" and not bulk else x for name, x in out.items()}

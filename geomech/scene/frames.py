@@ -7,15 +7,17 @@ from geomech.systems.base import System
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics
 from geomech.tiers.fitted import FIELD, LARGEST_GRID, directions
+from rft.refusal import Refusal
 
 
 def framed(system: System, numerics: Numerics) -> Framed:
     """A system in its minimum-perturbation frame, on the grid of the numerics; the same one where these change nothing."""
     inner = system.inner if isinstance(system, Framed) else system
     if (count := numerics.grid**inner.joints) > LARGEST_GRID or (inner.joints > 3 and count > FIELD):
-        raise ValueError(
-            f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large: lower [numerics] grid, or "
-            "take a body of two shape variables, such as a chain with [body] modes or a serpenoid"
+        raise Refusal(
+            f"a frame on a grid of {numerics.grid}^{inner.joints} shapes is too large",
+            instead="lower [numerics] grid, or take a body of two shape variables, such as a chain with "
+            "[body] modes or a serpenoid",
         )
     axes = connection.grid(inner.joints, numerics.grid, numerics.extent)
     grid = tuple(tuple(a.tolist()) for a in axes)

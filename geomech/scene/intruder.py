@@ -8,7 +8,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import named
 from geomech.scene.columns import rows_of, series
 from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
@@ -17,6 +16,7 @@ from rft.checks import Number
 from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.plates import MOTIONS, SHAPES, Loads, Motion, Outline, PlateStress, Shape, loads
 from rft.plates.loads import ORDER
+from rft.refusal import located
 
 POINTS = FromFile(rows_of("points", ("x", "z")), "CSV with the header x,z (m), in place of points", ("points",))
 COURSE = FromFile(
@@ -70,7 +70,7 @@ class IntruderScene(Intruding):
     ladder = (12, 25, 50, 100, 200, 400, 3200)
 
     def __post_init__(self):
-        with named(self.name):
+        with located(self.name):
             self._check()
             _ = self.outline
 

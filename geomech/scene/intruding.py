@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from geomech.core.errors import named, short
 from geomech.core.summary import part
 from rft.checks import check_numbers
 from rft.ground import GROUND_EFFECTS, GroundEffect, checked_effects, weight
 from rft.premise import negated
+from rft.refusal import Refusal, located
 
 
 class Intruding:
@@ -31,11 +31,11 @@ class Intruding:
         """ValueError for fields of wrong types."""
         for what, (kind, such) in {**self.takes, "name": (str, "text"), "text": (str, "text")}.items():
             if not isinstance(getattr(self, what), kind):
-                raise ValueError(f"{what} must be {such}, got {short(getattr(self, what))}")
+                raise Refusal(f"{what} must be {such}", value=getattr(self, what))
         if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
-            raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
+            raise Refusal("files must be a tuple of names", value=self.files)
         check_numbers(self)
-        with named("[[effects]]"):
+        with located("[[effects]]"):
             object.__setattr__(self, "effects", checked_effects(self.effects))
 
     @property

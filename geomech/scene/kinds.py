@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from geomech import gaits, systems, tiers  # noqa: F401  which have registries
-from geomech.core.errors import SceneError, short
 from geomech.io.files import read_text
 from geomech.scene import sources
 from geomech.systems.functions import class_of
+from rft.refusal import Refusal, formatted, located
 from rft.registry import REGISTRIES, Registry, home, place
 
 LARGEST = 1_000_000  # bytes of a file of one's own
@@ -50,27 +50,29 @@ def registry_of(part: Any) -> Registry:
     for registry in REGISTRIES.values():
         if registry.admits(part):
             return registry
-    raise ValueError(
-        f"{short(part)} is no part of a scene: a law is a class with `traction`, a body one with `motion`, `joints` and "
-        "`length`, a system one with `velocity`, `joints`, `length` and `traits`, or a function velocity(alpha, alphadot) "
-        "with joints = ...; a gait is derived from geomech.gaits.Gait, an effect from rft.effects.Effect; a tier is a "
-        "geomech.tiers.Tier"
+    raise Refusal(
+        f"{formatted(part)} is no part of a scene",
+        because="a law is a class with `traction`, a body one with `motion`, `joints` and `length`, "
+        "a system one with `velocity`, `joints`, `length` and `traits`, or a function velocity(alpha, "
+        "alphadot) with joints = ...; a gait is derived from geomech.gaits.Gait, an effect "
+        "from rft.effects.Effect",
+        instead="a tier is a geomech.tiers.Tier",
     )
 
 
 def load_file(path: str | Path) -> list[str]:
-    """Run a Python file and register the classes in it that have a ``law`` or ``kind`` of their own; their names. SceneError,
+    """Run a Python file and register the classes in it that have a ``law`` or ``kind`` of their own; their names. Refusal,
     one line, if it cannot be run, has none, or one cannot be registered; then none is."""
     if not isinstance(path, (str, Path)):
-        raise SceneError(f"a file of one's own is named by text, got {short(path)}")
+        raise Refusal("a file of one's own is named by text", value=path)
     path = Path(path)
     place = f"--plugin {path}"
     if path.suffix != ".py":
-        raise SceneError(f"{place}: give a Python file, with a name that ends in .py")
+        raise Refusal("give a Python file, with a name that ends in .py", where=place)
     try:
         text = read_text(path, LARGEST)
     except (OSError, ValueError) as error:
-        raise SceneError(f"{place}: {getattr(error, 'strerror', None) or 'it is not text'}") from None
+        raise Refusal(getattr(error, "strerror", None) or "it is not text", where=place) from None
     return _load(path, str(path.resolve()), text)
 
 
@@ -94,11 +96,11 @@ def _load(path: Path, whole: str, text: str) -> list[str]:
         _run(place, path, text, module)
         for part in vars(module).values():
             if isinstance(part, type) and part.__module__ == name and {"law", "kind"} & {*vars(part)}:
-                with _said(place):
+                with located(place):
                     register(part)
         own = [n for (_, n), part in _named().items() if home(part) == name and before.get((_, n)) is not part]
         if not own:
-            raise SceneError(f'{place}: no class in it has a law = "..." (a force law) or kind = "..." (all else)')
+            raise Refusal('no class in it has a law = "..." (a force law) or kind = "..." (all else)', where=place)
     _texts[name], _files[whole] = text.encode(), text
     return sorted(own)
 
@@ -129,21 +131,13 @@ def _run(place: str, path: Path, text: str, module: types.ModuleType) -> None:
     except (Exception, SystemExit) as error:
         lines = [f.lineno for f in _frames(error) if f.filename == str(path)]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-        raise SceneError(f"{place}, line {line}: {type(error).__name__}: {error}") from error
+        raise Refusal(type(error).__name__, where=f"{place}, line {line}", because=str(error)) from error
 
 
 def _frames(error: BaseException):
     import traceback
 
     return traceback.extract_tb(error.__traceback__)
-
-
-@contextlib.contextmanager
-def _said(place: str) -> Iterator[None]:
-    try:
-        yield
-    except ValueError as error:
-        raise SceneError(f"{place}: {error}") from None
 
 
 def code() -> dict[str, str]:

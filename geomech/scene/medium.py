@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.io.files import read_text
 from geomech.io.rows import Rows
 from geomech.io.rows import read as read_rows
@@ -18,6 +17,7 @@ from geomech.scene.key import Word
 from geomech.scene.reader import Source, read_section
 from geomech.scene.sections import FromFile, OneOf
 from geomech.systems.swimmer import MEDIA, PARTS
+from rft.refusal import Refusal, located
 
 LARGEST = 1_000_000  # bytes of a medium's file
 FORCES = (("f_t", "f_n"), ("F_parallel_N", "F_perpendicular_N"))  # columns of a table, under either names
@@ -57,32 +57,34 @@ def _medium(place: str, path: Path) -> dict:
     try:
         tables = tomllib.loads(read_text(path, LARGEST))
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{place} {path.name} is not TOML: {error}{_table_instead(path)}") from None
+        raise Refusal(
+            f"{path.name} is not TOML", where=place, because=str(error), instead=_table_instead(path)
+        ) from None
     except RecursionError:
-        raise SceneError(f"{place} {path.name} is not TOML: it is nested too deep") from None
+        raise Refusal(f"{path.name} is not TOML", where=place, because="it is nested too deep") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
-        raise SceneError(f"{place} cannot read {path.name!r}: {reason}; geomech calibrate writes such files") from None
+        raise Refusal(
+            f"cannot read {path.name!r}", where=place, because=reason, instead="geomech calibrate writes such files"
+        ) from None
     table = tables.get("medium", tables)
     if not isinstance(table, dict) or (table is not tables and len(tables) > 1):
-        raise SceneError(f"{place} {path.name} must hold one table [medium] and nothing else")
+        raise Refusal(f"{path.name} must hold one table [medium] and nothing else", where=place)
     if not {"law", "name"} & {*table}:
-        raise SceneError(f"{place} {path.name} names no medium: it must have 'law' or 'name'")
+        raise Refusal(f"{path.name} names no medium", where=place, because="it must have 'law' or 'name'")
     return table
 
 
 def _table_instead(path: Path) -> str:
-    return '; for a table of drag add law = "table"' if path.suffix.lower() == ".csv" else ""
+    return 'for a table of drag add law = "table"' if path.suffix.lower() == ".csv" else ""
 
 
 def _rows(place: str, file: str) -> dict[str, list]:
     """Return psi (rad), f_t and f_n of a CSV file."""
-    try:
+    with located(place):
         source = read_rows(file, LARGEST_FILE, "give a CSV file with columns psi_deg,f_t,f_n")
         angle, forces = _columns(source)
         psi, *f = source.numbers(header(source, (angle, *forces)), (angle, *(x.lower() for x in forces))).T
-    except ValueError as error:
-        raise SceneError(f"{place} {error}") from None
     psi = np.radians(psi) if angle == "psi_deg" else psi
     return {"psi": psi.tolist(), "f_t": f[0].tolist(), "f_n": f[1].tolist()}
 

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from geomech.core.errors import choose, named, plain, short
+from geomech.core.errors import choose
 from geomech.gaits import KINDS as GAITS
 from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
@@ -22,6 +22,7 @@ from geomech.systems.base import Cycle, System, as_system, given, kind_of, note_
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
+from rft.refusal import Refusal, formatted, located, printable
 
 FRAME = (
     "of all velocities and displacements, in place of the body's own key; 'minimum-perturbation', here or there: the one in "
@@ -39,7 +40,7 @@ class Told:
     """How a scene shows itself: its name and its parts, in a line of readable length."""
 
     def __repr__(self) -> str:
-        return f"Scene({plain(self.name)}: {short(self.system, 160)}, {short(self.gait, 100)}, {self.numerics!r})"
+        return f"Scene({printable(self.name)}: {formatted(self.system, 160)}, {formatted(self.gait, 100)}, {self.numerics!r})"
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,10 +58,10 @@ class Scene(Told):
     once: ClassVar = {"physical": Keys(Physical), "frame": text_key("frame", FRAME)._replace(default="mean")}
 
     def __post_init__(self):
-        with named(self.name):
+        with located(self.name):
             for what, kind in (("name", str), ("text", str), ("files", tuple), ("numerics", Numerics)):
                 if not isinstance(getattr(self, what), kind):
-                    raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
+                    raise Refusal(f"{what} must be {kind.__name__}", value=getattr(self, what))
             gait = checked_gait(self.gait)
             object.__setattr__(self, "system", as_system(self.system, gait.joints))
             _check_joints(self.system, gait)
@@ -80,7 +81,7 @@ class Scene(Told):
         """This scene with some of its [numerics] changed, the system's own among them; None keeps a value."""
         own = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
-        with named(self.name):
+        with located(self.name):
             system = with_solver(self.system, {k: v for k, v in changes.items() if k in own})
             rest = {k: v for k, v in changes.items() if k not in own}
             for name in rest:
@@ -90,7 +91,7 @@ class Scene(Told):
     def changed(self, **changes) -> Scene:
         """This scene with some of its parts changed, or of its system's."""
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
-        with named(self.name):
+        with located(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
             system = given(own.get("system", self.system))
             for name in of_system:
@@ -118,13 +119,13 @@ def _check_joints(system: System, gait: Gait) -> None:
         if not hasattr(system, "body"):
             whose, cure = f"the {kind_of(system)}", "give it another gait"
         told = f"[gait] {type(gait).__name__.lower()} moves {gait.joints} joints but {whose} has {system.joints}"
-        raise ValueError(f"{told}: {cure}")
+        raise Refusal(told, instead=cure)
 
 
 def checked_scene(scene) -> Scene:
     """scene, or ValueError if it is none."""
     if not isinstance(scene, Scene):
-        raise ValueError(f"scene must be a Scene, such as geomech.scene.load gives, got {short(scene)}")
+        raise Refusal("scene must be a Scene, such as geomech.scene.load gives", value=scene)
     return scene
 
 
@@ -135,6 +136,6 @@ def frequency_of(system: System, gait: Gait) -> float | None:
     if own is None or others is None:
         return others if own is None else own
     if np.any(np.asarray(others) != own):
-        told = f"[gait] frequency = {own:g}, but the effects of the {kind_of(system)} have {short(others)}"
-        raise ValueError(f"{told}: it is one swimmer, keep one")
+        told = f"[gait] frequency = {own:g}, but the effects of the {kind_of(system)} have {formatted(others)}"
+        raise Refusal(told, because="it is one swimmer, keep one")
     return own

@@ -9,6 +9,7 @@ import numpy as np
 
 from geomech.io.rows import Rows
 from geomech.scene.drag import LENGTHS, LONGEST_COMMENT, MOST_COMMENTS, NUMBER, SAID
+from rft.refusal import Refusal
 
 UNITS = {  # in small letters; without one it is the SI unit
     "depth": {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3},
@@ -46,18 +47,20 @@ def read(source: Rows) -> Penetration:
     for word in words:
         named = quantity(word)
         if named and named[0] in found:
-            raise ValueError(f"{source.name}, line {line}: the header has two columns of {named[0]}: keep one")
+            raise Refusal(
+                f"the header has two columns of {named[0]}", where=f"{source.name}, line {line}", instead="keep one"
+            )
         if named:
             found[named[0]] = (word, named[1])
     for name in ("depth", "force"):
         if name not in found:
             told = "it must have depth_m,force_N (or depth_mm, depth_cm; z_m, force_z)"
-            raise ValueError(f"{source.name}, line {line}: the header has no column {name}: {told}")
+            raise Refusal(f"the header has no column {name}", where=f"{source.name}, line {line}", instead=told)
     rows = source.numbers(words, tuple(word for word, _ in found.values())).T
     values = {name: scale * row for (name, (_, scale)), row in zip(found.items(), rows)}
     written = _area(source)
     if written is not None and "area" in values:
-        raise ValueError(f"{source.name}: the area is given in a column and in a header line: keep one")
+        raise Refusal("the area is given in a column and in a header line", where=source.name, instead="keep one")
     area = values.get("area", None if written is None else np.array([written]))
     return Penetration(values["depth"], values["force"], area, source.name)
 
@@ -89,7 +92,7 @@ def _area(source: Rows) -> float | None:
         found |= {_rounded(float(a) * LENGTHS[ua or ub] * float(b) * LENGTHS[ub]) for a, ua, b, ub in sides}
     if len(found) > 1:
         told = " and ".join(f"{x:g}" for x in sorted(found))
-        raise ValueError(f"{source.name}: the header lines give areas {told} m^2: keep one")
+        raise Refusal(f"the header lines give areas {told} m^2", where=source.name, instead="keep one")
     return found.pop() if found else None
 
 

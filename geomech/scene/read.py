@@ -9,13 +9,14 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geomech.core.errors import SceneError, choose, short
+from geomech.core.errors import choose
 from geomech.io.files import note, read_text
 from geomech.scene import reader, slips, swimming
 from geomech.scene.medium import MEDIUM
 from geomech.scene.model import Scene, checked_scene
 from geomech.systems.base import kind_of
 from geomech.systems.swimmer import Swimmer
+from rft.refusal import Refusal, formatted
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -58,9 +59,9 @@ def builtin_text(name: str) -> str | None:
 
 def load(scene: str | Path) -> Scene | Any:
     """The scene of a built-in name or a TOML file, an intruder scene if it has an [intruder], a `WalkerScene` if a [robot]
-    (Any, so that no type checker asks which); SceneError, one line, if it is not one."""
+    (Any, so that no type checker asks which); Refusal, one line, if it is not one."""
     if not isinstance(scene, (str, Path)):
-        raise SceneError(f"scene must be a name or a TOML file, got {short(scene)}")
+        raise Refusal("scene must be a name or a TOML file", value=scene)
     if (text := builtin_text(str(scene))) is not None:
         return parse(text, str(scene))
     path, names = Path(scene), builtin_names()
@@ -69,12 +70,14 @@ def load(scene: str | Path) -> Scene | Any:
             choose("scene", str(scene), names + intruder_names() + walker_names())
         text = read_text(path, LARGEST, pipes=True)
         scene = PIPE if path.is_fifo() else scene  # files that it names are looked for from here
-    except SceneError:
+    except Refusal:
         raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is not text"
-        raise SceneError(
-            f"cannot read scene {str(scene)!r}: {reason}; give a TOML file or one of {', '.join(names)}"
+        raise Refusal(
+            f"cannot read scene {str(scene)!r}",
+            because=reason,
+            instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
     made = parse(text, str(scene))
     for line in getattr(getattr(made, "system", None), "assumed", ()):
@@ -84,9 +87,9 @@ def load(scene: str | Path) -> Scene | Any:
 
 def in_medium(scene: Scene, file: str | Path) -> Scene:
     """The scene in another medium, from a file as ``[medium] file`` takes it, or a table of drag if its name ends in .csv;
-    relative to the current folder. SceneError if that holds none, or the scene's system takes none."""
+    relative to the current folder. Refusal if that holds none, or the scene's system takes none."""
     if not isinstance(scene.system, Swimmer):
-        raise SceneError(f"{scene.name}: a {kind_of(scene.system)} takes no medium")
+        raise Refusal(f"a {kind_of(scene.system)} takes no medium", where=scene.name)
     table = {"file": str(Path(file).absolute())}
     if Path(file).suffix.lower() == ".csv":
         table["law"] = "table"
@@ -103,13 +106,13 @@ def inputs(scene: Scene | Intruding | WalkerScene) -> list[Path]:
 
 
 def parse(text: str, name: str = "scene") -> Scene | Any:
-    """The scene of a TOML text; SceneError if it is not one."""
+    """The scene of a TOML text; Refusal if it is not one."""
     if not isinstance(text, str):
-        raise SceneError(f"{short(name)}: a scene is a TOML text, got {short(text)}")
+        raise Refusal("a scene is a TOML text", value=text, where=formatted(name))
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # a ValueError may be an integer of too many digits
-        raise SceneError(f"{name} is not TOML: {error}{slips.at_line(text, error)}") from None
+        raise Refusal(f"{name} is not TOML", because=f"{error}{slips.at_line(text, error)}") from None
     return from_tables(tables, name, text)
 
 
@@ -126,9 +129,9 @@ def _intruding(tables: Mapping, name: str) -> type[Intruding]:
 
 
 def from_tables(tables: dict, name: str = "scene", text: str = "") -> Scene | Any:
-    """The scene of the tables of a TOML text; SceneError if they make none."""
+    """The scene of the tables of a TOML text; Refusal if they make none."""
     if not isinstance(tables, Mapping):
-        raise SceneError(f"{short(name)}: a scene is a dict of tables, got {short(tables)}")
+        raise Refusal("a scene is a dict of tables", value=tables, where=formatted(name))
     if "robot" in tables:
         from geomech.scene.walker import WalkerScene, spelled_out
 

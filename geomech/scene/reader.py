@@ -13,11 +13,12 @@ from typing import Any, TypeVar
 import msgspec
 
 from geomech.core.entry_points import choose_part
-from geomech.core.errors import SceneError, UnitWarning, choose, named, short
+from geomech.core.errors import UnitWarning, choose
 from geomech.scene import slips
 from geomech.scene.key import Key, spellings, words_of
 from geomech.scene.sections import Each, Keys, OneOf, Section, Variant, file_sections, sections_of, variant_of
 from geomech.scene.sizes import Sizes
+from rft.refusal import Refusal, located
 from rft.registry import Registry
 
 FILES = ("file", "mjcf")  # keys that name a file, looked for from the folder of the scene's
@@ -50,15 +51,15 @@ class Source:
 
 
 def read(scene: type[Built], tables: Mapping, name: str, text: str) -> Built:
-    """Return the scene of the tables of a TOML text; SceneError, which names the place, if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal, which names the place, if they make none."""
     source = Source(name, scene.example)
     check(scene, tables, source)
-    with named(name):
+    with located(name):
         return scene(**read_sections(scene, tables, source), name=name, text=text, files=tuple(source.files))
 
 
 def check(scene: type, tables: Mapping, source: Source) -> None:
-    """Raise SceneError unless the tables are those that a scene declares, and none is missing."""
+    """Raise Refusal unless the tables are those that a scene declares, and none is missing."""
     declared = file_sections(scene)
     for table in tables:
         choose(f"{source.name}: table", table, declared)
@@ -66,16 +67,18 @@ def check(scene: type, tables: Mapping, source: Source) -> None:
         if name in tables:
             _check_form(source, name, tables[name], section)
         elif required and instead not in tables:
-            raise SceneError(f"{source.name}: the table [{name}] is missing: add it, {source.cure}")
+            raise Refusal(f"the table [{name}] is missing", where=source.name, instead=f"add it, {source.cure}")
 
 
 def _check_form(source: Source, path: str, table: Any, section: Section | Key) -> None:
-    """Raise SceneError unless a table is one, or a list of tables where a section is one for each part."""
+    """Raise Refusal unless a table is one, or a list of tables where a section is one for each part."""
     if isinstance(section, Each):
         if not (isinstance(table, list) and all(isinstance(each, Mapping) for each in table)):
-            raise SceneError(f"{source.name}: {path} must be tables [[{path}]], one for each")
+            raise Refusal(f"{path} must be tables [[{path}]], one for each", where=source.name)
     elif not isinstance(section, Key) and not isinstance(table, Mapping):
-        raise SceneError(f"{source.name}: {path} must be a table [{path}], got {type(table).__name__}: {source.cure}")
+        raise Refusal(
+            f"{path} must be a table [{path}], got {type(table).__name__}", where=source.name, instead=source.cure
+        )
 
 
 def read_sections(scene: type, tables: Mapping, source: Source) -> dict[str, Any]:
@@ -109,7 +112,7 @@ def _read_one(source: Source, path: str, table: Mapping, section: Section) -> An
             _check_form(source, within, table[field], part)
             inner[field] = read_section(source, within, table.pop(field), part)
         elif not isinstance(part, Each):
-            raise SceneError(f"{place}: the table [{within}] is missing: add it, {source.cure}")
+            raise Refusal(f"the table [{within}] is missing", where=place, instead=f"add it, {source.cure}")
     if variant.file:
         table = _from_file(place, table, variant)
     return build(source, place, table, variant.kind, inner, label)
@@ -135,20 +138,26 @@ def _chosen(place: str, table: dict, section: Keys | OneOf) -> tuple[Variant, di
         if key in table:
             return Variant({}, kind), table
     instead = "".join(f", or {key}" for key in others)
-    raise SceneError(f"{place} has no {section.key!r}: add {section.key} = one of {', '.join(section.kinds)}{instead}")
+    raise Refusal(
+        f"has no {section.key!r}",
+        where=place,
+        instead=f"add {section.key} = one of {', '.join(section.kinds)}{instead}",
+    )
 
 
 def _from_file(place: str, table: dict, variant: Variant) -> dict:
     """Return the keys of a section with what its file has in place of the file."""
     if not variant.file.keys and {*table} != {"file"}:
-        raise SceneError(f"{place}: {variant.label} takes 'file' and nothing else: a {variant.file.meaning}")
+        raise Refusal(
+            f"{variant.label} takes 'file' and nothing else", where=place, because=f"a {variant.file.meaning}"
+        )
     if "file" not in table:
         return table
     if variant.file.keys:
         variant.alternatives.check(place, [spellings(variant.kind).get(key, (key,))[0] for key in table])
     file = table.pop("file")
     if not isinstance(file, str):
-        raise SceneError(f"{place} file must be the name of a file, got {short(file)}")
+        raise Refusal("file must be the name of a file", value=file, where=place)
     return table | variant.file.read(place, file)
 
 
@@ -160,7 +169,7 @@ def build(
     inner: Mapping[str, Any] | None = None,
     label: str = "",
 ) -> Built:
-    """Return a part of a class, or what a form of its keys makes, from a table of keys; else SceneError.
+    """Return a part of a class, or what a form of its keys makes, from a table of keys; else Refusal.
 
     inner: fields that are read already. label: how the table names the class."""
     _check_keys(place, table, kind, label)
@@ -169,7 +178,7 @@ def build(
         field, in_degrees = spellings(kind)[key]
         if field in values:
             both = [other for other in table if spellings(kind)[other][0] == field]
-            raise SceneError(f"{place}: {field} is given twice: keep one of {' and '.join(both)}")
+            raise Refusal(f"{field} is given twice", where=place, instead=f"keep one of {' and '.join(both)}")
         values[field] = _radians(value) if in_degrees else value
         if key == "gamma0_deg":
             _check_degrees(f"{place} {key}", value)
@@ -183,21 +192,25 @@ def build(
     try:
         part = msgspec.convert({**values, **(inner or {})}, kind)
         return part.to_part(source, place, {*values}) if hasattr(kind, "to_part") else part
-    except SceneError:
-        raise
+    except Refusal as refusal:
+        raise refusal.within(place) from None
     except (ValueError, OverflowError) as error:
+        if isinstance(refusal := error.__cause__, Refusal):  # of a class that checks its own values
+            refusal.instead = refusal.instead or slips.cure_of_value(refusal.what, table, kind)
+            raise refusal.within(place) from None
         reason = str(error).replace(" - at `$", " - at `").replace(" - at ``", "")
         told = reason.replace("Object missing required field", "has no")  # msgspec's words
-        raise SceneError(f"{place} {told}{slips.cure_of_value(reason, table, kind)}") from None
+        raise Refusal(told, where=place, instead=slips.cure_of_value(reason, table, kind)) from None
 
 
 def _check_keys(place: str, table: Mapping, kind: type, label: str) -> None:
-    """Raise SceneError for a key that a class has not. label: how the table names the class."""
+    """Raise Refusal for a key that a class has not. label: how the table names the class."""
     try:
         for key in table:
             choose(f"{place} key", key, spellings(kind))
-    except SceneError as error:
-        raise SceneError(f"{error} ({label})" if label else str(error)) from None
+    except Refusal as refusal:
+        refusal.instead += f" ({label})" if label else ""
+        raise
 
 
 def _check_degrees(place: str, value) -> None:

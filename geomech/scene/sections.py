@@ -23,8 +23,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, get_args, get_type_hints
 
-from geomech.core.errors import SceneError
 from geomech.scene.key import Key, keys_of, text_key
+from rft.refusal import Refusal
 
 
 class FromFile(NamedTuple):
@@ -93,13 +93,13 @@ class Alternatives:
         return set().union(*(needed | allowed for needed, allowed in self.groups))
 
     def check(self, place: str, given: Collection[str]) -> None:
-        """Raise SceneError unless the keys given make one of the groups."""
+        """Raise Refusal unless the keys given make one of the groups."""
         own = self.keys & {*given}
         if any(needed <= own <= needed | allowed for needed, allowed in self.groups):
             return
         lacking = [sorted(needed - own) for needed, allowed in self.groups if own <= needed | allowed]
         reason = f" has no {', '.join(lacking[0])}" if len(lacking) == 1 else ""
-        raise SceneError(f"{place}{reason}: {self.cure}")
+        raise Refusal(f"{place}{reason}", instead=self.cure)
 
 
 class Within(NamedTuple):

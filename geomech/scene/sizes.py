@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from geomech.core.errors import SceneError, choose
+from geomech.core.errors import choose
+from rft.refusal import Refusal
 
 NOT_OF_THE_BODY = {"radius": ("disturbed-ground",)}  # that one is of the track it leaves
 
@@ -42,10 +43,12 @@ class Sizes:
     def _check(self, place: str, key: str, value) -> None:
         given = self.given.get(key, value)
         if given is not value and given != value:  # a nan is left to the bounds of its own section
-            raise SceneError(f"{place} {key} = {value!r}, but {self.places[key]} = {self.given[key]!r}: keep one")
+            raise Refusal(
+                f"{key} = {value!r}, but {self.places[key]} = {self.given[key]!r}", where=place, instead="keep one"
+            )
 
     def fill(self, place: str, table: dict, kind: type) -> dict:
-        """The table with the sizes that its class has; SceneError if it says otherwise itself."""
+        """The table with the sizes that its class has; Refusal if it says otherwise itself."""
         names = [f.name for f in dataclasses.fields(kind)]
         for key, value in self.given.items():
             if key not in names or getattr(kind, "kind", "") in NOT_OF_THE_BODY.get(key, ()):
@@ -59,4 +62,9 @@ class Sizes:
         if self.unused:
             key = sorted(self.unused)[0]
             place = "" if key == "frame" else "[physical] "
-            raise SceneError(f"{self.name}: {place}{key}: nothing in this scene has one: drop it, or add what has")
+            raise Refusal(
+                f"{place}{key}",
+                where=self.name,
+                because="nothing in this scene has one",
+                instead="drop it, or add what has",
+            )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from geomech.core.errors import is_number, short
 from geomech.scene.key import angles_of, meanings
+from rft.checks import is_number
+from rft.refusal import formatted
 
 WANTED = {
     "float": "a number", "int": "a whole number without a point", "str": 'text in "quotes"', "bool": "true or false",
@@ -33,7 +34,7 @@ def at_line(text: str, error: Exception) -> str:
         return ""
     line = lines[int(found[1]) - 1].partition("#")[0]
     cure = next((f", {cure}" for rule, cure in RULES if re.search(rule, line)), "")
-    return f": {short(line.strip())}{cure}"
+    return f": {formatted(line.strip())}{cure}"
 
 
 def cure_of_value(told: str, table: Mapping, kind: type) -> str:
@@ -41,13 +42,13 @@ def cure_of_value(told: str, table: Mapping, kind: type) -> str:
     keys."""
     if missing := re.search(r"missing required field `(\w+)`", told):
         unit, _ = meanings(kind).get(missing[1], ("-", ""))
-        return f": add {missing[1]} = ..." + f", in {unit}" * (unit not in ("-", ""))
+        return f"add {missing[1]} = ..." + f", in {unit}" * (unit not in ("-", ""))
     if found := re.search(r"Expected `(\w+)(?: \| null)?`.* at `\.(\w+)((?:\[\d+\])*)", told):
         wanted, key, places = found.groups()
         value = table.get(key, table.get(f"{key}_deg"))
         for place in re.findall(r"\d+", places):
             value = value[int(place)] if isinstance(value, list) and int(place) < len(value) else value
-        return f": give {WANTED.get(wanted, wanted)} in place of {short(value)}"
+        return f"give {WANTED.get(wanted, wanted)} in place of {formatted(value)}"
     key = told.partition(" must ")[0]
     given = is_number(table.get(key)) and abs(table[key]) < float("inf")
-    return f"; {key} is in rad, write {key}_deg for degrees" if given and key in angles_of(kind) else ""
+    return f"{key} is in rad, write {key}_deg for degrees" if given and key in angles_of(kind) else ""

@@ -9,7 +9,6 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import named
 from geomech.scene.columns import series
 from geomech.scene.intruding import Intruding
 from geomech.scene.sections import Each, FromFile, Keys, OneOf, Within
@@ -30,6 +29,7 @@ from rft.meshes import (
     below,
     wrench,
 )
+from rft.refusal import located
 
 KINDS = {
     **{k: v for k, v in SOLIDS.items() if k != "c-leg"},
@@ -94,7 +94,7 @@ class MeshScene(Intruding):
     }
 
     def __post_init__(self):
-        with named(self.name):
+        with located(self.name):
             self._check()
             _ = self.mesh
 

@@ -12,7 +12,7 @@ from typing import Annotated, get_args, get_type_hints
 
 import numpy as np
 
-from geomech.core.errors import SceneError, choose, named
+from geomech.core.errors import choose
 from geomech.io.files import read_text
 from geomech.scene.columns import columns
 from geomech.scene.key import Word
@@ -22,6 +22,7 @@ from rft.checks import Number
 from rft.meshes import Spatial
 from rft.plates import VERTICAL, PlateDrags, PlateStress, StressMap
 from rft.plates.stress import COEFFICIENTS
+from rft.refusal import Refusal, located
 
 LARGEST = 10_000_000  # bytes of a TOML file
 RADIANS = 3.2  # a table of angles within this is likely not in degrees
@@ -140,10 +141,10 @@ def plate_rows(place: str, file) -> np.ndarray:
     drags = columns(place, file, (("beta", "beta_deg"), ("gamma", "gamma_deg"), "alpha_x", "alpha_z"))
     rows = np.stack(list(drags.values()))
     if rows.size and np.abs(rows[:2]).max() < RADIANS:
-        raise SceneError(f"{place}: {Path(file).name}: beta and gamma look like radians: give degrees")
+        raise Refusal("beta and gamma look like radians", where=(place, Path(file).name), instead="give degrees")
     if rows.size and (largest := np.abs(rows[:2]).max()) > 360:
-        raise SceneError(
-            f"{place}: {Path(file).name}: beta and gamma must be from -360 to 360 degrees, got {largest:g}"
+        raise Refusal(
+            f"beta and gamma must be from -360 to 360 degrees, got {largest:g}", where=(place, Path(file).name)
         )
     return rows
 
@@ -151,7 +152,7 @@ def plate_rows(place: str, file) -> np.ndarray:
 def plate_drags(place: str, file) -> PlateDrags:
     """Return the stress map through the plate drags of a CSV file (`plate_rows`)."""
     beta, gamma, a_x, a_z = plate_rows(place, file)
-    with named(f"{place}: {Path(file).name}"):
+    with located(f"{place}: {Path(file).name}"):
         return PlateDrags(*map(tuple, (np.radians(beta), np.radians(gamma), a_x, a_z)))
 
 
@@ -175,14 +176,16 @@ def _of_file(source: Source, place: str, file: str) -> PlateStress:
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "it is not TOML"
         cure = f"give a TOML or CSV file or one of {', '.join(VERTICAL)}"
-        raise SceneError(f"{place}: cannot read {file!r}: {reason}; {cure}") from None
+        raise Refusal(f"cannot read {file!r}", where=place, because=reason, instead=cure) from None
     table = tables.get("medium", tables)
     if not isinstance(table, Mapping):
-        raise SceneError(f"{place}: {path.name}: medium must be a table [medium], got {type(table).__name__}")
+        raise Refusal(f"medium must be a table [medium], got {type(table).__name__}", where=(place, path.name))
     if isinstance(table.get("file"), str):
         table = {**table, "file": str(path.absolute().parent / table["file"])}
         if not table["file"].endswith(".csv"):
-            raise SceneError(
-                f"{place}: {path.name} names another file, {Path(table['file']).name}: copy the coefficients"
+            raise Refusal(
+                f"{path.name} names another file, {Path(table['file']).name}",
+                where=place,
+                instead="copy the coefficients",
             )
     return build(source, f"{place}: {path.name}:", table, StressKeys)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from geomech.core.errors import SceneError, choose, named
+from geomech.core.errors import choose
 from geomech.scene import reader
 from geomech.scene.frames import framed
 from geomech.scene.key import spellings
@@ -18,6 +18,7 @@ from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import NAME as FITTED
 from geomech.systems.swimmer import Swimmer
 from geomech.tiers.base import Numerics
+from rft.refusal import Refusal, located
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,12 +27,12 @@ class NoSolver:
 
 
 def from_tables(tables: Mapping, name: str, text: str) -> Scene:
-    """Return the scene of the tables of a TOML text; SceneError if they make none."""
+    """Return the scene of the tables of a TOML text; Refusal if they make none."""
     source = reader.Source(name, Scene.example)
     reader.check(Scene, tables, source)
     tables, fitted = _without_fitted(tables, name)
     source.sizes = Sizes(name, tables)
-    with named(name):
+    with located(name):
         section = sections_of(Scene)["gait"].section
         gait = reader.read_section(dataclasses.replace(source, files=[]), "gait", tables["gait"], section)
         system = reader.read_sections(Scene, {"system": _system(tables, name)}, source)["system"]
@@ -47,7 +48,7 @@ def _system(tables: Mapping, name: str) -> dict:
     table = tables.get("system", {"kind": SHORT})
     short, kind = {part: tables[part] for part in SWIMMER if part in tables}, table.get("kind")
     if short and isinstance(kind, str) and kind in {*SYSTEMS} - {SHORT}:
-        raise SceneError(f"{name}: a {kind} takes no {sorted(short)[0]!r}: drop it, or the table [system]")
+        raise Refusal(f"a {kind} takes no {sorted(short)[0]!r}", where=name, instead="drop it, or the table [system]")
     return short | dict(table)
 
 
@@ -86,5 +87,7 @@ def _without_fitted(tables: Mapping, name: str) -> tuple[dict, bool]:
     if "body" in tables.get("system", {}):
         tables["system"] = {**tables["system"], "body": plain("system.body", tables["system"]["body"])}
     if places and own not in (None, FITTED):
-        raise SceneError(f"{name}: [{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}: keep one")
+        raise Refusal(
+            f"[{places[0]}] frame = {FITTED!r}, but the scene's frame = {own!r}", where=name, instead="keep one"
+        )
     return tables, bool(places)

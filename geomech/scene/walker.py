@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
-from geomech.core.errors import SceneError, named, short
 from geomech.core.summary import part
 from geomech.scene.intruder import OUTLINES
 from geomech.scene.intruding import of_effects
@@ -15,6 +14,7 @@ from geomech.scene.stress import SpatialKeys, StressKeys
 from rft.ground import GROUND_EFFECTS, GroundEffect
 from rft.meshes import Screw, Spatial
 from rft.plates import PlateStress
+from rft.refusal import Refusal, formatted, located
 from rft.walking import ROBOTS, Fineness, Mjcf, Robot, Screws, Tripod, Walker
 
 KINDS = {kind: effect for kind, effect in GROUND_EFFECTS.items() if effect.walks}
@@ -46,12 +46,12 @@ class WalkerScene:
     example: ClassVar[str] = "xplorer"
 
     def __post_init__(self):
-        with named(self.name):
+        with located(self.name):
             for what, kind in (("numerics", Fineness), ("name", str), ("text", str)):
                 if not isinstance(getattr(self, what), kind):
-                    raise ValueError(f"{what} must be {kind.__name__}, got {short(getattr(self, what))}")
+                    raise Refusal(f"{what} must be {kind.__name__}", value=getattr(self, what))
             if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
-                raise ValueError(f"files must be a tuple of names, got {short(self.files)}")
+                raise Refusal("files must be a tuple of names", value=self.files)
             object.__setattr__(self, "effects", self.walker.effects)
             self.robot.check(self.numerics.elements)
 
@@ -78,7 +78,12 @@ def spelled_out(tables: Mapping, name: str) -> dict:
     tables = {key: dict(table) if isinstance(table, Mapping) else table for key, table in tables.items()}
     medium, robot = (tables.get(key) if isinstance(tables.get(key), dict) else {} for key in ("medium", "robot"))
     if "mjcf" in robot and robot.setdefault("kind", "mjcf") != "mjcf":
-        raise SceneError(f"{name}: [robot]: kind = {short(robot['kind'])} has sizes, mjcf a file: drop one")
+        raise Refusal(
+            "[robot]",
+            where=name,
+            because=f"kind = {formatted(robot['kind'])} has sizes, mjcf a file",
+            instead="drop one",
+        )
     if isinstance(robot.get("screw"), Mapping):
         robot["screw"] = {"kind": "screw", **robot["screw"]}
     if medium is not None:

@@ -10,7 +10,6 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geomech.core.errors import named
 from geomech.gaits import Gait
 from geomech.scene.key import angles_of
 from geomech.scene.medium import MEDIUM
@@ -21,6 +20,7 @@ from geomech.systems.base import given
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
+from rft.refusal import Refusal, located
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def toml(scene: Scene | Intruding | WalkerScene) -> str:
     """The text it was read from where that still holds by itself and in any folder, comments and all; else a new one, in
-    which a medium that came from a file stands, and other files with their folders. SceneError if it has a part that no
+    which a medium that came from a file stands, and other files with their folders. Refusal if it has a part that no
     scene file can name."""
     alone = not isinstance(_checked(scene), Scene) or not (scene.files or _beside(scene.text))
     if scene.text and alone and from_tables(tomllib.loads(scene.text), scene.name, scene.text) == scene:
@@ -98,8 +98,8 @@ def spelled_out(tables: dict, scene: Scene) -> dict:
 
 
 def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
-    """Return the tables that a scene's parts make; SceneError if a file cannot name one of them."""
-    with named(scene.name):
+    """Return the tables that a scene's parts make; Refusal if a file cannot name one of them."""
+    with located(scene.name):
         out = {}
         for name, (section, *_) in sections_of(type(scene)).items():
             part = getattr(scene, name, scene)  # the scene itself where its own fields are keys
@@ -108,7 +108,7 @@ def _anew(scene: Scene | Intruding | WalkerScene) -> dict:
         if isinstance(scene, Scene):
             out = _short(out, scene)
         if from_tables(out, scene.name) != scene:
-            raise ValueError("a part of this scene is of no kind that a scene file can name")
+            raise Refusal("a part of this scene is of no kind that a scene file can name")
         return out
 
 
@@ -124,11 +124,11 @@ def _section(part: Any, section: Section) -> dict:
             inner = {field: section_tables(getattr(part, field), one) for field, one in variant.inner.items()}
             return {**variant.named, **_fields(part, variant.kind), **inner}
         if is_one or isinstance(section, Keys):
-            raise ValueError(
-                f"a {type(part).__name__} has a CSV file of its own: write the scene that names it by hand"
+            raise Refusal(
+                f"a {type(part).__name__} has a CSV file of its own", instead="write the scene that names it by hand"
             )
     reason = f"a {name_in(section.kinds, part)} is of no kind that a scene file can name"
-    raise ValueError(f"{reason}: use one of {', '.join(section.kinds)}")
+    raise Refusal(reason, instead=f"use one of {', '.join(section.kinds)}")
 
 
 def _short(tables: dict, scene: Scene) -> dict:

@@ -35,7 +35,7 @@ class Adjustable(Protocol):
     runs: int
 
     def check(self) -> None:
-        """SceneError for what makes no sense."""
+        """Refusal for what makes no sense."""
 
     def cost(self) -> Cost:
         """Return what all settings take, each ``runs`` times."""

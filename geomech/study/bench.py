@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import SceneError, choose, named, real_array, short
+from geomech.core.errors import choose
 from geomech.core.face import Faced
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
@@ -36,6 +36,8 @@ from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
 from geomech.tiers.harmonic import HARMONIC
 from geomech.tiers.path import PATH
+from rft.checks import real_array
+from rft.refusal import Refusal, located
 
 LOOKED_AT = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
 
@@ -46,7 +48,7 @@ class Study(Faced):
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
-            raise ValueError(f"a study is that of a Scene, got {short(scene)}")
+            raise Refusal("a study is that of a Scene", value=scene)
         self.scene, self._tables = scene, {} if tables is None else tables
 
     def __repr__(self) -> str:
@@ -63,11 +65,11 @@ class Study(Faced):
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
     def in_frame(self, frame: str) -> Study:
-        """The bench of the scene in another body frame; SceneError for one of no such name, or the scene's own."""
+        """The bench of the scene in another body frame; Refusal for one of no such name, or the scene's own."""
         s = self.scene
-        with named(s.name):
+        with located(s.name):
             if frame == s.frame:
-                raise ValueError(f"the frame is {frame!r} already: name another")
+                raise Refusal(f"the frame is {frame!r} already", instead="name another")
             system = framed(s.system, s.numerics) if frame == MINIMUM_PERTURBATION else in_frame(s.system, frame)
             return Study(s.changed(system=system), self._tables)
 
@@ -104,8 +106,8 @@ class Study(Faced):
         return fitted.table(self.scene.system, self.scene.numerics)
 
     def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
-        """How a tier predicts displacements of a gait, or of the scene's own; SceneError if it says nothing of the system."""
-        with named(self.scene.name):
+        """How a tier predicts displacements of a gait, or of the scene's own; Refusal if it says nothing of the system."""
+        with located(self.scene.name):
             how = _tier(tier)
             how.refuse(self.scene.system)
             return self._plan(how, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
@@ -114,17 +116,17 @@ class Study(Faced):
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
 
     def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
-        """What a tier looks up, computed once: a Connection, Harmonics or a Family; None for nothing. SceneError if it says
+        """What a tier looks up, computed once: a Connection, Harmonics or a Family; None for nothing. Refusal if it says
         nothing of the system."""
         return self._looked_up(self.plan(tier, gait, amplitudes), progress)
 
     def _looked_up(self, plan: Plan, progress: Callable | None = None) -> Any:
-        with named(self.scene.name):
+        with located(self.scene.name):
             return self._built(plan.table, progress)[0] if plan.table else None
 
     def refuse_connection(self) -> None:
-        """SceneError if the system has no connection."""
-        with named(self.scene.name):
+        """Refusal if the system has no connection."""
+        with located(self.scene.name):
             fitted.refuse(self.scene.system)
 
     @property
@@ -142,13 +144,13 @@ class Study(Faced):
         return self._fitted()
 
     def _fitted(self, progress: Callable | None = None) -> Connection:
-        with named(self.scene.name):
+        with located(self.scene.name):
             fitted.refuse(self.scene.system)
             return self._built(self._connection(), progress)[0]
 
     def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
         """The odd harmonics of the velocity on the scene's grid, telling ``progress`` the fraction done."""
-        with named(self.scene.name):
+        with located(self.scene.name):
             return self._built(harmonic.table(self.scene.system, self.scene.numerics), progress)[0]
 
     @property
@@ -167,7 +169,7 @@ class Study(Faced):
         """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
         that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, at = self.scene, self.scene.gait.middle if at is None else at
-        with named(s.name):
+        with located(s.name):
             build = lambda: fitted.plane(s.system, s.numerics, tuple(pair), at, progress)
             return self._stored("plane", (*self._connection().key, *pair, *at), build)[0]
 
@@ -180,7 +182,7 @@ class Study(Faced):
         """`metric`, telling ``progress`` the fraction done. Where it takes the velocities of the harmonic table, that is
         made beside it, if it is not there yet."""
         s = self.scene
-        with named(s.name):
+        with located(s.name):
             key = fitted.key(s.numerics, effort.DEPENDS_ON)
             return self._stored("metric", key, lambda: self._new_metric(progress))[0]
 
@@ -196,12 +198,12 @@ class Study(Faced):
     @property
     def metric(self) -> Metric | Finsler:
         """What a change of shape costs, on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
-        alphadot, else a norm. SceneError if the system has none."""
+        alphadot, else a norm. Refusal if the system has none."""
         return self.compute_metric()
 
     def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:
         """Path length and work of a gait, or the scene's own, with their errors: `geomech.study.effort.effort`."""
-        with named(self.scene.name):
+        with located(self.scene.name):
             self.scene.note_turns(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
             return effort.effort(self.scene, gait, amplitudes)
 
@@ -227,7 +229,7 @@ class Study(Faced):
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
         """Net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
-        with named(scene.name):
+        with located(scene.name):
             plan = self.plan(method, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(plan, gait, amplitudes)
@@ -303,7 +305,7 @@ class Study(Faced):
         for method in sorted(tables, key=of_field, reverse=True):  # the field is the picture, too
             name = "field" if of_field(method) else f"{method} table"
             if name not in seconds:
-                with named(self.scene.name):
+                with located(self.scene.name):
                     _, seconds[name], there = self._built(tables[method], progress)
                 kept += [name] * there
         return seconds, kept
@@ -312,19 +314,19 @@ class Study(Faced):
         """What `study` would take, and ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.study.cost`."""
         gait, amplitudes, plans = self._asked(gait, amplitudes, methods, *LOOKED_AT)
-        with named(self.scene.name):
+        with located(self.scene.name):
             return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
     def _asked(self, gait, amplitudes, methods, looked_at: int = sys.maxsize, phases: int = sys.maxsize):
-        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; SceneError for what makes none, such as a
+        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; Refusal for what makes none, such as a
         gait that leaves the field at one of so many amplitudes and phases."""
         scene = self.scene
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
-            raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes)}")
+            raise Refusal("amplitudes must be a list of numbers", value=amplitudes, where=scene.name)
         if isinstance(methods, str) or not isinstance(methods, Sequence):
-            raise SceneError(f"{scene.name}: methods must be a list of {', '.join(TIERS)}, got {short(methods)}")
-        with named(scene.name):
+            raise Refusal(f"methods must be a list of {', '.join(TIERS)}", value=methods, where=scene.name)
+        with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
             some = np.sort(amplitudes)[np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), looked_at)).astype(int)]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError, choose, named
+from geomech.core.errors import choose
 from geomech.core.variables import Result, Variable
 from geomech.scene import drag
 from geomech.scene.write import table
@@ -20,6 +20,7 @@ from geomech.study.question import Allow, Progress, Question
 from geomech.study.stress_calibration import OfPenetration, OfPlates, law_of, of_penetration, of_plates
 from rft.calibrate import FITS, Fit, fit
 from rft.drag import Rod, rod_drag
+from rft.refusal import Refusal, located
 
 UNITS = {"k": "", "axial_stress": "Pa", "axial_force": "N", "gamma0": "degrees"}
 SIZES = {
@@ -148,15 +149,12 @@ def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
 
 
 def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfDrag:
-    """A law fitted to the file or sample ``source``. sizes: of `SIZES`, those that overrule the header lines. SceneError, one
+    """A law fitted to the file or sample ``source``. sizes: of `SIZES`, those that overrule the header lines. Refusal, one
     line that names the file, if the data are bad or do not settle the law."""
     if "area" in sizes:
-        raise SceneError(f"--area belongs to another measurement: leave it out for --law {law}")
-    try:
-        measured = drag.read(source)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
-    with named(measured.name):
+        raise Refusal("--area belongs to another measurement", instead=f"leave it out for --law {law}")
+    measured = drag.read(source)
+    with located(measured.name):
         rod = Rod(**{**measured.sizes, **sizes})
         data = rod_drag(*measured.rows)
         found = OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)

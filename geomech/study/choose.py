@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from geomech.core.errors import SceneError, is_number, real_array, short
 from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scene.model import Scene
@@ -18,6 +17,8 @@ from geomech.study.results import Displacements
 from geomech.systems.capabilities import pieces_of, settling, solver_of
 from geomech.tiers.base import solved
 from geomech.tiers.direct import DIRECT
+from rft.checks import is_number, real_array
+from rft.refusal import Refusal
 
 MOST_PHASES = 1 << 16
 FINEST_PIECES = 640  # that a tolerance asks for
@@ -31,18 +32,20 @@ def cheapest(
     most ``tol`` body lengths.
 
     Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
-    come (`geomech.study.cost`) before each is done. SceneError if no tier gets there.
+    come (`geomech.study.cost`) before each is done. Refusal if no tier gets there.
     """
     if not (is_number(tol) and 0 < tol <= 1e300):
-        raise SceneError(f"--tol must be a number > 0 in body lengths, got {short(tol)}")
+        raise Refusal("--tol must be a number > 0 in body lengths", value=tol)
     study, start = Study(scene), time.perf_counter()
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1 or not amplitudes.size:
-        raise SceneError(f"{scene.name}: amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
+        raise Refusal("amplitudes must be a list of numbers", value=amplitudes.tolist(), where=scene.name)
     scene.note_turns(gait, amplitudes)
     if tol <= settling(system):
-        raise SceneError(f"{scene.name}: cycles with these effects repeat to {settling(system):g} only: raise --tol")
+        raise Refusal(
+            f"cycles with these effects repeat to {settling(system):g} only", where=scene.name, instead="raise --tol"
+        )
     ask(cost.of_medium(scene, gait, len(amplitudes)))
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
@@ -77,9 +80,10 @@ def cheapest(
     if error[:, 0].max() > tol:
         found = " and ".join(f"{n} {name}" for name, n in settings.items())
         finer = "lower [numerics] regularisation and tolerance" if solver_of(system) else "take a finer table"
-        raise SceneError(
-            f"{scene.name}: no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found}): "
-            f"raise --tol, or {finer}"
+        raise Refusal(
+            f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found})",
+            where=scene.name,
+            instead=f"raise --tol, or {finer}",
         )
     return answer(DIRECT.name, poses, error, settings)
 

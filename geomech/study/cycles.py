@@ -34,7 +34,7 @@ class Cycles:
     """How far gaits go in a cycle."""
 
     def grid(self, scene: Scene, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid, of which amplitudes of one scene are one batch; SceneError if a corner makes no scene."""
+        """Return the grid, of which amplitudes of one scene are one batch; Refusal if a corner makes no scene."""
         found = written.tables(checked_scene(scene))
         if any(name.startswith("medium.") for name in over):
             found = written.spelled_out(found, scene)

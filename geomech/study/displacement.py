@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from geomech.core.errors import SceneError, choose
+from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
@@ -15,6 +15,7 @@ from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
 from geomech.study.effort import refuse_costless, with_effort
 from geomech.study.question import Allow, Progress, Question
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -92,5 +93,5 @@ def displacement(
     if tolerance is None:
         return Displacement(scene, tuple(amplitudes), chosen, effort)
     if chosen:
-        raise SceneError("--tol chooses the tier: drop --methods")
+        raise Refusal("--tol chooses the tier", instead="drop --methods")
     return Cheapest(scene, tuple(amplitudes), tolerance, effort)

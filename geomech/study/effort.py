@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import SceneError, number, real_array
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
 from geomech.geometry import connection, metric
@@ -32,7 +31,9 @@ from geomech.tiers import harmonic
 from geomech.tiers.base import Numerics, Table, in_groups
 from geomech.tiers.fitted import axes
 from geomech.tiers.harmonic import HARMONIC
+from rft.checks import in_range, real_array
 from rft.premise import ALL, SHAPE_ALONE
+from rft.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
 HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
@@ -76,7 +77,7 @@ def _even(system: System) -> bool:
 def table(system: System, numerics: Numerics, progress: Callable | None = None) -> Metric | Finsler:
     """The metric on the field's grid: quadratic where xi = A alphadot, else a norm. ValueError if it has none."""
     if reason := why_none(system):
-        raise ValueError(reason)
+        raise Refusal(reason)
     if own := stored(system, "metric"):
         return own
     grid, degree = axes(system, numerics), numerics.interpolation
@@ -104,7 +105,7 @@ def with_harmonics(
 ) -> tuple[Harmonics, Metric | Finsler]:
     """The harmonic table and the metric from the same force balances. ValueError if it has no metric."""
     if reason := why_none(system):
-        raise ValueError(reason)
+        raise Refusal(reason)
     seen = _Watched(system)
     found = harmonic.table(seen, numerics).build(progress)
     P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
@@ -148,11 +149,11 @@ def _norm(power, degree: float) -> np.ndarray:
 
 
 def refuse_costless(scene: Scene) -> None:
-    """SceneError for a scene of which nothing says what moving costs."""
+    """Refusal for a scene of which nothing says what moving costs."""
     system = scene.system
     if not any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
         what = "its file does not tell it" if stored(system, "connection") else "nothing says what moving costs"
-        raise SceneError(f"{scene.name}: no path length or work with the {kind_of(system)}: {what}")
+        raise Refusal(f"no path length or work with the {kind_of(system)}", where=scene.name, instead=what)
 
 
 def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
@@ -162,7 +163,7 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
     it. Path lengths are nan where power is of no one degree in the rate. ValueError where nothing says what moving costs."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
-    number("phases", phases or 8, 8, 1e6, whole=True)
+    in_range("phases", phases or 8, 8, 1e6, whole=True)
     phases = phases_of(scene, phases)
     finer = scene.with_numerics(pieces=min(2 * pieces_of(system), MOST_PIECES)).system if pieces_of(system) else None
 

@@ -12,12 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from geomech.core.errors import named
 from geomech.gaits import Gait
 from geomech.geometry.reconstruct import displacement
 from geomech.run.jobs import runner
 from geomech.scene.model import Scene
 from geomech.systems.capabilities import at_once, is_closed, own_error, pieces_of, refined
+from rft.refusal import located
 
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
@@ -59,7 +59,7 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
     one = (
         _direct if scene.system.traits.steps else partial(runner().call, _direct)
     )  # pieces of steps are stored by themselves
-    with named(scene.name):
+    with located(scene.name):
         return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, some, phases) for some in groups)))
 
 

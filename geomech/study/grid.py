@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import SceneError, real_array, short
 from geomech.scene.read import from_tables
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 LARGEST = 100_000_000  # points
 MOST = 200  # values of a parameter, each of which is seen to make a scene, which takes some 0.5 ms
@@ -83,22 +84,20 @@ class Grid:
 
 
 def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the values by parameter; SceneError unless they make a grid."""
+    """Return the values by parameter; Refusal unless they make a grid."""
     if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
-        raise SceneError(
-            f"over must be values by parameter, such as {{'gait.amplitude': [0.5, 1.0]}}, got {short(over)}"
-        )
+        raise Refusal("over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}", value=over)
     values = {name: _listed(name, x) for name, x in over.items()}
     total = math.prod(map(len, values.values())) if values else 0
     if not 0 < total <= LARGEST:
-        raise SceneError(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
+        raise Refusal(f"--over must span 1 to {LARGEST:,} points, got {total:,}")
     return values
 
 
 def _listed(name: str, values: Any) -> list[float]:
     array = real_array(name, values)
     if array.ndim != 1 or not np.isfinite(array).all():
-        raise SceneError(f"--over {name}: values must be a list of finite numbers, got {short(values)}")
+        raise Refusal("values must be a list of finite numbers", value=values, where=f"--over {name}")
     return array.tolist()
 
 
@@ -144,14 +143,20 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
         effects = tables.get("effects", [])
         if any(parts[1] in e for e in effects):
             return {**tables, "effects": [{**e, parts[1]: value} if parts[1] in e else e for e in effects]}
-        raise SceneError(f"--over {parameter}: no effect of the scene gives {parts[1]!r}: name the effect, or add it")
+        raise Refusal(
+            f"no effect of the scene gives {parts[1]!r}",
+            where=f"--over {parameter}",
+            instead="name the effect, or add it",
+        )
     if len(parts) == 3 and parts[0] == "effects":
         effects = tables.get("effects", [])
         if any(e.get("kind") == parts[1] for e in effects):
             return {**tables, "effects": [{**e, parts[2]: value} if e["kind"] == parts[1] else e for e in effects]}
-        raise SceneError(f"--over {parameter}: the scene has no effect {parts[1]!r}: add it as [[effects]]")
-    raise SceneError(
-        f"--over {parameter}: name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius"
+        raise Refusal(
+            f"the scene has no effect {parts[1]!r}", where=f"--over {parameter}", instead="add it as [[effects]]"
+        )
+    raise Refusal(
+        "name a parameter such as gait.amplitude, medium.C or effects.end-caps.radius", where=f"--over {parameter}"
     )
 
 

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import SceneError, is_whole, named, short
 from geomech.core.variables import Result, Variable
 from geomech.geometry.reconstruct import poses, repeated
 from geomech.run.cost import Cost
@@ -18,7 +17,9 @@ from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import length_unit, shape_labels
 from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
+from rft.checks import is_whole
 from rft.premise import Premise
+from rft.refusal import Refusal, located
 
 MOST_CYCLES = 10_000
 WORDS = 2e-6  # s a number of a table takes to be computed and written; some two times what it took
@@ -138,10 +139,10 @@ def motion(scene: Scene, cycles: int = 1) -> Motion:
     """So many cycles of the scene's gait at its own phases, by the direct tier: a cycle ends where that says. Where cycles
     are run until they repeat it is the limit cycle, where place matters each goes on from the one before."""
     if not isinstance(scene, Scene):
-        raise SceneError(f"a motion is that of a Scene, got {short(scene)}")
+        raise Refusal("a motion is that of a Scene", value=scene)
     checked(cycles)
     gait, phases = scene.gait, scene.numerics.phases
-    with named(scene.name):
+    with located(scene.name):
         alpha, alphadot = gait.cycle(phases)
         stepped = capability(scene.system, Stepped)
         if stepped is None:
@@ -153,9 +154,9 @@ def motion(scene: Scene, cycles: int = 1) -> Motion:
 
 
 def checked(cycles: int) -> None:
-    """SceneError unless so many cycles make sense."""
+    """Refusal unless so many cycles make sense."""
     if not (is_whole(cycles) and 1 <= cycles <= MOST_CYCLES):
-        raise SceneError(f"--cycles must be a whole number from 1 to {MOST_CYCLES}, got {short(cycles)}")
+        raise Refusal(f"--cycles must be a whole number from 1 to {MOST_CYCLES}", value=cycles)
 
 
 def cost(scene: Scene, cycles: int = 1) -> Cost:

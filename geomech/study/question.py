@@ -36,7 +36,7 @@ class Question(ABC):
         return inputs(self.scene)
 
     def check(self) -> None:  # noqa: B027  most have nothing more to refuse
-        """SceneError for what makes no sense, before anything is computed."""
+        """Refusal for what makes no sense, before anything is computed."""
 
     def cost(self) -> Cost | None:
         """Return what answering takes; None for what takes no time to speak of and is not worth storing."""

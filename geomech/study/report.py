@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.core.variables import Result
 from geomech.gaits import Butterfly, Circle, Gait
 from geomech.geometry.plane import Plane
@@ -26,6 +25,7 @@ from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
+from rft.refusal import Refusal, located
 
 AMPLITUDES = 10  # or so, in the study that is made of each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
@@ -85,7 +85,7 @@ def is_mapped(system: System) -> bool:
 
 
 def cost(scene: Scene) -> Cost:
-    """Return the cost of a report; SceneError for what it refuses."""
+    """Return the cost of a report; Refusal for what it refuses."""
     study, system = Study(scene), scene.system
     found: list[Job] = []
     for k, gait in enumerate(_gaits(scene)):
@@ -109,12 +109,12 @@ def _gaits(scene: Scene) -> list[Gait]:
 def reachable(scene: Scene, gait: Gait) -> list[float]:
     """Round amplitudes (`steps`), of the sign of the gait's own, up to the largest that keeps it inside the field; where there
     is no field, or one with singular shapes, up to its own, which is the last.
-    SceneError for a gait that does not move or lies outside."""
+    Refusal for a gait that does not move or lies outside."""
     system, n = scene.system, scene.numerics
     own = not PATH.is_offered(system) or system.traits.singularity is not None or is_too_large(system, n)
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
     if np.ptp(unit, axis=0).max() == 0 or (own and gait.amplitude == 0):
-        raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+        raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
     if own:
         size = abs(gait.amplitude)
         if near(scene.system):
@@ -123,14 +123,14 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         return [float(np.copysign(a, gait.amplitude)) for a in found]
     room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle))
     if room <= 0:
-        raise SceneError(f"{scene.name}: the gait's centre lies outside the field: raise [numerics] extent")
+        raise Refusal("the gait's centre lies outside the field", where=scene.name, instead="raise [numerics] extent")
     return [float(np.copysign(a, gait.amplitude)) for a in steps(room / np.abs(unit).max())]
 
 
 def _near(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes about the gait's own, as far as what is known of the system reaches; SceneError where that is nowhere."""
+    """Amplitudes about the gait's own, as far as what is known of the system reaches; Refusal where that is nowhere."""
     found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
-    with named(scene.name):
+    with located(scene.name):
         refuse_singular(scene.system, gait.cycle(scene.numerics.phases)[0])
     reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
     return [a for a in found if reached(a)]

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.core.variables import Result, Variable
 from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
@@ -24,6 +23,7 @@ from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored
 from geomech.tiers.fitted import fits
+from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
 MOST_PAIRS = 10  # of joints in a figure: those of five
@@ -95,27 +95,28 @@ class ShapeSpace(Question):
         joints = self.scene.system.joints
         pairs = [_pair(self.pair, joints)] if self.pair is not None else list(combinations(range(joints), 2))
         if len(pairs) > MOST_PAIRS:
-            raise SceneError(
-                f"{joints} joints have {len(pairs)} pairs: say which, such as --pair 1,{joints}, or give a chain [body] modes"
+            raise Refusal(
+                f"{joints} joints have {len(pairs)} pairs",
+                instead=f"say which, such as --pair 1,{joints}, or give a chain [body] modes",
             )
         return [(one, through(self.scene, one, self.held, self.pair is not None)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
-        with named(name):
+        with located(name):
             self.study.refuse_connection()
             if (self.map or self.planes) and system.joints == 1:
-                raise SceneError(NO_MAP)
+                raise Refusal(NO_MAP)
             if self.gait:
                 self.study.refuse_outside()
             if self.metric and (reason := why_none(system)):
-                raise SceneError(f"{name}: {reason}")
+                raise Refusal(reason, where=name)
             if self.beside is not None and len(self._at) > 1:
-                raise SceneError("--beside draws one pair of joints: say which with --pair")
+                raise Refusal("--beside draws one pair of joints", instead="say which with --pair")
         _ = self.other
 
     def cost(self) -> Cost:
-        with named(self.scene.name):
+        with located(self.scene.name):
             return price([job for study in filter(None, (self.study, self.other)) for job in self._jobs(study)])
 
     def _jobs(self, study: Study) -> list[Job]:
@@ -171,10 +172,10 @@ def _pair(text: str, joints: int) -> tuple[int, int]:
     """Return joints from 0 of 1,3."""
     found = text.split(",")
     if len(found) != 2 or not all(x.strip().isdecimal() for x in found):
-        raise SceneError(f"--pair: {text!r} is not two joints such as 1,{joints}")
+        raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="--pair")
     i, j = (int(x) - 1 for x in found)
     if i == j or not all(0 <= k < joints for k in (i, j)):
-        raise SceneError(f"--pair: {text!r} must be two different joints from 1 to {joints}")
+        raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="--pair")
     return i, j
 
 
@@ -183,20 +184,22 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     holds."""
     at, held = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
     if angles is not None and not held:
-        raise SceneError("--slice says where other joints are held, and this body has but two: drop it")
+        raise Refusal("--slice says where other joints are held, and this body has but two", instead="drop it")
     if angles is None:
         return at
     extent = scene.numerics.extent
     if not (stored(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
-        raise SceneError(
-            f"--slice: the angles must lie within the field's {extent:g} rad: give others, or raise --extent"
+        raise Refusal(
+            f"the angles must lie within the field's {extent:g} rad",
+            where="--slice",
+            instead="give others, or raise --extent",
         )
     if len(angles) == len(at) > 1:
         return np.array(angles)
     if len(angles) != 1 and not (alone and len(angles) == len(held)):
         ways = f"{len(held)} one by one, " * (alone and len(held) > 1) + "or "
-        raise SceneError(
-            f"--slice takes one angle for all joints that are held, {ways}{len(at)} for a shape, got {len(angles)}"
+        raise Refusal(
+            f"--slice takes one angle for all joints that are held, {ways}{len(at)} for a shape", value=len(angles)
         )
     at[held] = angles
     return at
@@ -208,7 +211,7 @@ def ccf(
     """Return the question of the CCF's picture. metric, stretch: it takes what a change of shape costs."""
     sliced = scene.system.joints > 2 or pair is not None or held is not None
     if sliced and (metric or stretch):
-        raise SceneError("--metric and --stretch are those of two joints: drop them for slices")
+        raise Refusal("--metric and --stretch are those of two joints", instead="drop them for slices")
     if sliced:
         return ShapeSpace(scene, field=False, planes=True, pair=pair, held=held, beside=beside)
     return ShapeSpace(scene, map=True, gait=True, metric=metric or stretch, beside=beside)
@@ -222,13 +225,13 @@ def connection(
         check_two_joints(scene)
     sliced = drawn and (scene.system.joints > 2 or pair is not None or held is not None)
     if sliced and beside is not None:
-        raise SceneError("--beside draws maps of two joints: drop it, or see 'geomech ccf --pair'")
+        raise Refusal("--beside draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
     picture = {"map": drawn and not sliced, "planes": sliced, "pair": pair, "held": held, "beside": beside}
     return ShapeSpace(scene, file=not matlab, **picture)
 
 
 def check_two_joints(scene: Scene) -> None:
-    """SceneError for other than the two joints that sysplotter's layout has arrays for."""
+    """Refusal for other than the two joints that sysplotter's layout has arrays for."""
     if (joints := scene.system.joints) != 2:
         why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
-        raise SceneError(f"{scene.name}: {why}: write a .nc file, which takes any number of joints")
+        raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.errors import real_array, short
 from geomech.geometry.velocity import evaluate
 from geomech.systems.base import System, note_angles
 from geomech.systems.capabilities import Diagnosed, capability
+from rft.checks import real_array
+from rft.refusal import Refusal, formatted
 
 
 def single(system: System, alpha, alphadot) -> dict:
@@ -16,7 +17,7 @@ def single(system: System, alpha, alphadot) -> dict:
     note_angles(system, np.abs(alpha).max())
     traits = system.traits
     if traits.singularity is not None and not traits.singularity(alpha):
-        raise ValueError(f"the shape is singular: {traits.singular}: move a joint")
+        raise Refusal("the shape is singular", because=traits.singular, instead="move a joint")
     if (diagnosed := capability(system, Diagnosed)) is not None:
         return diagnosed.diagnosed(alpha, alphadot)
     return {"xi": evaluate(system.velocity, alpha, alphadot).tolist(), "status": "exact", "residual": 0.0}
@@ -27,7 +28,7 @@ def _one(system: System, name: str, x) -> np.ndarray:
     x = real_array(name, x)
     if x.shape != (system.joints,) or not np.isfinite(x).all():
         count = "" if x.shape == (system.joints,) else f"{x.size}: "
-        raise ValueError(
-            f"{name} must be {system.joints} finite numbers for this system, got {count}{short(x.tolist())}"
+        raise Refusal(
+            f"{name} must be {system.joints} finite numbers for this system, got {count}{formatted(x.tolist())}"
         )
     return x

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.core.variables import Result, Variable
 from geomech.scene.stress import load_medium
 from geomech.study.question import Allow, Progress, Question
 from rft.plates import survey
+from rft.refusal import Refusal
 
 LARGEST_ANGLE = 1e6  # degrees
 
@@ -31,9 +31,9 @@ class Stress(Question):
 
     def check(self) -> None:
         if (self.beta is None) != (self.gamma is None) or (self.beta is None and not self.drawn):
-            raise SceneError("give both --beta and --gamma, in degrees, or --plot for all angles")
+            raise Refusal("give both --beta and --gamma, in degrees, or --plot for all angles")
         if not all(x is None or abs(x) <= LARGEST_ANGLE for x in (self.beta, self.gamma)):
-            raise SceneError("--beta and --gamma must be finite angles in degrees, of at most 1e6")
+            raise Refusal("--beta and --gamma must be finite angles in degrees, of at most 1e6")
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         law = load_medium(self.medium)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.io.rows import read as read_rows
 from geomech.scene import penetration
 from geomech.scene.drag import LARGEST_FILE
 from geomech.scene.stress import plate_rows
 from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_stress, fit_zeta
 from rft.plates.survey import survey
+from rft.refusal import Refusal, located
 
 KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # as files have them: B-11 for Bm11
 MOST_LINES = 60  # of a table of residuals
@@ -192,34 +192,32 @@ class OfPenetration:
 
 
 def of_plates(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfPlates:
-    """The nine coefficients from a CSV file of plate drags. SceneError, one line that names the file, for bad ones."""
+    """The nine coefficients from a CSV file of plate drags. Refusal, one line that names the file, for bad ones."""
     _refuse(law, sizes, end_caps, ())
     beta, gamma, a_x, a_z = plate_rows("plate drags", source)
-    with named(_name(source)):
+    with located(_name(source)):
         return OfPlates(fit_stress(np.radians(beta), np.radians(gamma), a_x, a_z), beta, gamma, a_x, a_z, _name(source))
 
 
 def of_penetration(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfPenetration:
-    """zeta from a CSV file of a penetration test. sizes: "area", m^2, which overrules the file's. SceneError for bad ones."""
+    """zeta from a CSV file of a penetration test. sizes: "area", m^2, which overrules the file's. Refusal for bad ones."""
     _refuse(law, sizes, end_caps, ("area",))
-    try:
-        test = penetration.read(read_rows(source, LARGEST_FILE, GIVEN))
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    test = penetration.read(read_rows(source, LARGEST_FILE, GIVEN))
     area = np.array([sizes["area"]]) if "area" in sizes else test.area
-    with named(test.name):
+    with located(test.name):
         if area is None:
-            raise ValueError(
-                "the area of the plate is missing: give --area in m^2, or a header line '# plate area = 9.5 cm^2'"
+            raise Refusal(
+                "the area of the plate is missing",
+                instead="give --area in m^2, or a header line '# plate area = 9.5 cm^2'",
             )
         return OfPenetration(fit_zeta(test.depth, test.force, area), area, test.name)
 
 
 def _refuse(law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ...]) -> None:
-    """SceneError for options that are of a rod."""
+    """Refusal for options that are of a rod."""
     for name in (*sizes, *(["end-caps"] if end_caps else [])):
         if name not in known:
-            raise SceneError(f"--{name} belongs to another measurement: leave it out for --law {law}")
+            raise Refusal(f"--{name} belongs to another measurement", instead=f"leave it out for --law {law}")
 
 
 def _name(source: str) -> str:

@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from geomech.core.errors import SceneError, plain, short
 from geomech.core.face import Faced
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
@@ -21,6 +20,7 @@ from geomech.run.jobs import context_of, runner, storing
 from geomech.scene.read import inputs
 from geomech.study.grid import Grid, listed
 from geomech.study.question import Allow, Progress, Question
+from rft.refusal import Refusal, printable
 
 
 class Swept(Faced, dict):
@@ -33,7 +33,7 @@ class Swept(Faced, dict):
 
     def __repr__(self) -> str:
         over = " x ".join(f"{name} ({len(v)}: {span(v)})" for name, v in self["over"].items())
-        return f"Swept({plain(self.scene.name)} over {over}; {batched(self.scene).summary(self)})"
+        return f"Swept({printable(self.scene.name)} over {over}; {batched(self.scene).summary(self)})"
 
 
 def as_stored(result: Result) -> Result:
@@ -47,7 +47,7 @@ class Batched(Protocol):
     It knows its scenes and says how they are put side by side; the sweep knows the grid, the order and who computes."""
 
     def grid(self, scene: Any, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid of these parameters; SceneError if a point of it makes no scene."""
+        """Return the grid of these parameters; Refusal if a point of it makes no scene."""
 
     def cost(self, grid: Grid) -> Cost:
         """Return what all points take."""
@@ -153,7 +153,7 @@ def sweep(
 
     Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects), and robots, go
     through the solver together. partial: a file in which what is done is stored, so that the same sweep resumes; it is the
-    caller's to remove, once the results are saved. Who computes: `geomech.run.workers`. SceneError if a point of the grid
+    caller's to remove, once the results are saved. Who computes: `geomech.run.workers`. Refusal if a point of the grid
     makes no scene."""
     question = Sweep(scene, over)
     question.check()
@@ -166,5 +166,5 @@ def _stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextMa
     if partial is None:
         return contextlib.nullcontext()
     if not (isinstance(partial, (str, Path)) and str(partial)):
-        raise SceneError(f"partial must be the path of a file, got {short(partial)}")
+        raise Refusal("partial must be the path of a file", value=partial)
     return storing(Path(partial), context_of(inputs(scene)), Path(partial), keep=True)

@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.core.knob import Knob
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene, checked_scene
@@ -23,6 +22,7 @@ from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver
 from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
+from rft.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096
@@ -56,13 +56,13 @@ class Settings:
         return self.scene.gait.amplitude * FRACTIONS
 
     def check(self) -> None:
-        """SceneError for a gait that does not move, or leaves the field that a knob turns."""
+        """Refusal for a gait that does not move, or leaves the field that a knob turns."""
         scene = self.scene
         if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
-            raise SceneError(f"{scene.name}: [gait] does not move: give it a size")
+            raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
         tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
         if any(table and table.axes for table in tables):
-            with named(scene.name):
+            with located(scene.name):
                 Study(scene).refuse_outside()
 
     def cost(self) -> Cost:

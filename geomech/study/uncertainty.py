@@ -15,13 +15,13 @@ import itertools
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.gaits import Gait
 from geomech.scene.model import Scene
 from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import System
 from geomech.systems.capabilities import Uncertain, at_once, capability
 from geomech.tiers.base import in_groups
+from rft.refusal import Refusal, located
 
 PHASES = 64  # of a cycle: changes of displacement are wanted to a per cent, not displacements
 NONLINEAR = 1.02  # times the linear standard deviation, from which on the second order counts
@@ -54,10 +54,10 @@ def points(system: System) -> int:
 
 def sigma_points(scene: Scene) -> tuple[float, list[tuple[System, System]], dict[tuple[int, int], System]]:
     """(standard deviations to either side, the systems there in every direction, those in any two together, by their
-    numbers). SceneError if one is no system a standard deviation away: the covariance then allows what cannot be."""
+    numbers). Refusal if one is no system a standard deviation away: the covariance then allows what cannot be."""
     try:
         return _points(scene, REACH)
-    except SceneError:
+    except Refusal:
         return _points(scene, 1.0)
 
 
@@ -65,7 +65,7 @@ def _points(scene: Scene, reach: float):
     system = capability(scene.system, Uncertain)
     steps = reach * root(system.covariance).T
     pairs = itertools.combinations(range(len(steps)), 2)
-    with named(scene.name):
+    with located(scene.name):
         near = [(system.varied(s), system.varied(-s)) for s in steps]
         return reach, near, {(i, j): system.varied(steps[i] + steps[j]) for i, j in pairs}
 
@@ -74,7 +74,7 @@ def of_medium(scene: Scene, gait: Gait, amplitudes) -> dict[str, np.ndarray | li
     """Standard deviations of the net pose for amplitudes (B,), or None for those of gaits side by side: {"x", "y", "heading",
     "net_distance": (B,) in the scene's unit and rad, "position": (B,), of both coordinates together, "rule": [...]},
     "linear" or "second order" for each, and "shift": {the first four: (B,)}, how far the mean over the media lies from the
-    pose in their mean. None where the medium is taken for certain. SceneError as of `sigma_points`.
+    pose in their mean. None where the medium is taken for certain. Refusal as of `sigma_points`.
 
     What is of the net distance is of the position along the direction of the net displacement, which does not fold at 0; the
     deviation is that of the whole position where the distance is smaller than that."""

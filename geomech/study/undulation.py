@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geomech.core.errors import real_array, short
 from geomech.gaits import Sine, Wave
+from rft.checks import real_array
+from rft.refusal import Refusal
 
 if TYPE_CHECKING:
     from geomech.scene.model import Scene
@@ -37,7 +38,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
     gait = _travelling(scene)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1:
-        raise ValueError(f"amplitudes must be a list of numbers, got {short(amplitudes.tolist())}")
+        raise Refusal("amplitudes must be a list of numbers", value=amplitudes.tolist())
     run, length = scene.cycle(gait, amplitudes, work=True), scene.system.length
     spent = run.work
     progress = np.hypot(run.net[:, 0], run.net[:, 1]) / length
@@ -68,17 +69,17 @@ def _travelling(scene: Scene) -> Sine | Wave:
     if not isinstance(gait, Wave):
         return _sine(scene, "performance")
     if gait.waves == 0 or gait.offset != 0 or any(gait.centre):
-        raise ValueError(
-            "performance is that of a wave about the straight body: give it waves, no offset and no centre"
+        raise Refusal(
+            "performance is that of a wave about the straight body", instead="give it waves, no offset and no centre"
         )
     if len({*getattr(body, "lengths", ())}) != 1 or body.modes is not None:
-        raise ValueError("performance is that of a chain whose links are of equal length, moved joint by joint")
+        raise Refusal("performance is that of a chain whose links are of equal length, moved joint by joint")
     return gait
 
 
 def _sine(scene: Scene, what: str) -> Sine:
     if not isinstance(getattr(scene, "gait", None), Sine):
-        raise ValueError(f"{what} is that of a sine wave, got a {type(getattr(scene, 'gait', scene)).__name__.lower()}")
+        raise Refusal(f"{what} is that of a sine wave, got a {type(getattr(scene, 'gait', scene)).__name__.lower()}")
     return scene.gait
 
 
@@ -101,7 +102,7 @@ def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str =
     from scipy.optimize import brentq
 
     if kinematics not in KINEMATICS:
-        raise ValueError(f"kinematics must be one of {', '.join(KINEMATICS)}, got {kinematics!r}")
+        raise Refusal(f"kinematics must be one of {', '.join(KINEMATICS)}", value=kinematics)
     sliding = kinematics == "sliding"
     c, s = np.cos(headings), np.sin(headings)
     speed = c.mean()  # of the wave
@@ -172,7 +173,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     """
     gait = _sine(scene, "activation")
     if gait.amplitude == 0:
-        raise ValueError("activation takes a wave of amplitude > 0: a straight body at rest needs no muscles")
+        raise Refusal("activation takes a wave of amplitude > 0", because="a straight body at rest needs no muscles")
     bend, rate = gait.cycle(scene.numerics.phases)
     moment = scene.system.run(bend, rate, work=True).work.bending_moment
     s = np.arange(1, gait.elements) / gait.elements

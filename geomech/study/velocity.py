@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geomech.core.errors import named
 from geomech.core.variables import Result, Variable
 from geomech.scene.model import Scene
 from geomech.study.question import Allow, Progress, Question
 from geomech.study.single import single
 from geomech.systems.base import length_unit
+from rft.refusal import located
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Velocity(Question):
     alphadot: tuple[float, ...]
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        with named(self.scene.name):
+        with located(self.scene.name):
             found = single(self.scene.system, self.alpha, self.alphadot)
         unit = length_unit(self.scene.system)
         xi = Variable("xi", ("component",), np.array(found["xi"]), f"{unit}, {unit}, rad", "per unit time")

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from geomech.core.errors import SceneError, named
 from geomech.core.knob import Knob
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
@@ -24,7 +23,8 @@ from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
 from geomech.study.question import Allow, Progress, Question
-from rft.laws.catalogue import GRAVITY
+from rft.metres import GRAVITY
+from rft.refusal import Refusal, located
 from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
@@ -105,20 +105,20 @@ def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
 def run(
     scene: WalkerScene, by: str | None = None, progress: Callable | None = None, longest: float = math.inf
 ) -> Walked:
-    """One scene. longest: s of computing, after which SceneError where the way from rest is not yet done: how long that takes
+    """One scene. longest: s of computing, after which Refusal where the way from rest is not yet done: how long that takes
     hangs on whether a cycle repeats itself, which nobody knows before."""
     begin = time.process_time()
 
     def told(done: float) -> None:
         if time.process_time() - begin > longest and done < WALKING:
             cure = "lower [numerics] duration, or say --yes"
-            raise SceneError(
-                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself: {cure}"
+            raise Refusal(
+                f"after {longest:.0f} s of computing {done:.0%} is done, and no cycle repeats itself", instead=cure
             )
         if progress:
             progress(done)
 
-    with named(scene.name):
+    with located(scene.name):
         return walked([scene], by, progress=told)[0]
 
 
@@ -180,7 +180,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
-    with named(scene.name), suiting(STEP * least if planar else 0.0):
+    with located(scene.name), suiting(STEP * least if planar else 0.0):
         pace, tries = engine(how).step_cost([scene.walker] * together, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
@@ -202,7 +202,7 @@ class Walks:
     """How fast robots walk, side by side: what a sweep over scenes of robots asks."""
 
     def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid; SceneError if one of some 200 of its points makes no scene, or one that nothing here computes."""
+        """Return the grid; Refusal if one of some 200 of its points makes no scene, or one that nothing here computes."""
         grid = Grid(scene, over, written.tables(scene))
         last = grid.total - 1
         for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
@@ -311,8 +311,8 @@ class Settings:
 
 
 def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
-    """SceneError unless there is such an engine here, and it takes the scene."""
-    with named(scene.name):
+    """Refusal unless there is such an engine here, and it takes the scene."""
+    with located(scene.name):
         engine(by or scene.engine).refuse(scene.walker)
 
 

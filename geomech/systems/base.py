@@ -11,10 +11,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.errors import check_angle, number, short
+from geomech.core.errors import check_angle
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.geometry.velocity import evaluate, in_batches
+from rft.checks import in_range
+from rft.refusal import Refusal
 from rft.registry import Registry, classes_with
 
 MEMBERS = ("joints", "length", "traits", "velocity", "run")
@@ -88,12 +90,12 @@ class Given:
     traits: Traits = NOTHING
 
     def __post_init__(self):
-        number("joints", self.joints, 1, 10_000, whole=True)
-        number("length", self.length, 1e-9, 1e9)
+        in_range("joints", self.joints, 1, 10_000, whole=True)
+        in_range("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
-            raise ValueError(f"traits must be Traits(...), got {short(self.traits)}")
+            raise Refusal("traits must be Traits(...)", value=self.traits)
         if not _takes_two(self._velocity):
-            raise ValueError(f"the velocity of {self.kind} must take (alpha, alphadot)")
+            raise Refusal(f"the velocity of {self.kind} must take (alpha, alphadot)")
 
     @property
     def kind(self) -> str:
@@ -141,14 +143,14 @@ def as_system(given: Any, joints: int | None = None) -> System:
     if not isinstance(given, type) and all(hasattr(given, name) for name in MEMBERS):
         refuse_mutable(given)
         if not isinstance(given.traits, Traits):
-            raise ValueError(f"traits of the {kind_of(given)} must be Traits(...), got {short(given.traits)}")
+            raise Refusal(f"traits of the {kind_of(given)} must be Traits(...)", value=given.traits)
         return given
     function = getattr(given, "velocity", given)
     joints = getattr(given, "joints", joints)
     if isinstance(given, type) or not callable(function) or joints is None:
-        raise ValueError(
-            "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot), got "
-            f"{short(given)}"
+        raise Refusal(
+            "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot)",
+            value=given,
         )
     refuse_mutable(given)
     return Given(given, joints, getattr(given, "length", 1.0), getattr(given, "traits", NOTHING))
@@ -195,9 +197,9 @@ def refuse_singular(system: System, alpha) -> None:
     met = (d == 0) | (d * np.roll(d, -1, -1) < 0)
     if met.any():
         shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[met][0])
-        raise ValueError(
-            f"the gait meets the singular shape near alpha = ({shape}), where {system.traits.singular}: "
-            "move its centre, or lower the amplitude"
+        raise Refusal(
+            f"the gait meets the singular shape near alpha = ({shape}), where {system.traits.singular}",
+            instead="move its centre, or lower the amplitude",
         )
 
 
@@ -205,4 +207,6 @@ def refuse_mutable(*parts) -> None:
     """ValueError for a part of a class that has no hash: tables are kept under the system that they are of."""
     for part in parts:
         if type(part).__hash__ is None:
-            raise ValueError(f"{type(part).__name__} must be a value: put @dataclass(frozen=True) above the class")
+            raise Refusal(
+                f"{type(part).__name__} must be a value", instead="put @dataclass(frozen=True) above the class"
+            )

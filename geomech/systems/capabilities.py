@@ -15,6 +15,7 @@ import numpy as np
 
 from geomech.systems.base import System, kind_of
 from rft.premise import Premise
+from rft.refusal import Refusal
 
 T = TypeVar("T")
 # Of gaits run side by side, angles and velocities, a batch of which takes some 120 MB with what is made of them: more take
@@ -196,7 +197,7 @@ def driven(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
     """Return xi (..., 3) and power (...) of the same solutions; ValueError for a system that says no power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
-        raise ValueError(f"no power with the {kind_of(system)}: nothing says what a change of shape costs it")
+        raise Refusal(f"no power with the {kind_of(system)}", because="nothing says what a change of shape costs it")
     xi = system.velocity(alpha, alphadot)
     return xi, dissipative.power(alpha, alphadot, xi)
 

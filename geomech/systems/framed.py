@@ -33,6 +33,7 @@ from geomech.systems.capabilities import (
 from geomech.systems.premises import refuse
 from rft import se2
 from rft.premise import SHAPE_ALONE
+from rft.refusal import Refusal
 
 NAME = "minimum-perturbation"
 
@@ -51,11 +52,14 @@ class Framed:
     def __post_init__(self):
         refuse(self.inner, "minimum-perturbation frame", SHAPE_ALONE, f"drop frame = {NAME!r}")
         if self.inner.traits.singularity is not None:
-            raise ValueError(
-                f"no minimum-perturbation frame of the {kind_of(self.inner)}, which has singular shapes: drop frame"
+            raise Refusal(
+                f"no minimum-perturbation frame of the {kind_of(self.inner)}, which has singular shapes",
+                instead="drop frame",
             )
         if stored(self.inner, "connection"):
-            raise ValueError(f"a table keeps the frame it was made in: drop frame = {NAME!r}, or make the table in it")
+            raise Refusal(
+                "a table keeps the frame it was made in", instead=f"drop frame = {NAME!r}, or make the table in it"
+            )
 
     kind = property(lambda self: kind_of(self.inner))
     joints = property(lambda self: self.inner.joints)
@@ -162,13 +166,15 @@ def in_frame(system: System, frame: str) -> System:
         return own(frame)
     if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:
         return dataclasses.replace(system, frame=frame)
-    raise ValueError(f"the {kind_of(system)} has one frame, {system.traits.frame!r}, and no {frame!r}")
+    raise Refusal(f"the {kind_of(system)} has one frame, {system.traits.frame!r}, and no {frame!r}")
 
 
 def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
     """Return A (3, joints) as a sympy Matrix and its shape variables (`geomech.symbolic`); ValueError if there is none."""
     if isinstance(system, Framed):
-        raise ValueError(f"no formula in the {NAME} frame, which is a field of numbers: take another frame")
+        raise Refusal(f"no formula in the {NAME} frame, which is a field of numbers", instead="take another frame")
     if (symbolic := capability(system, Symbolic)) is None:
-        raise ValueError(f"no formula of the connection of a {kind_of(system)}: 'geomech connection' has its numbers")
+        raise Refusal(
+            f"no formula of the connection of a {kind_of(system)}", because="'geomech connection' has its numbers"
+        )
     return symbolic.symbolic()

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import real_array, short
 from geomech.geometry.traits import Traits
 from geomech.systems.base import integrated
 from rft.balance.newton import to_element
 from rft.bodies import Chain
 from rft.bodies.base import Elements, Length
-from rft.checks import check_numbers
+from rft.checks import check_numbers, real_array
+from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class Momentum:
         """ValueError if the field of this name is not empty, nor a number from least to most for each link."""
         x = real_array(name, getattr(self, name))
         if x.shape not in ((0,), (len(self.lengths),)) or not ((least <= x) & (x <= most)).all():
-            raise ValueError(
-                f"{name} must be {len(self.lengths)} numbers from {least:g} to {most:g}, one for each link, or left out, "
-                f"got {short(x.tolist())}"
+            raise Refusal(
+                f"{name} must be {len(self.lengths)} numbers from {least:g} to {most:g}, one for each link, or left out",
+                value=x.tolist(),
             )
         object.__setattr__(self, name, tuple(x.tolist()))
 

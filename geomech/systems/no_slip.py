@@ -15,6 +15,7 @@ from geomech.geometry.traits import Traits
 from geomech.systems.base import SYSTEMS, integrated
 from rft.bodies import Chain
 from rft.bodies.base import Length
+from rft.refusal import Refusal
 
 
 @SYSTEMS.register
@@ -40,7 +41,7 @@ class NoSlipSnake:
     def __post_init__(self):
         object.__setattr__(self, "lengths", self._chain.lengths)
         if len(self.lengths) != 3:
-            raise ValueError(f"lengths must be those of three links, got {len(self.lengths)}")
+            raise Refusal("lengths must be those of three links", value=len(self.lengths))
 
     @property
     def traits(self) -> Traits:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import Composite, Part, capability
 from rft.premise import Premise, negated
+from rft.refusal import Refusal
 
 CURES = {"law": ", or take another law", "effect": ", or drop the effect"}
 
@@ -35,7 +36,7 @@ def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
     """ValueError, one line, if there is no such result because a premise of it does not hold."""
     if system.traits.lacks & premises:
         parts = broken(system, premises)
-        raise ValueError(f"no {what} with {because(system, premises)}: {instead}{CURES.get(parts[0].role, '')}")
+        raise Refusal(f"no {what} with {because(system, premises)}", instead=f"{instead}{CURES.get(parts[0].role, '')}")
 
 
 def _named(part: Part) -> str:

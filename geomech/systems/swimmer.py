@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 import rft
-from geomech.core.errors import short
 from geomech.core.work import iterate
 from geomech.geometry.images import around, solved_count
 from geomech.geometry.reconstruct import displacement, poses, repeated
@@ -28,6 +27,7 @@ from rft.laws.base import is_odd, require_law
 from rft.laws.records import record, rule_for
 from rft.premise import NONE, SHAPE_ALONE, Premise
 from rft.quadrature import QUADRATURE
+from rft.refusal import Refusal, located
 from rft.stepping import Row, State, Stepping
 
 PARTS = {"medium": LAWS, "body": BODIES, "effects": EFFECTS}  # of a scene's tables
@@ -54,20 +54,16 @@ class Swimmer:
         rft.effects.broken_premises(self.effects)
         object.__setattr__(self, "effects", tuple(self.effects))  # a list has no hash, by which tables are kept
         if not isinstance(self.solver, Solver):
-            raise ValueError(f"solver must be Solver(...), got {short(self.solver)}")
-        try:
+            raise Refusal("solver must be Solver(...)", value=self.solver)
+        with located("[numerics]"):
             record(self.medium, self.solver.loads)
-        except ValueError as error:
-            raise ValueError(f"[numerics] {error}") from None
         self._agree()
         kinds = [type(e) for e in self.effects]
         for effect in self.effects:
             if kinds.count(type(effect)) > 1:
-                raise ValueError(f"[[effects]] {effect.kind} is asked for twice: keep one")
-            try:
+                raise Refusal(f"[[effects]] {effect.kind} is asked for twice", instead="keep one")
+            with located("[[effects]]"):
                 effect.check(self.medium)
-            except ValueError as error:
-                raise ValueError(f"[[effects]] {error}: drop it, or change the medium") from None
 
     def __getstate__(self) -> dict:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # not what is cached
@@ -79,8 +75,8 @@ class Swimmer:
             said += [(e.kind, getattr(e, what)) for e in self.effects if hasattr(e, what)]
             for name, value in said[1:]:
                 if np.any(np.asarray(value) != said[0][1]):
-                    raise ValueError(
-                        f"{said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}: it is one swimmer"
+                    raise Refusal(
+                        f"{said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}", because="it is one swimmer"
                     )
 
     joints = property(lambda self: self.body.joints)
@@ -145,9 +141,10 @@ class Swimmer:
         try:
             return dataclasses.replace(self, medium=dataclasses.replace(self.medium, covariance=None, **changed))
         except ValueError as error:
-            raise ValueError(
-                f"[medium] covariance: a standard deviation away there is no medium ({error}): measure more drag, or "
-                "leave the covariance out"
+            raise Refusal(
+                "[medium] covariance",
+                because=f"a standard deviation away there is no medium ({error})",
+                instead="measure more drag, or leave the covariance out",
             ) from None
 
     @property
@@ -212,7 +209,7 @@ class Swimmer:
     def diagnosed(self, alpha, alphadot) -> dict:
         s = self.solve(alpha, alphadot)
         if str(s.status) == "unconverged":
-            raise ValueError("the force balance did not converge: raise [numerics] regularisation")
+            raise Refusal("the force balance did not converge", instead="raise [numerics] regularisation")
         told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
         return {"xi": s.xi.tolist(), **told}
 
@@ -221,7 +218,7 @@ class Swimmer:
 
         plain = type(self.body) is rft.Chain and self.body.modes is None
         if not (self.traits.linear and plain and type(self.medium) is rft.Viscous):
-            raise ValueError("a formula is that of a chain of links in a viscous medium without effects")
+            raise Refusal("a formula is that of a chain of links in a viscous medium without effects")
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
         return connections.in_units_of(self.body.length, A), alpha
 

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import short
 from geomech.geometry.field import Field
 from geomech.geometry.reconstruct import displacement, trajectory
 from geomech.geometry.traits import Traits
@@ -23,6 +22,7 @@ from geomech.io import tables
 from geomech.systems.base import SYSTEMS, integrated
 from geomech.systems.capabilities import Dissipative, OwnMetric
 from rft.checks import Number, check_numbers
+from rft.refusal import Refusal
 
 LENGTHS = (
     "its lengths are taken for body lengths; say body_length = 1 if they are, 3 if one is a link of three equal ones"
@@ -63,21 +63,23 @@ class Table:
 
     def __post_init__(self):
         if not isinstance(self.file, (str, Path)):
-            raise ValueError(f"file must be the name of a .nc or .mat file, got {short(self.file)}")
+            raise Refusal("file must be the name of a .nc or .mat file", value=self.file)
         object.__setattr__(self, "file", str(Path(self.file).absolute()))
         for name in ("sign", "order", "sha256"):
             if not isinstance(getattr(self, name), str):
-                raise ValueError(f"{name} must be text, got {short(getattr(self, name))}")
+                raise Refusal(f"{name} must be text", value=getattr(self, name))
         check_numbers(self)
         held = tables.load(self.file, self.sign, self.order)
         if self.sha256.lower() not in ("", held.sha256):
-            raise ValueError(f"{self.file} is not the file whose sha256 is given: restore it, or leave sha256 out")
+            raise Refusal(
+                f"{self.file} is not the file whose sha256 is given", instead="restore it, or leave sha256 out"
+            )
         if held.connection.field.masked and not isinstance(held.connection, Tube):
             cure = "" if held.A_error is None else ": give the .nc file of the measured gait, which has what lies there"
-            raise ValueError(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
+            raise Refusal(f"{self.file} has singular shapes (nan), and nothing is looked up between those{cure}")
         if self.body_length is not None and (held.unit, held.length) != ("BL", 1.0):
-            raise ValueError(
-                f"{self.file} says the body's length itself, {held.length:g} {held.unit}: drop body_length"
+            raise Refusal(
+                f"{self.file} says the body's length itself, {held.length:g} {held.unit}", instead="drop body_length"
             )
         object.__setattr__(self, "sha256", held.sha256)
         object.__setattr__(self, "held", tables.scaled(held, 1.0 / (self.body_length or 1.0)))
@@ -116,8 +118,8 @@ class Table:
         return 1 - self.tube.reach(alpha)
 
     def in_frame(self, frame: str) -> Table:
-        raise ValueError(
-            f"a table has the frame it was made in, {self.held.frame!r}: make it anew in the frame {frame!r}"
+        raise Refusal(
+            f"a table has the frame it was made in, {self.held.frame!r}", instead=f"make it anew in the frame {frame!r}"
         )
 
     def refuse_singular(self, alpha) -> None:

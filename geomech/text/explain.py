@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from geomech.core.errors import plain
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.offer import tiers
@@ -13,6 +12,7 @@ from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved
 from rft.premise import ALL
+from rft.refusal import printable
 
 if TYPE_CHECKING:
     from geomech.scene.intruding import Intruding
@@ -25,7 +25,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
     intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
     if hasattr(scene, "told"):  # of bodies in grains, whose modules a swimmer does without
-        return plain("\n".join(scene.told()))
+        return printable("\n".join(scene.told()))
     system = checked_scene(scene).system
     first, *told = described(system)
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
@@ -37,7 +37,7 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
     by_name = [m for m, tier in TIERS.items() if tier.is_possible(system) and not tier.is_offered(system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
-    return plain("\n".join([*lines, *_lost(system)]))
+    return printable("\n".join([*lines, *_lost(system)]))
 
 
 def _lost(system) -> list[str]:

@@ -6,17 +6,17 @@ import itertools
 from collections.abc import Iterator
 
 from geomech import symbolic
-from geomech.core.errors import named
 from geomech.scene.model import Scene
 from geomech.systems.framed import formula
+from rft.refusal import located
 
 ROWS = ("x", "y", "theta")
 
 
 def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[str]:
     """Yield A(alpha), xi = A alphadot, of a scene, and the CCF of every two joints if asked for, one after the other as they
-    are found: an equation of LaTeX each, or a line for each entry. SceneError for a system without closed form."""
-    with named(scene.name):
+    are found: an equation of LaTeX each, or a line for each entry. Refusal for a system without closed form."""
+    with located(scene.name):
         A, alpha = formula(scene.system)
     A = symbolic.simplified(A, alpha)
     told = symbolic.latex if latex else _text

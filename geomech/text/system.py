@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 
 from geomech.core import summary
-from geomech.core.errors import short
 from geomech.io.tables.base import SIGNS
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import Given, System, kind_of
@@ -18,6 +17,7 @@ from rft.laws import LAWS
 from rft.laws.records import is_compilable, record
 from rft.premise import SHAPE_ALONE, negated
 from rft.quadrature import QUADRATURE
+from rft.refusal import formatted
 
 NO_PAST = "nothing remembers, places are alike, no mass"
 
@@ -34,7 +34,7 @@ def described(system: System) -> list[str]:
     if isinstance(system, Table):
         return _table(system)
     fields = dataclasses.fields(system) if dataclasses.is_dataclass(system) else ()
-    told = ", ".join(f"{f.name} = {short(getattr(system, f.name))}" for f in fields)
+    told = ", ".join(f"{f.name} = {formatted(getattr(system, f.name))}" for f in fields)
     return [f"{kind_of(system)} ({told})" if told else kind_of(system)]
 
 

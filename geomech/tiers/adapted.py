@@ -7,11 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from geomech.core.errors import real_array
 from geomech.core.knob import Knob
 from geomech.geometry import family
 from geomech.geometry.family import Family
 from geomech.tiers.base import Plan, Table, Tier, solved
+from rft.checks import real_array
 from rft.premise import SHAPE_ALONE
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.errors import number, short
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER
@@ -16,6 +15,8 @@ from geomech.geometry.two_form import RADII, spanned, spanned_by, two_form
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Tier, in_groups
 from rft import se2
+from rft.checks import in_range
+from rft.refusal import Refusal
 
 TIPS, AROUND = 2, 64  # surfaces besides the one that is taken; phases on one where there is no field
 
@@ -27,11 +28,11 @@ def area(field: Field, gait: Gait, amplitudes=None, phases: int = 256) -> np.nda
     size in a generic frame, 4 where A vanishes at its centre.
     """
     checked_gait(gait)
-    number("phases", phases, 1, 1e9, whole=True)
+    in_range("phases", phases, 1, 1e9, whole=True)
     if not isinstance(field, Field):
-        raise ValueError(f"the area tier sums up a Field, such as curvature.ccf gives, got {short(field)}")
+        raise Refusal("the area tier sums up a Field, such as curvature.ccf gives", value=field)
     if field.joints != 2 or gait.joints != 2:
-        raise ValueError(f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}")
+        raise Refusal(f"the area tier needs two joints, got a field of {field.joints} and a gait of {gait.joints}")
     potential = field.antiderivative(0)
 
     def enclosed(some):

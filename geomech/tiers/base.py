@@ -11,14 +11,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from geomech.core.errors import real_array
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
 from geomech.systems.capabilities import costed, near
 from geomech.systems.premises import refuse
-from rft.checks import Number, check_numbers
+from rft.checks import Number, check_numbers, real_array
 from rft.premise import ALL, Premise
+from rft.refusal import Refusal
 from rft.registry import Registry
 
 
@@ -50,9 +50,9 @@ class Numerics:
     def __post_init__(self):
         check_numbers(self)
         if self.harmonics is not None and self.harmonics % 2 == 0:
-            raise ValueError(f"harmonics must be an odd number from 1 to 999, got {self.harmonics!r}")
+            raise Refusal("harmonics must be an odd number from 1 to 999", value=self.harmonics)
         if self.interpolation >= self.grid:
-            raise ValueError(f"interpolation must be from 1 to 5 and less than grid, got {self.interpolation!r}")
+            raise Refusal("interpolation must be from 1 to 5 and less than grid", value=self.interpolation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +144,11 @@ class Tier:
         """ValueError if it says nothing of this system."""
         refuse(system, self.result, self.rests_on, "use the direct tier")
         if system.joints not in self.joints:
-            raise ValueError(f"the {self.name} tier {self.takes}, this body has {system.joints}: {self.instead}")
+            raise Refusal(f"the {self.name} tier {self.takes}, this body has {system.joints}", instead=self.instead)
         if self.meets_singular_shapes(system):
             gait = near(system)
             why = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
-            raise ValueError(f"the {self.name} tier sums a field up, and {why}: use path or direct")
+            raise Refusal(f"the {self.name} tier sums a field up, and {why}", instead="use path or direct")
 
     def meets_singular_shapes(self, system: System) -> bool:
         """Return whether singular shapes keep it from saying anything of this system."""

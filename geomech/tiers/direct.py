@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from geomech.core.errors import number
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
@@ -12,6 +11,7 @@ from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
 from geomech.systems.capabilities import at_once
 from geomech.tiers.base import Plan, Tier, in_groups, solved
+from rft.checks import in_range
 from rft.premise import NONE
 
 COUNTS = 2, 4, 8, 16, 32, 64  # of segments or nodes of a link
@@ -22,7 +22,7 @@ def direct(velocity: Velocity, gait: Gait, amplitudes=None, phases: int = 256) -
     """The velocity integrated along the gait, for amplitudes (...,) or the gait's own, many phases in one batch."""
     checked_gait(gait)
     amplitudes = gait.amplitude if amplitudes is None else amplitudes
-    number("phases", phases, 1, 1e9, whole=True)
+    in_range("phases", phases, 1, 1e9, whole=True)
     step = SAMPLES_TOGETHER // int(phases)
     return in_groups(lambda some: _cycle(velocity, gait, some, phases), amplitudes, step)
 

@@ -21,6 +21,7 @@ from geomech.systems.capabilities import stored
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
 from rft.premise import ALL
+from rft.refusal import Refusal
 
 INSTEAD = "draw slices (geomech ccf --pair), or use methods such as path and direct, which need no field"
 
@@ -50,7 +51,7 @@ def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
         few = 4**d <= LARGEST_GRID
         cost = f" ({24e-9 * d * n**d:.3g} GB for A)" if few else ""
         lower = f"lower [numerics] grid, to {fits(d)} or less, " if few else "give a chain two [body] modes, "
-        raise ValueError(f"a field of {n}^{d} shapes is too large{cost}: {lower}{INSTEAD}")
+        raise Refusal(f"a field of {n}^{d} shapes is too large{cost}", instead=f"{lower}{INSTEAD}")
     return connection.grid(system.joints, numerics.grid, numerics.extent)
 
 

@@ -15,6 +15,7 @@ from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
 from geomech.tiers.direct import itself
 from geomech.tiers.path import path
+from rft.refusal import Refusal
 
 HIGHEST = {2: 15, 3: 9}  # by joints, if [numerics] harmonics is left out
 FEW = 5  # of more: 56 coefficients of each component of four joints, 126 of five
@@ -49,9 +50,9 @@ def table(system, numerics) -> Table:
 def _axes(system, numerics) -> tuple[np.ndarray, ...]:
     d, n = system.joints, numerics.grid
     if fitted.is_too_large(system, numerics):
-        raise ValueError(
-            f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes is too large: lower [numerics] grid, to "
-            f"{fitted.fits(d)} or less, or use path, adapted or direct, which need none"
+        raise Refusal(
+            f"harmonics of {d} joint rates need a field, and one of {n}^{d} shapes is too large",
+            instead=f"lower [numerics] grid, to {fitted.fits(d)} or less, or use path, adapted or direct, which need none",
         )
     return fitted.axes(system, numerics)
 

@@ -1,5 +1,1 @@
-"""The balance of forces: one formula of a Newton step, two drivers that apply it, and `body_velocity`."""
-
-from rft.balance.velocity import Solution, body_velocity, checked_input
-
-__all__ = ["Solution", "body_velocity", "checked_input"]
+"""The balance of forces: one formula of a Newton step, and two drivers that apply it (`rft.balance.velocity`)."""

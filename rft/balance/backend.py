@@ -12,8 +12,8 @@ import importlib.util
 from collections.abc import Iterator
 from contextvars import ContextVar
 
-from rft.checks import formatted, require
 from rft.laws.records import is_compilable
+from rft.refusal import Refusal, require
 
 BACKENDS = ("auto", "numpy", "numba")
 
@@ -25,9 +25,11 @@ class Note(UserWarning):
 def check(backend: str) -> None:
     """Raise ValueError unless a back end exists and is installed."""
     if not (isinstance(backend, str) and backend in BACKENDS):
-        raise ValueError(f"backend must be one of {', '.join(BACKENDS)}, got {formatted(backend)}")
+        raise Refusal(f"backend must be one of {', '.join(BACKENDS)}", value=backend)
     require(
-        backend != "numba" or installed(), "backend = 'numba' takes numba: pip install 'geomech[fast]', or take 'auto'"
+        backend != "numba" or installed(),
+        "backend = 'numba' takes numba",
+        instead="pip install 'geomech[fast]', or take 'auto'",
     )
 
 

@@ -16,6 +16,7 @@ from rft.contact import assemble
 from rft.effects.base import Effect, broken_premises, engine
 from rft.laws.base import Medium
 from rft.premise import negated
+from rft.refusal import Refusal
 
 STATUSES = np.array(["sliding", "stuck", "unconverged"])
 UNCONVERGED = 2
@@ -95,7 +96,9 @@ def body_velocity(
     """
     if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))
-        raise ValueError(f"no body velocity follows from shape alone where effects are {broken}: use rft.time_steps")
+        raise Refusal(
+            f"no body velocity follows from shape alone where effects are {broken}", instead="use rft.time_steps"
+        )
     assembly = assemble(medium, body, effects, loads, pieces)
     alpha, alphadot = checked_input(body, alpha, alphadot, regularisation, tolerance)
     check(backend)
@@ -143,7 +146,7 @@ def _guess(start, batch: tuple, length: float) -> np.ndarray:
     except ValueError:
         start = None
     if start is None:
-        raise ValueError(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
+        raise Refusal(f"start must be body velocities, {(*batch, 3)}, finite or nan where none is known")
     with np.errstate(over="ignore"):
         return start.reshape(-1, 3).T / [[length], [length], [1.0]]
 
@@ -157,22 +160,22 @@ def checked_input(body, alpha, alphadot, regularisation, tolerance) -> list[np.n
     for name, x, largest in (("alpha", alpha, 1e6), ("alphadot", alphadot, 1e100)):
         x = real_array(name, x)
         if x.ndim == 0 or x.shape[-1] != body.joints:
-            raise ValueError(f"{name} must have shape (..., {body.joints}) for this body, got {x.shape}")
+            raise Refusal(f"{name} must have shape (..., {body.joints}) for this body", value=x.shape)
         size = np.abs(x)
         if not size.max(initial=0.0) <= largest:
             if not np.isfinite(x).all():
-                raise ValueError(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
-            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+                raise Refusal(f"{name} must be finite, got {float(x[~np.isfinite(x)][0])}")
+            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         if (
             name == "alphadot"
             and size.min(initial=1.0) < LEAST_RATE
             and size.min(initial=1.0, where=size > 0) < LEAST_RATE
         ):
-            raise ValueError(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
+            raise Refusal(f"{name} must be 0 or of a size that leaves digits to compute with, got {x.ravel()[:4]}")
         arrays.append(x)
     if arrays[0].shape == arrays[1].shape:
         return arrays
     try:
         return np.broadcast_arrays(*arrays)
     except ValueError:
-        raise ValueError(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None
+        raise Refusal(f"alpha {arrays[0].shape} and alphadot {arrays[1].shape} do not broadcast") from None

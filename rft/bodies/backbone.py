@@ -13,7 +13,8 @@ import numpy as np
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.chain import Chain
-from rft.checks import Number, check_numbers, formatted, require
+from rft.checks import Number, check_numbers
+from rft.refusal import require
 
 
 @BODIES.register
@@ -89,7 +90,7 @@ class Serpenoid(Backbone):
     def __post_init__(self):
         super().__post_init__()
         in_bounds = 0 < self.waves <= self.elements / 4
-        require(in_bounds, f"waves must be > 0 and at most elements / 4, got {formatted(self.waves)}")
+        require(in_bounds, "waves must be > 0 and at most elements / 4", value=self.waves)
 
     @property
     def joints(self) -> int:
@@ -120,7 +121,7 @@ class ConstantCurvature(Backbone):
     def __post_init__(self):
         super().__post_init__()
         divides = self.elements % self.sections == 0
-        require(divides, f"sections must divide elements ({self.elements}), got {self.sections!r}")
+        require(divides, f"sections must divide elements ({self.elements})", value=self.sections)
 
     @property
     def joints(self) -> int:

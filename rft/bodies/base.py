@@ -7,8 +7,9 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import Number, formatted, require
+from rft.checks import Number
 from rft.laws.base import cached_if_immutable
+from rft.refusal import require
 from rft.registry import Registry, classes_with
 
 BODIES = Registry("geomech.bodies", "kind", "a body", classes_with("motion"))
@@ -84,7 +85,7 @@ class Body(Protocol):
 def checked_body(body) -> Body:
     """Return the body; ValueError unless it has the members of `Body`."""
     is_body = all(hasattr(body, name) for name in ("joints", "length", "motion")) and not isinstance(body, type)
-    require(is_body, f"body must be a body such as Chain((1, 1, 1)), got {formatted(body)}")
+    require(is_body, "body must be a body such as Chain((1, 1, 1))", value=body)
     return body
 
 

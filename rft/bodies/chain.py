@@ -12,7 +12,8 @@ import numpy as np
 
 from rft.bodies.base import BODIES, Elements, Length, numbered_labels
 from rft.bodies.modes import checked_modes, mode_rows
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
+from rft.refusal import require
 from rft.se2 import rotated
 
 
@@ -40,11 +41,11 @@ class Chain:
 
     def __post_init__(self):
         lengths = real_array("lengths", self.lengths)
-        require(lengths.ndim == 1, f"lengths must be a list of numbers, got {formatted(self.lengths)}")
+        require(lengths.ndim == 1, "lengths must be a list of numbers", value=self.lengths)
         object.__setattr__(self, "lengths", tuple(lengths.tolist()))
-        require(len(self.lengths) >= 2, f"lengths needs at least two links, got {len(self.lengths)}")
+        require(len(self.lengths) >= 2, "lengths needs at least two links", value=len(self.lengths))
         are_lengths = all(0 < x < math.inf for x in self.lengths) and sum(self.lengths) < 1e100
-        require(are_lengths, f"lengths must all be finite and > 0, got {formatted(list(self.lengths))}")
+        require(are_lengths, "lengths must all be finite and > 0", value=list(self.lengths))
         shortest = min(self.lengths) / sum(self.lengths)
         require(shortest >= 1e-12, f"the shortest link must be at least 1e-12 of the body, got {shortest:.3g}")
         object.__setattr__(self, "modes", checked_modes(self.modes, self.waves, len(self.lengths)))
@@ -90,10 +91,7 @@ class Chain:
         if text == "mean":
             return None
         match, n = re.fullmatch(r"link-([1-9]\d{0,6})", text), len(self.lengths)
-        require(
-            bool(match) and int(match[1]) <= n,
-            f"frame must be 'mean' or 'link-1' ... 'link-{n}', got {formatted(frame)}",
-        )
+        require(bool(match) and int(match[1]) <= n, f"frame must be 'mean' or 'link-1' ... 'link-{n}'", value=frame)
         return int(match[1]) - 1
 
     @cached_property
@@ -152,8 +150,8 @@ class Chain:
         alpha: (..., joints), rad. pose: (..., 3), pose of the body frame in the world, (x, y) in length units, theta in
         rad."""
         alpha, pose = np.asarray(alpha, float), np.asarray(pose, float)
-        require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last, got {alpha.shape}")
-        require(pose.shape[-1:] == (3,), f"pose must be (x, y, theta), got {pose.shape}")
+        require(alpha.shape[-1:] == (self.joints,), f"alpha must have {self.joints} angles last", value=alpha.shape)
+        require(pose.shape[-1:] == (3,), "pose must be (x, y, theta)", value=pose.shape)
         flat = alpha.reshape(-1, self.joints).T
         heading, _, centre, *_ = self._links(flat, np.zeros_like(flat))
         half = self._half_lengths * heading

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from rft.checks import formatted, require
 from rft.contact import Problem
 from rft.premise import NONE, SHAPE_ALONE, Premise
+from rft.refusal import Refusal, require
 from rft.registry import Registry, subclasses
 
 # Engines and what they solve, the cheapest first.
@@ -142,7 +142,7 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
         values = [getattr(e, field.name) for e in effects]
         if any(v != values[0] for v in values):
             if field.name not in first.batched:
-                raise ValueError(f"{first.kind}: {field.name} cannot differ within a batch")
+                raise Refusal(first.kind, instead=f"{field.name} cannot differ within a batch")
             joined[field.name] = np.repeat(np.array(values, float), counts)
     return first.with_parameters(**joined)
 
@@ -150,7 +150,7 @@ def batched_effect(effects: Sequence[Effect], counts: Sequence[int]) -> Effect:
 def broken_premises(effects: Sequence[Effect]) -> Premise:
     """Return the premises that the effects break; ValueError unless all are effects."""
     is_list = isinstance(effects, Sequence) and all(isinstance(e, Effect) for e in effects)
-    require(is_list, f"effects must be a list of effects such as EndCaps(radius=0.06), got {formatted(effects)}")
+    require(is_list, "effects must be a list of effects such as EndCaps(radius=0.06)", value=effects)
     return functools.reduce(operator.or_, (e.breaks for e in effects), NONE)
 
 

@@ -8,11 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from rft.balance.newton import to_element
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.contact import Problem
 from rft.effects.base import EFFECTS, Effect, Site
 from rft.momentum import MomentumRate, element_momenta, frame_to_ground, ground_to_frame
 from rft.premise import Premise
+from rft.refusal import require
 
 
 @EFFECTS.register
@@ -38,7 +39,11 @@ class BodyInertia(Effect):
 
     def __post_init__(self):
         check_numbers(self)
-        require(self.inertia <= 1e6, f"inertia is {self.inertia:.3g} times the axial drag: beyond 1e6 no gait settles")
+        require(
+            self.inertia <= 1000000.0,
+            f"inertia is {self.inertia:.3g} times the axial drag",
+            because="beyond 1e6 no gait settles",
+        )
 
     @property
     def inertia(self) -> Any:

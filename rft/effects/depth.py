@@ -7,10 +7,11 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
 from rft.contact import Contact, Problem
 from rft.effects.base import EFFECTS, Effect, Site
 from rft.premise import NONE, Premise
+from rft.refusal import Refusal, require
 
 
 @EFFECTS.register
@@ -40,7 +41,8 @@ class DepthProfile(Effect):
         along = real_array("along", self.along)
         require(
             along.ndim == 1 and along.size >= 2 and bool(((along > 0) & (along <= 1000)).all()),
-            f"along must be two depths or more, over the reference depth, > 0 to 1000, got {formatted(self.along)}",
+            "along must be two depths or more, over the reference depth, > 0 to 1000",
+            value=self.along,
         )
         object.__setattr__(self, "along", tuple(along.tolist()))
         check_numbers(self)
@@ -64,7 +66,9 @@ class DepthProfile(Effect):
             return level
         depth = level + self.slope * (site.centres(contact.elements) * np.exp(-1j * self.towards)).real
         if not (depth > 0).all(where=contact.buried > 0):
-            raise ValueError("the body comes to the surface: lower the slope of the depth profile, or run fewer cycles")
+            raise Refusal(
+                "the body comes to the surface", instead="lower the slope of the depth profile, or run fewer cycles"
+            )
         return depth
 
     @classmethod

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.contact import Contact, Problem
 from rft.effects.base import EFFECTS, Effect
 from rft.laws.granular import Granular
 from rft.link import dry_point
+from rft.refusal import require
 
 
 @EFFECTS.register

@@ -8,13 +8,14 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.contact import Problem
 from rft.effects.base import EFFECTS, Effect, Site
 from rft.laws.base import is_linear
 from rft.laws.catalogue import REPOSE
 from rft.link import Incline
 from rft.premise import Premise
+from rft.refusal import require
 
 
 @EFFECTS.register
@@ -51,13 +52,15 @@ class Slope(Effect):
         angle, repose = math.degrees(self.angle), math.degrees(self.repose)
         require(
             self.angle < self.repose,
-            f"a slope of {angle:.3g} degrees slides by itself: it must be below the angle of repose, {repose:.3g} degrees",
+            f"a slope of {angle:.3g} degrees slides by itself",
+            because=f"it must be below the angle of repose, {repose:.3g} degrees",
         )
         pull, drag = self.weight * math.sin(self.angle), math.sin(self.repose - self.angle) / math.sin(self.repose)
         require(
             pull < drag,
-            f"a body of this weight slides down: its pull along the slope, {pull:.3g} of the drag on level ground, must "
-            f"be below the drag downhill, {drag:.3g}",
+            "a body of this weight slides down",
+            because=f"its pull along the slope, {pull:.3g} of the drag on level ground, must be below "
+            f"the drag downhill, {drag:.3g}",
         )
 
     def check(self, medium) -> None:

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.contact import Contact, Problem
 from rft.effects.base import EFFECTS, Effect
 from rft.laws.base import speed_exponent
 from rft.laws.coulomb import Coulomb
+from rft.refusal import require
 
 
 @EFFECTS.register

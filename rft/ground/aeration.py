@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
+from rft.refusal import require
 
 
 @GROUND_EFFECTS.register
@@ -30,7 +31,9 @@ class Aeration(GroundEffect):
     def __post_init__(self):
         check_numbers(self)
         message = f"air_speed = {self.air_speed:g} m/s: the ground is fluidised from {self.fluidisation:g} m/s on"
-        require(self.air_speed < self.fluidisation, f"{message}, and no longer bears as this law says; give less")
+        require(
+            self.air_speed < self.fluidisation, f"{message}, and no longer bears as this law says", instead="give less"
+        )
 
     def apply(self, ground: Ground) -> Ground:
         return ground._replace(strength=ground.strength * (1.0 - self.air_speed / self.fluidisation))

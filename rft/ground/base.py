@@ -15,8 +15,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from rft.checks import formatted, require
 from rft.premise import NONE
+from rft.refusal import require
 from rft.registry import Registry, subclasses
 from rft.vectors import absolute, formula, maximum, minimum, sqrt, where
 
@@ -117,8 +117,8 @@ def checked_effects(effects) -> tuple[GroundEffect, ...]:
     """Return the effects as a tuple; ValueError for anything else in the list, and for a kind that stands twice, but for
     disturbed ground."""
     valid = isinstance(effects, Sequence) and all(isinstance(e, GroundEffect) for e in effects)
-    require(valid, f"effects must be a list of effects such as Aeration(0.01, 0.03), got {formatted(effects)}")
+    require(valid, "effects must be a list of effects such as Aeration(0.01, 0.03)", value=effects)
     kinds = [e.kind for e in effects]
     duplicates = sorted({k for k in kinds if kinds.count(k) > 1 and k != "disturbed-ground"})
-    require(not duplicates, f"{', '.join(duplicates)} stands twice in effects: keep one")
+    require(not duplicates, f"{', '.join(duplicates)} stands twice in effects", instead="keep one")
     return tuple(effects)

@@ -7,9 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
 from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
 from rft.premise import Premise
+from rft.refusal import require
 
 MOST_PLACES = 1000
 
@@ -38,7 +39,7 @@ class DisturbedGround(GroundEffect):
     def __post_init__(self):
         places = real_array("places", self.places)
         valid = places.ndim == 1 and 1 <= places.size <= MOST_PLACES and bool((np.abs(places) <= 1e3).all())
-        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000, got {formatted(self.places)}")
+        require(valid, f"places must be 1 to {MOST_PLACES} numbers in m, within 1000", value=self.places)
         object.__setattr__(self, "places", tuple(places.tolist()))
         check_numbers(self)
 

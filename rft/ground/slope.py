@@ -6,9 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from rft.checks import Number, check_numbers, require
+from rft.checks import Number, check_numbers
 from rft.ground.base import GROUND_EFFECTS, Ground, GroundEffect
-from rft.laws.catalogue import GRAVITY, REPOSE
+from rft.laws.catalogue import REPOSE
+from rft.metres import GRAVITY
+from rft.refusal import require
 
 
 @GROUND_EFFECTS.register

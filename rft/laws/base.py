@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rft.checks import formatted, require
+from rft.refusal import Refusal, require
 from rft.registry import Registry, classes_with
 from rft.vectors import formula, sqrt, where
 
@@ -165,7 +165,7 @@ def is_odd(medium: Medium) -> bool:
 def require_law(medium: Medium) -> None:
     """Raise ValueError unless a medium has a `traction` that takes and returns arrays."""
     is_law = hasattr(medium, "traction") and not isinstance(medium, type)
-    require(is_law, f"medium must be a force law such as Granular(C=1.8, gamma0=0.24), got {formatted(medium)}")
+    require(is_law, "medium must be a force law such as Granular(C=1.8, gamma0=0.24)", value=medium)
     if is_closed(medium):
         return
     name = f"{type(medium).__name__}.traction"
@@ -174,12 +174,13 @@ def require_law(medium: Medium) -> None:
             f_t, f_n = medium.traction(1.0, 0.0)
             f_t, f_n = medium.traction(np.ones((2, 3)), np.zeros((2, 3)), 1e-6)
     except TypeError as error:
-        raise ValueError(
-            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), rounding being the speed below which dry "
-            f"friction is rounded off: {error}"
+        raise Refusal(
+            f"{name} must take (v_t, v_n, rounding=0.0) and return (f_t, f_n), rounding being "
+            "the speed below which dry friction is rounded off",
+            because=str(error),
         ) from error
     except Exception as error:
-        raise ValueError(f"{name} fails: {type(error).__name__}: {error}") from error
+        raise Refusal(f"{name} fails", because=f"{type(error).__name__}: {error}") from error
     shapes = np.shape(f_t), np.shape(f_n)
     broadcasts = set(shapes) <= {(), (1,), (2, 3)}
     require(broadcasts, f"{name} must return arrays of the velocities' shape (2, 3), got {shapes[0]} and {shapes[1]}")
@@ -202,12 +203,12 @@ def require_drag(medium: Medium) -> None:
         f_t, f_n = medium.traction(v_t, v_n)
         cosine = (f_t * v_t + f_n * v_n) / (np.hypot(f_t, f_n) * SPEEDS)  # 1 straight against the motion
     name, cosine = type(medium).__name__, np.nan_to_num(cosine)
-    require(bool((cosine > 0).any()), f"{name} has no drag at any velocity: give its traction a positive one")
+    require(bool((cosine > 0).any()), f"{name} has no drag at any velocity", instead="give its traction a positive one")
     worst = np.unravel_index(np.argmin(cosine), cosine.shape)
     require(
-        cosine[worst] > -1e-9,  # roundoff, in laws that hardly drag along the body
-        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body: "
-        "drag is positive in the direction of the motion it opposes, change its sign there",
+        cosine[worst] > -1e-09,
+        f"{name} pushes instead of drags at velocity ({v_t[worst]:.3g}, {v_n[worst]:.3g}) along and across the body",
+        because="drag is positive in the direction of the motion it opposes, change its sign there",
     )
 
 

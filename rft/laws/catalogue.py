@@ -10,6 +10,7 @@ from rft.laws.coulomb import Coulomb
 from rft.laws.granular import Granular
 from rft.laws.surface import Surface
 from rft.laws.viscous import Viscous
+from rft.metres import GRAVITY
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,6 @@ class Entry:
 
 # From the paper's one datum: on a surface tilted by 20 degrees motion downhill has 50 % less drag (Sec. IV B).
 REPOSE = math.atan(math.sin(math.radians(20.0)) / (math.cos(math.radians(20.0)) - 0.5))  # rad, 37.9 degrees
-GRAVITY = 9.81  # m/s^2
 DEPTH = 0.0762  # m, of the rods whose drag gave the axial stresses of the catalogue
 GLASS = 2500.0  # kg/m^3, soda-lime glass, assumed
 PACKED = {"loose": 0.58, "close": 0.62}  # volume fractions, Zhang and Goldman (2014), caption of Fig. 9

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import real_array, require
+from rft.checks import real_array
 from rft.drag import rod_drag
 from rft.laws.base import LAWS, require_drag
 from rft.laws.granular import Granular
+from rft.refusal import require
 from rft.vectors import absolute, copysign, floor, formula, gather, minimum, sqrt, where
 
 MOST_ROWS = 10_000
@@ -50,12 +51,16 @@ class Table:
             require(bool(np.isfinite(x).all()), f"{name} must be finite numbers")
             object.__setattr__(self, name, tuple(x.tolist()))
         largest = np.abs(rows[0]).max()
-        require(largest <= 2 * np.pi + 1e-9, f"psi is in rad, at most 2 pi, got {largest:g}: write psi_deg for degrees")
+        require(
+            largest <= 2 * np.pi + 1e-09,
+            f"psi is in rad, at most 2 pi, got {largest:g}",
+            instead="write psi_deg for degrees",
+        )
         data = rod_drag(np.degrees(rows[0]), *rows[1:])
         require(
             data.psi.min() <= LARGEST_GAP
             and data.psi.max() >= np.pi / 2 - LARGEST_GAP
-            and len(np.unique(data.psi.round(9))) > 2,
+            and (len(np.unique(data.psi.round(9))) > 2),
             "the angles must come within 15 degrees of 0 and of 90, with at least one more between",
         )
         along, across = (_monotone_curve(x, f) for x, f in zip((np.cos(data.psi), np.sin(data.psi)), data.forces))

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import formatted, require
 from rft.ground.lead import rounded
 from rft.plates.stress import PER_CUBIC_METRE, StressMap
+from rft.refusal import formatted, require
 
 CUT = 0.05  # width, in n . v times the cosine between stress and n, over which a cut of tension is rounded
 SHARPEST = 2e-3  # least sine of the angle over which stress rises: implicit time steps cannot solve a jump

@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.checks import real_array, require
+from rft.checks import real_array
 from rft.ground import Ground, GroundEffect, ground_of
 from rft.meshes.contact import Motion, Part, load
 from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh, below
 from rft.meshes.submerged import submerged
+from rft.refusal import require
 
 
 class Wrench(NamedTuple):
@@ -50,12 +51,12 @@ def wrench(
     world."""
     rotation = real_array("rotation", rotation)
     place, velocity, spin = (real_array(n, x) for n, x in (("place", place), ("velocity", velocity), ("spin", spin)))
-    require(rotation.shape[-2:] == (3, 3), f"rotation must be (..., 3, 3), got {rotation.shape}")
+    require(rotation.shape[-2:] == (3, 3), "rotation must be (..., 3, 3)", value=rotation.shape)
     skewness = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0)
     proper = skewness < 1e-9 and np.all(np.linalg.det(rotation) > 0)
-    require(bool(proper), "rotation must be rotation matrices: orthogonal, with determinant 1")
+    require(bool(proper), "rotation must be rotation matrices", because="orthogonal, with determinant 1")
     for name, x in (("place", place), ("velocity", velocity), ("spin", spin)):
-        require(x.shape[-1:] == (3,) and bool(np.isfinite(x).all()), f"{name} must be finite (..., 3), got {x.shape}")
+        require(x.shape[-1:] == (3,) and bool(np.isfinite(x).all()), f"{name} must be finite (..., 3)", value=x.shape)
     shape = np.broadcast_shapes(rotation.shape[:-2], place.shape[:-1], velocity.shape[:-1], spin.shape[:-1])
     rotation = np.broadcast_to(rotation, (*shape, 3, 3)).reshape(-1, 3, 3)
     place, velocity, spin = (np.broadcast_to(x, (*shape, 3)).reshape(-1, 3) for x in (place, velocity, spin))

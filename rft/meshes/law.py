@@ -24,11 +24,12 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, in_range, require
+from rft.checks import Number, check_numbers, in_range
 from rft.ground.lead import jump, smoothstep
+from rft.metres import GRAVITY
+from rft.refusal import require
 
 TENSION = ("cut", "keep", "push")
-GRAVITY = 9.81  # m/s^2
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT = 1e-9  # |n . z| of faces that are vertical but for roundoff
 
@@ -115,7 +116,7 @@ class Spatial:
 
     def __post_init__(self):
         check_numbers(self)
-        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}, got {formatted(self.tension)}")
+        require(self.tension in TENSION, f"tension must be one of {', '.join(TENSION)}", value=self.tension)
 
     @classmethod
     def from_grains(cls, density: float, friction: float, **more) -> Spatial:

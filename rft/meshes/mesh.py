@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from rft.checks import formatted, real_array, require
+from rft.checks import real_array
 from rft.metres import LARGEST
+from rft.refusal import Refusal, formatted, located, require
 
 MOST_TRIANGLES = 2_000_000  # triangles
 LARGEST_FILE = 500_000_000  # bytes
@@ -35,13 +34,13 @@ class Mesh:
 
     def __post_init__(self):
         vertices, faces = real_array("vertices", self.vertices), np.asarray(self.faces)
-        require(vertices.ndim == 2 and vertices.shape[1:] == (3,), f"vertices must be (V, 3), got {vertices.shape}")
+        require(vertices.ndim == 2 and vertices.shape[1:] == (3,), "vertices must be (V, 3)", value=vertices.shape)
         valid = faces.ndim == 2 and faces.shape[1:] == (3,) and faces.dtype.kind in "iu"
         require(valid, f"faces must be (F, 3) whole numbers, got {faces.dtype} {faces.shape}")
         require(0 < len(faces) <= MOST_TRIANGLES, f"a mesh has 1 to {MOST_TRIANGLES:,} triangles, got {len(faces):,}")
         require(bool(np.isfinite(vertices).all()), "vertices must be finite")
         _require_known(faces, len(vertices))
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
+        require(isinstance(self.closed, bool), "closed must be true or false", value=self.closed)
         normals = None if self.smooth_normals is None else real_array("smooth_normals", self.smooth_normals)
         valid = normals is None or (normals.shape == (len(faces), 3, 3) and bool(np.isfinite(normals).all()))
         require(valid, f"smooth_normals must be unit normals of shape ({len(faces)}, 3, 3)")
@@ -49,7 +48,7 @@ class Mesh:
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces.astype(np.int64))
         flat = int((self.areas <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2).sum())
-        require(not flat, f"{flat} of {len(faces)} triangles have no area: clean the mesh")
+        require(not flat, f"{flat} of {len(faces)} triangles have no area", because="clean the mesh")
         if self.closed:
             self._require_closed()
 
@@ -59,13 +58,22 @@ class Mesh:
         reversed_edges = np.sort(self._codes(self.faces[:, [1, 2, 0]], self.faces))
         require(
             bool((np.diff(edges) > 0).all()),
-            "the mesh has an edge that two triangles run along the same way: some are turned inside out, or there are doubles",
+            "the mesh has an edge that two triangles run along the same way",
+            because="some are turned inside out, or there are doubles",
         )
         open_edges = np.setdiff1d(edges, reversed_edges).size
         require(
-            not open_edges, f"the mesh is open: {open_edges} edges have one triangle; close it, or say closed = false"
+            not open_edges,
+            "the mesh is open",
+            because=f"{open_edges} edges have one triangle",
+            instead="close it, or say closed = false",
         )
-        require(self.volume > 0, "the mesh is inside out: its normals point inwards; turn the triangles round")
+        require(
+            self.volume > 0,
+            "the mesh is inside out",
+            because="its normals point inwards",
+            instead="turn the triangles round",
+        )
 
     def _codes(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return one whole number for each pair of vertices."""
@@ -188,32 +196,26 @@ def mirrored(mesh: Mesh) -> Mesh:
 def read(path, closed: bool = True, scale: float = 1.0) -> Mesh:
     """Return the mesh of an STL, OBJ or PLY file, with lengths times ``scale``, 0.001 for millimetres. Needs trimesh."""
     kind = str(path).rpartition(".")[2].lower()
-    require(kind in ("stl", "obj", "ply"), f"{path}: a mesh is an .stl, .obj or .ply file")
+    require(kind in ("stl", "obj", "ply"), "a mesh is an .stl, .obj or .ply file", where=path)
     vertices, faces = _loaded(Path(path), kind)
-    require(faces.ndim == 2 and len(faces) > 0, f"{path} is no {kind.upper()} mesh: it has no triangles")
-    with _named(path):
+    require(faces.ndim == 2 and len(faces) > 0, f"{path} is no {kind.upper()} mesh", because="it has no triangles")
+    with located(path):
         _require_known(faces, len(vertices))
     merged, index = np.unique(vertices, axis=0, return_inverse=True)  # an STL file has three vertices for each triangle
     size = scale * float(np.ptp(merged, axis=0).max())
-    message = f"{path}: the mesh is {size:.4g} m large, beyond {LARGEST:g} m: give scale, 0.001 if it is in mm"
-    require(not size > LARGEST, message)
-    with _named(path):
+    with located(path):
+        require(
+            not size > LARGEST,
+            f"the mesh is {size:.4g} m large, beyond {LARGEST:g} m",
+            instead="give scale, 0.001 if it is in mm",
+        )
         return Mesh(merged * scale, index.reshape(-1)[faces], closed)
-
-
-@contextlib.contextmanager
-def _named(path) -> Iterator[None]:
-    """Put the file's name before the text of a ValueError."""
-    try:
-        yield
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
 
 
 def _require_known(faces: np.ndarray, count: int) -> None:
     """Raise ValueError if faces name vertices other than 0 to count - 1."""
     for bad in faces[(faces < 0) | (faces >= count)][:1]:
-        raise ValueError(f"a face names vertex {bad}, where vertices are 0 to {count - 1}: mend the mesh")
+        raise Refusal(f"a face names vertex {bad}, where vertices are 0 to {count - 1}", instead="mend the mesh")
 
 
 # Lines of an OBJ file: a face with a vertex 0, a face with a vertex below 0, and a vertex.
@@ -225,10 +227,12 @@ ZERO, BACK, VERTEX = (
 def _require_read_rightly(data: bytes) -> None:
     """Raise ValueError for an OBJ file that trimesh misreads: it takes vertex 0 for the last one, and counts vertices below 0
     back from the end of the file, where OBJ counts back from the face."""
-    require(not ZERO.search(data), "a face names vertex 0, where vertices count from 1: mend the mesh")
+    require(not ZERO.search(data), "a face names vertex 0, where vertices count from 1", instead="mend the mesh")
     back = BACK.search(data)
     valid = back is None or not VERTEX.search(data, back.end())
-    require(valid, "a face counts vertices back, and vertices follow it: count from 1, or put all vertices first")
+    require(
+        valid, "a face counts vertices back, and vertices follow it", instead="count from 1, or put all vertices first"
+    )
 
 
 def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
@@ -236,19 +240,23 @@ def _loaded(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
     try:
         import trimesh
     except ImportError:
-        raise ValueError(f"{path}: reading a mesh needs trimesh: pip install 'geomech[mesh]'") from None
+        raise Refusal("reading a mesh needs trimesh", where=path, instead="pip install 'geomech[mesh]'") from None
     try:
         size = path.stat().st_size
         require(path.is_file(), f"{path} is no ordinary file")
-        require(size <= LARGEST_FILE, f"{path} is larger than {LARGEST_FILE / 1e6:.0f} MB: give fewer triangles")
+        require(
+            size <= LARGEST_FILE,
+            f"{path} is larger than {LARGEST_FILE / 1000000.0:.0f} MB",
+            instead="give fewer triangles",
+        )
         data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"cannot read mesh {path}: {error.strerror}") from None
+        raise Refusal(f"cannot read mesh {path}", because=error.strerror) from None
     if kind == "obj":
-        with _named(path):
+        with located(path):
             _require_read_rightly(data)
     try:
         mesh = trimesh.load(io.BytesIO(data), file_type=kind, force="mesh", process=False)
         return np.asarray(mesh.vertices, float), np.asarray(getattr(mesh, "faces", ()))
     except Exception as error:  # trimesh raises many kinds of errors for a file that is no mesh
-        raise ValueError(f"{path} is no {kind.upper()} mesh: {formatted(str(error))}") from None
+        raise Refusal(f"{path} is no {kind.upper()} mesh", because=formatted(str(error))) from None

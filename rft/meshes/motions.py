@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
 from rft.meshes.mesh import Mesh
 from rft.metres import LARGEST, metres
 from rft.prescribed import FARTHEST, MOST_SAMPLES, Depth, Direction, Distance, Height, Motion, Samples
+from rft.refusal import require
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -116,7 +117,7 @@ class Rotate(Motion):
         axis = real_array("axis", self.axis)
         size = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
         valid = 1e-9 < size < 1e9
-        require(valid, f"axis must be three numbers that are not all 0, such as [0, 1, 0], got {formatted(self.axis)}")
+        require(valid, "axis must be three numbers that are not all 0, such as [0, 1, 0]", value=self.axis)
         object.__setattr__(self, "axis", tuple(axis.tolist()))
         _set_attitude(self)
 
@@ -155,16 +156,18 @@ class Path(Motion):
             largest, unit = {"x": (FARTHEST, " m"), "y": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(name, (1e9, ""))
             within = bool((np.abs(values) <= largest).all())
             require(within, f"{name} must be finite and within {largest:g}{unit}")
-        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses, got {len(self.t)}")
+        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses", value=len(self.t))
         same = len(self.x) == len(self.y) == len(self.z) == len(self.t)
         all_or_none = {len(self.rx), len(self.ry), len(self.rz)} in ({0}, {len(self.t)})
         require(same and all_or_none, "t, x, y, z and rx, ry, rz must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
-        require(not late.size, f"t must ascend, but t = {self.t[late[0]] if late.size else 0:g} is not before the next")
+        require(
+            not late.size, f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next"
+        )
         rotation = self._rotations()
         wide = np.flatnonzero((rotation[1:] * rotation[:-1].inv()).magnitude() >= WIDEST)
         after = f"after t = {self.t[wide[0]] if wide.size else 0:g}"
-        require(not wide.size, f"the body turns by {WIDEST:g} rad or more {after}: give poses between")
+        require(not wide.size, f"the body turns by {WIDEST:g} rad or more {after}", instead="give poses between")
 
     @property
     def samples(self) -> int:
@@ -213,7 +216,7 @@ def _set_attitude(motion) -> None:
     array = real_array("attitude", value)
     valid = array.shape in ((), (3,)) and bool((np.abs(array) <= 10.0).all())
     message = "attitude must be an angle about y or a rotation vector of three numbers, within 10 rad"
-    require(valid, f"{message}, got {formatted(value)}")
+    require(valid, message, value=value)
     vector = array.tolist() if array.ndim else [0.0, float(array), 0.0]
     object.__setattr__(motion, "attitude", tuple(vector))
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rft.checks import in_range, require
+from rft.checks import in_range
 from rft.meshes.mesh import Mesh, subdivided
+from rft.refusal import require
 
 
 def sphere(radius: float, fineness: int = 4) -> Mesh:

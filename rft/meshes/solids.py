@@ -9,12 +9,13 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, in_range, require
+from rft.checks import Number, check_numbers, in_range
 from rft.meshes import shapes
 from rft.meshes.blade import blade
 from rft.meshes.mesh import MOST_TRIANGLES, Mesh, mirrored, quartered, read
 from rft.meshes.smooth import smooth
 from rft.metres import metres
+from rft.refusal import require
 
 FINEST = 327_680  # triangles of the mesh that stands for the truth in studies of accuracy
 HANDS = ("right", "left")
@@ -96,8 +97,12 @@ class Screw(Solid):
         message = "thickness must be 0, or from a thousandth of the pitch to less than that"
         within = self.thickness == 0 or 1e-3 * self.pitch <= self.thickness < self.pitch
         require(within, f"{message}, got {self.thickness:g} and {self.pitch:g}")
-        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}, got {formatted(self.handed)}")
-        require(self.turns <= MOST_TURNS, f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}: length / pitch")
+        require(self.handed in HANDS, f"handed must be one of {', '.join(HANDS)}", value=self.handed)
+        require(
+            self.turns <= MOST_TURNS,
+            f"the thread has {self.turns:.4g} turns, beyond {MOST_TURNS}",
+            because="length / pitch",
+        )
 
     @property
     def turns(self) -> float:
@@ -182,10 +187,10 @@ class MeshFile(Solid):
     smooth: bool = False
 
     def __post_init__(self):
-        require(isinstance(self.file, str), f"file must be the name of a mesh, got {formatted(self.file)}")
+        require(isinstance(self.file, str), "file must be the name of a mesh", value=self.file)
         check_numbers(self)
-        require(isinstance(self.closed, bool), f"closed must be true or false, got {formatted(self.closed)}")
-        require(isinstance(self.smooth, bool), f"smooth must be true or false, got {formatted(self.smooth)}")
+        require(isinstance(self.closed, bool), "closed must be true or false", value=self.closed)
+        require(isinstance(self.smooth, bool), "smooth must be true or false", value=self.smooth)
         mesh = read(self.file, self.closed, self.scale)
         mesh = smooth(mesh) if self.smooth else mesh
         object.__setattr__(self, "_mesh", mesh if self.closed else mesh.two_sided)

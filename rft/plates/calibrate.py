@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rft.calibrate import student_factor
-from rft.checks import in_range, real_array, require
+from rft.checks import in_range, real_array
 from rft.plates.stress import COEFFICIENTS, PER_CUBIC_METRE, StressMap
+from rft.refusal import require
 
 GENERIC = np.array([getattr(StressMap(), name) for name in COEFFICIENTS])
 SPREAD = 0.2  # N/cm^3 over zeta, assumed: four times the most that named media with own coefficients differ by
@@ -138,11 +139,11 @@ def fit_zeta(depth, force, area) -> ZetaFit:
     order = order[depth[order] > 1 / LARGEST]
     needed = f"{FEWEST_DEPTHS} to {MOST_ROWS} depths below the surface are needed"
     within = FEWEST_DEPTHS <= order.size <= MOST_ROWS
-    require(within, f"{needed}, got {order.size}: depth is positive downwards")
+    require(within, f"{needed}, got {order.size}", because="depth is positive downwards")
     d, f, a = depth[order], force[order], np.broadcast_to(area, depth.shape)[order]
     per_zeta = float(StressMap()(0.0, math.pi / 2)[1]) * PER_CUBIC_METRE * a * d
     zeta = float(per_zeta @ f / (per_zeta @ per_zeta))
-    require(zeta > 0, "the force is against the law: it must be positive where grains push the plate upwards")
+    require(zeta > 0, "the force is against the law", because="it must be positive where grains push the plate upwards")
     check_strength(zeta, "depth in m, force in N, area in m^2")
     residuals = f - zeta * per_zeta
     error = math.sqrt((residuals @ residuals) / (len(f) - 1) / (per_zeta @ per_zeta))
@@ -166,7 +167,7 @@ def _drags(beta, gamma, alpha_x, alpha_z) -> np.ndarray:
     rows = np.stack(rows)
     require(bool((np.abs(rows) <= LARGEST).all()), f"plate drags must be finite numbers of at most {LARGEST:g}")
     in_range("number of plate drags", rows.shape[1], FEWEST_DRAGS, MOST_ROWS, whole=True)
-    require(bool((np.abs(rows[2:]) > 1 / LARGEST).any()), "the plate drags are all 0: measure some force")
+    require(bool((np.abs(rows[2:]) > 1 / LARGEST).any()), "the plate drags are all 0", instead="measure some force")
     return rows
 
 

@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.backend import check, compiles
-from rft.checks import real_array, require
+from rft.checks import real_array
 from rft.ground import Ground, GroundEffect, ground_of
 from rft.plates.contact import Element, Motion, Part, elements, leading_part, load, record, sides
 from rft.plates.outline import Outline
 from rft.plates.stress import PlateStress
+from rft.refusal import require
 
 ORDER = {"keep": 2, "cut": 1}  # of the error in 1 / elements, by `PlateStress.tension`: a cut jumps inside an element
 
@@ -91,6 +92,6 @@ def parts(outline: Outline, pose, twist, side: float = 1.0) -> Part:
 def _triples(name: str, values) -> np.ndarray:
     """Return poses or twists as an array (..., 3); ValueError unless they are finite numbers of that shape."""
     values = real_array(name, values)
-    require(values.ndim > 0 and values.shape[-1] == 3, f"{name} must have shape (..., 3), got {values.shape}")
+    require(values.ndim > 0 and values.shape[-1] == 3, f"{name} must have shape (..., 3)", value=values.shape)
     require(bool(np.isfinite(values).all()), f"{name} must be finite")
     return values

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rft.checks import real_array, require
+from rft.checks import real_array
 from rft.plates.stress import GRAZING, Grazing, PlateStress, Zeta
+from rft.refusal import require
 
 FARTHEST = 35.0  # degrees from any pair of angles to the nearest measured one, assumed: 32 in a grid of 45 degrees
 MOST_PLATES = 5000
@@ -36,7 +37,7 @@ class PlateDrags(PlateStress):
         for name in ("beta", "gamma", "alpha_x", "alpha_z"):
             values = real_array(name, getattr(self, name))
             require(values.ndim == 1, f"{name} must be a list of numbers")
-            require(bool((np.abs(values) <= 1e6).all()), f"{name} must be finite numbers of at most 1e6")
+            require(bool((np.abs(values) <= 1000000.0).all()), f"{name} must be finite numbers of at most 1e6")
             object.__setattr__(self, name, tuple(map(float, values)))
         sizes = {len(x) for x in (self.beta, self.gamma, self.alpha_x, self.alpha_z)}
         require(len(sizes) == 1, "beta, gamma, alpha_x and alpha_z must be equally many")

@@ -9,10 +9,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, real_array, require
+from rft.checks import Number, check_numbers, real_array
 from rft.metres import LARGEST, metres
 from rft.plates.outline import Outline
 from rft.prescribed import FARTHEST, MOST_SAMPLES, Depth, Direction, Distance, Height, Motion, Samples
+from rft.refusal import require
 
 Speed = Annotated[float, Number(1e-9, 1e3, "m/s", "speed; it changes no force")]
 Attitude = Annotated[float, Number(-10, 10, "rad", "angle at which the body is held")]
@@ -113,11 +114,13 @@ class Path(Motion):
             largest, unit = {"x": (FARTHEST, " m"), "z": (LARGEST, " m")}.get(name, (1e9, ""))
             within = all(abs(v) <= largest for v in getattr(self, name))
             require(within, f"{name} must be finite and within {largest:g}{unit}")
-        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses, got {len(self.t)}")
+        require(3 <= len(self.t) <= MOST_SAMPLES, f"a path takes 3 to {MOST_SAMPLES} poses", value=len(self.t))
         same = len(self.x) == len(self.z) == len(self.t) and len(self.angle) in (0, len(self.t))
         require(same, "t, x, z and angle must be equally many")
         late = np.flatnonzero(np.diff(self.t) <= 0)
-        require(not late.size, f"t must ascend, but t = {self.t[late[0]] if late.size else 0:g} is not before the next")
+        require(
+            not late.size, f"t must ascend, but t = {(self.t[late[0]] if late.size else 0):g} is not before the next"
+        )
 
     @property
     def samples(self) -> int:

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import check_numbers, real_array, require
+from rft.checks import check_numbers, real_array
 from rft.metres import LARGEST, metres
+from rft.refusal import require
 
 MOST_ELEMENTS = 5000
 FEW_ELEMENTS = 500  # elements up to which all pairs are compared at once, without loading SciPy's tree
@@ -93,16 +94,21 @@ def _check_simple(points, closed: bool) -> None:
     along = np.diff(points, axis=0)
     lengths, size = np.hypot(*along.T), np.ptp(points, axis=0).max()
     short = np.flatnonzero(lengths <= 1e-12 * size)
-    require(not short.size, f"points {short[:1]} and the next are the same: keep one")
+    require(not short.size, f"points {short[:1]} and the next are the same", instead="keep one")
     last = along[1:] if not closed else np.roll(along, -1, 0)
     first = along[:-1] if not closed else along
     back = (np.abs(_cross(first, last)) <= 1e-12 * size**2) & ((first * last).sum(-1) < 0)
     require(
         not back.any(),
-        f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}: drop the point there",
+        f"the outline turns back onto itself after element {np.flatnonzero(back)[:1]}",
+        instead="drop the point there",
     )
     i, j = _crossings(points, along, closed)
-    require(not i.size, f"elements {i[:1]} and {j[:1]} of the outline cross or touch: order its points along the edge")
+    require(
+        not i.size,
+        f"elements {i[:1]} and {j[:1]} of the outline cross or touch",
+        instead="order its points along the edge",
+    )
 
 
 def _close(points, reach: float) -> np.ndarray:

@@ -12,9 +12,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, in_range, real_array, require
+from rft.checks import Number, check_numbers, in_range, real_array
 from rft.metres import LARGEST, metres
 from rft.plates.outline import MOST_ELEMENTS, Outline
+from rft.refusal import require
 
 FEWEST_ROUND = 8  # elements of a curve
 MOST_POINTS = 2000  # of a polygon or spline
@@ -80,8 +81,7 @@ class HalfCylinder(Shape):
     def __post_init__(self):
         super().__post_init__()
         require(
-            isinstance(self.flat, str) and self.flat in ("down", "up"),
-            f"flat must be 'down' or 'up', got {formatted(self.flat)}",
+            isinstance(self.flat, str) and self.flat in ("down", "up"), "flat must be 'down' or 'up'", value=self.flat
         )
 
     def curve(self, elements: int):
@@ -163,7 +163,9 @@ class Wheel(Shape):
     def __post_init__(self):
         super().__post_init__()
         if not self.lugs:
-            require(self.lug_height == self.lug_width == 0, "lug_height and lug_width need lugs: say how many")
+            require(
+                self.lug_height == self.lug_width == 0, "lug_height and lug_width need lugs", instead="say how many"
+            )
             return
         for name in ("lug_height", "lug_width"):
             in_range(name, getattr(self, name), 1e-6, LARGEST, unit="m")
@@ -275,15 +277,15 @@ def _subdivided(points, elements: int):
 
 def _checked_points(points, closed) -> tuple[tuple[float, float], ...]:
     """Return the points as pairs of numbers, without a last one that repeats the first; ValueError for bad ones."""
-    require(isinstance(closed, bool), f"closed must be true or false, got {formatted(closed)}")
+    require(isinstance(closed, bool), "closed must be true or false", value=closed)
     array = real_array("points", points)
-    require(array.ndim == 2 and array.shape[1] == 2, f"points must be a list of (x, z), got {formatted(points)}")
+    require(array.ndim == 2 and array.shape[1] == 2, "points must be a list of (x, z)", value=points)
     if closed and len(array) > 1 and (array[0] == array[-1]).all():
         array = array[:-1]
     fewest = 3 if closed else 2
     kind = "closed" if closed else "open"
     valid = fewest <= len(array) <= MOST_POINTS
-    require(valid, f"a {kind} outline takes {fewest} to {MOST_POINTS} points, got {len(array)}")
+    require(valid, f"a {kind} outline takes {fewest} to {MOST_POINTS} points", value=len(array))
     require(bool((np.abs(array) <= LARGEST).all()), f"points must be finite and within {LARGEST:g} m")
     return tuple(map(tuple, array.tolist()))
 

@@ -13,7 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
+from rft.refusal import require
 from rft.vectors import absolute, formula, where
 
 PER_CUBIC_METRE = 1e6  # N/m^3 in one N/cm^3
@@ -91,7 +92,7 @@ class PlateStress:
         """Raise ValueError for numbers out of range and for an unknown tension."""
         check_numbers(self)
         valid = isinstance(self.tension, str) and self.tension in TENSION
-        require(valid, f"tension must be {' or '.join(map(repr, TENSION))}, got {formatted(self.tension)}")
+        require(valid, f"tension must be {' or '.join(map(repr, TENSION))}", value=self.tension)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rft.checks import check_numbers, formatted, require
+from rft.checks import check_numbers
 from rft.meshes import Mesh, Screw, shapes
 from rft.metres import LARGEST, metres
+from rft.refusal import formatted, require
 from rft.walking.robot import Mass, Robot
 
 PAIRS = ("mirrored", "alike")
@@ -39,9 +40,11 @@ class Screws(Robot):
     def __post_init__(self):
         check_numbers(self)
         require(
-            isinstance(self.screw, Screw), f"a robot without screws: screw must be a Screw, got {formatted(self.screw)}"
+            isinstance(self.screw, Screw),
+            "a robot without screws",
+            because=f"screw must be a Screw, got {formatted(self.screw)}",
         )
-        require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}, got {formatted(self.pair)}")
+        require(self.pair in PAIRS, f"pair must be one of {', '.join(PAIRS)}", value=self.pair)
         message = f"screws of radius {self.screw.radius:g} m meet: track must be more than {2 * self.screw.radius:g} m"
         require(self.track > 2 * self.screw.radius, message)
 

@@ -10,8 +10,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from rft.laws.catalogue import GRAVITY
 from rft.meshes.mesh import Mesh
+from rft.metres import GRAVITY
 from rft.walking.craft import Screws
 from rft.walking.facets import Surface
 from rft.walking.hexapod import (

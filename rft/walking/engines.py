@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from rft.checks import Number, check_numbers, formatted, require
+from rft.checks import Number, check_numbers
 from rft.ground import Ground, GroundEffect, checked_effects, ground_of
 from rft.meshes.law import Spatial
 from rft.plates.stress import PlateStress
+from rft.refusal import Refusal, formatted, require
 from rft.walking.robot import SMALLEST, Robot, Tripod
 from rft.walking.stride import Walk, compute_stride
 
@@ -28,10 +29,14 @@ class Walker:
     def __post_init__(self):
         for name, kind in (("robot", Robot), ("gait", Tripod), ("stress", PlateStress | Spatial)):
             value, kinds = getattr(self, name), getattr(kind, "__name__", "PlateStress or Spatial")
-            require(isinstance(value, kind), f"{name} must be a {kinds}, got {formatted(value)}")
+            require(isinstance(value, kind), f"{name} must be a {kinds}", value=value)
         object.__setattr__(self, "effects", checked_effects(self.effects))
         for effect in self.effects:
-            require(effect.walks, f"walking takes the effects aeration and grain-inertia, not {effect.kind}: drop it")
+            require(
+                effect.walks,
+                f"walking takes the effects aeration and grain-inertia, not {effect.kind}",
+                instead="drop it",
+            )
 
     @property
     def ground(self) -> Ground:
@@ -63,7 +68,7 @@ class Fineness:
 
     def __post_init__(self):
         valid = self.engine is None or (isinstance(self.engine, str) and self.engine in ENGINES)
-        require(valid, f"engine must be one of {', '.join(ENGINES)}, got {formatted(self.engine)}")
+        require(valid, f"engine must be one of {', '.join(ENGINES)}", value=self.engine)
         check_numbers(self)
 
 
@@ -108,17 +113,17 @@ class Engine(Protocol):
 
 def engine(name: str) -> Engine:
     """Return the engine of a name; ValueError for unknown engines and those that are not installed."""
-    require(
-        isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}, got {formatted(name)}"
-    )
+    require(isinstance(name, str) and name in ENGINES, f"engine must be one of {', '.join(ENGINES)}", value=name)
     try:
         return importlib.import_module(ENGINES[name])
     except ModuleNotFoundError as error:
         if error.name != name:
             raise
-        raise ValueError(f"the {name} engine is not installed: pip install 'geomech[{name}]'") from None
+        raise Refusal(f"the {name} engine is not installed", instead=f"pip install 'geomech[{name}]'") from None
     except Exception as error:  # importing MuJoCo loads the library that MUJOCO_GL names
-        raise ValueError(f"the {name} engine cannot be loaded: {formatted(str(error))}; is MUJOCO_GL right?") from None
+        raise Refusal(
+            f"the {name} engine cannot be loaded", because=formatted(str(error)), instead="is MUJOCO_GL right?"
+        ) from None
 
 
 ENGINES = {"planar": "rft.walking.planar_walk", "mujoco": "rft.walking.mujoco_walk"}

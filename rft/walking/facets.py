@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, require
+from rft.checks import Number, check_numbers
 from rft.ground import Ground
 from rft.meshes.contact import Motion, Part, cross, load
 from rft.meshes.extruded import Extruded
@@ -21,6 +21,7 @@ from rft.meshes.law import Spatial
 from rft.meshes.mesh import Mesh
 from rft.meshes.submerged import submerged
 from rft.plates.outline import Outline
+from rft.refusal import require
 
 NUDGE = 1e-3  # change of a velocity for differences, over the rounding
 
@@ -37,9 +38,7 @@ class Grains:
     )
 
     def __post_init__(self):
-        require(
-            isinstance(self.law, Extruded | Spatial), f"law must be an Extruded or Spatial, got {formatted(self.law)}"
-        )
+        require(isinstance(self.law, Extruded | Spatial), "law must be an Extruded or Spatial", value=self.law)
         check_numbers(self)
 
     @property

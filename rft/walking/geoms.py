@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from rft.checks import formatted, require
 from rft.meshes import shapes
 from rft.meshes.mesh import Mesh
 from rft.meshes.smooth import smooth
+from rft.refusal import formatted, require
 from rft.walking.facets import Surface
 
 MOST_FACES = 20_000  # of a geom's mesh
@@ -49,7 +49,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
         rod = shapes.cylinder(size[0], 2 * size[1], elements, along, max(1, elements // 12))
         return smooth(Mesh(rod.vertices @ ALONG_Z, rod.faces))
     cure = "give a sphere, ellipsoid, cylinder, capsule, box or mesh"
-    require(kind in ("sphere", "ellipsoid"), f"a {kind} cannot touch the ground: {cure}")
+    require(kind in ("sphere", "ellipsoid"), f"a {kind} cannot touch the ground", instead=cure)
     ball = shapes.sphere(1.0, int(np.clip(np.ceil(np.log2(elements / 5)), 1, 5)))  # 5 edges around, twice that, ...
     return smooth(Mesh(ball.vertices * (size if kind == "ellipsoid" else size[0]), ball.faces))
 
@@ -57,7 +57,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int, elements: int) -> Mesh:
 def _model_mesh(model: mujoco.MjModel, k: int) -> Mesh:
     """Return mesh number k of a model, with equal corners merged."""
     first, start, faces = model.mesh_vertadr[k], model.mesh_faceadr[k], model.mesh_facenum[k]
-    require(faces <= MOST_FACES, f"the mesh has {faces} triangles, more than {MOST_FACES}: give fewer")
+    require(faces <= MOST_FACES, f"the mesh has {faces} triangles, more than {MOST_FACES}", instead="give fewer")
     vertices = np.array(model.mesh_vert[first : first + model.mesh_vertnum[k]], float)
     merged, index = np.unique(vertices, axis=0, return_inverse=True)
     return Mesh(merged, index.reshape(-1)[model.mesh_face[start : start + faces]])

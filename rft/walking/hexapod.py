@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from rft.laws.catalogue import GRAVITY
+from rft.metres import GRAVITY
 from rft.walking.facets import Surface
 from rft.walking.robot import Robot, Roller
 

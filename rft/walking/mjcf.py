@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rft.checks import formatted, in_range, real_array, require
+from rft.checks import in_range, real_array
+from rft.refusal import Refusal, formatted, require
 from rft.walking.facets import Surface
 from rft.walking.robot import Robot
 
@@ -39,16 +40,16 @@ class Mjcf(Robot):
     period = 1.0
 
     def __post_init__(self):
-        require(isinstance(self.mjcf, str), f"mjcf must be the name of an MJCF file, got {formatted(self.mjcf)}")
+        require(isinstance(self.mjcf, str), "mjcf must be the name of an MJCF file", value=self.mjcf)
         for name in ("geoms", "actuators"):
             value = getattr(self, name)
             if value is None and name == "actuators":
                 continue
             valid = isinstance(value, tuple | list) and all(isinstance(x, str) for x in value)
-            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names, got {formatted(value)}")
-            require(len({*value}) == len(value), f"{name} names one twice: {formatted(value)}")
+            require(valid and len(value) <= MOST_NAMES, f"{name} must be a list of names", value=value)
+            require(len({*value}) == len(value), f"{name} names one twice", instead=formatted(value))
             object.__setattr__(self, name, tuple(value))
-        require(len(self.geoms) > 0, "a robot without legs: geoms must name those that touch the ground")
+        require(len(self.geoms) > 0, "a robot without legs", because="geoms must name those that touch the ground")
         model, digest = _compiled(self.mjcf)
         object.__setattr__(self, "digest", digest)
         object.__setattr__(self, "model", model)
@@ -71,13 +72,16 @@ class Mjcf(Robot):
     def _find_geoms(self) -> None:
         """Set the numbers of the geoms; ValueError for unknown ones and for those of the world."""
         model = self.model
-        require(model.nv > 0, f"{self.mjcf}: nothing can move: it has no joints")
+        require(model.nv > 0, "nothing can move", where=self.mjcf, because="it has no joints")
         numbers = []
         for name in self.geoms:
             geom = self._number("geom", name, model.ngeom)
             fixed = model.body_weldid[model.geom_bodyid[geom]] == 0
             require(
-                not fixed, f"{self.mjcf}: the geom {formatted(name)} is fixed to the world: name those of the robot"
+                not fixed,
+                f"the geom {formatted(name)} is fixed to the world",
+                where=self.mjcf,
+                instead="name those of the robot",
             )
             numbers.append(geom)
         object.__setattr__(self, "geom_numbers", np.array(numbers))
@@ -93,7 +97,7 @@ class Mjcf(Robot):
             near = difflib.get_close_matches(name, names, 1, 0.5)
             few = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "") or "none with a name"
             cure = f"did you mean {formatted(near[0])}?" if near else f"it has {few}"
-            raise ValueError(f"{self.mjcf} has no {kind} {formatted(name)}: {cure}")
+            raise Refusal(f"{self.mjcf} has no {kind} {formatted(name)}", instead=cure)
         return number
 
     def _find_driven(self) -> None:
@@ -102,9 +106,12 @@ class Mjcf(Robot):
 
         model = self.model
         require(
-            model.nu > 0, f"{self.mjcf} has no actuators: nothing turns its legs; add <position> or <velocity> ones"
+            model.nu > 0,
+            f"{self.mjcf} has no actuators",
+            because="nothing turns its legs",
+            instead="add <position> or <velocity> ones",
         )
-        require(model.na == 0, f"{self.mjcf} has actuators with a state of their own: drop their dyntype")
+        require(model.na == 0, f"{self.mjcf} has actuators with a state of their own", instead="drop their dyntype")
         affine = (model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE) & (
             model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED
         )
@@ -113,11 +120,16 @@ class Mjcf(Robot):
         if self.actuators is None:
             driven = np.flatnonzero(able)
             cure = f"{cure}, or actuators = [] for the first keyframe's controls"
-            require(len(driven) > 0, f"{self.mjcf}: no actuator can follow the clock: {cure}")
+            require(len(driven) > 0, "no actuator can follow the clock", where=self.mjcf, instead=cure)
         else:
             ids = [self._number("actuator", name, model.nu) for name in self.actuators]
             for name, k in zip(self.actuators, ids):
-                require(bool(able[k]), f"{self.mjcf}: the actuator {formatted(name)} cannot follow the clock: {cure}")
+                require(
+                    bool(able[k]),
+                    f"the actuator {formatted(name)} cannot follow the clock",
+                    where=self.mjcf,
+                    instead=cure,
+                )
             driven = np.array(ids, int)
         for k in driven:
             name = formatted(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or f"number {k + 1}")
@@ -125,7 +137,7 @@ class Mjcf(Robot):
             require(not model.actuator_ctrllimited[k], message)
         phases = np.zeros(len(driven)) if self.phases is None else real_array("phases", self.phases)
         valid = phases.shape == (len(driven),) and bool((np.abs(phases) <= 100).all())
-        require(valid, f"phases must be {len(driven)} numbers, one for each actuator, got {formatted(self.phases)}")
+        require(valid, f"phases must be {len(driven)} numbers, one for each actuator", value=self.phases)
         object.__setattr__(self, "phases", tuple(map(float, phases)))
         object.__setattr__(self, "driven", driven)
 
@@ -139,7 +151,7 @@ class Mjcf(Robot):
             try:
                 out.append(geoms.surface(self.model, geom, geoms.geom_mesh(self.model, geom, elements)))
             except ValueError as error:
-                raise ValueError(f"{self.mjcf}: geom {formatted(name)}: {error}") from None
+                raise Refusal(f"geom {formatted(name)}", where=self.mjcf, because=str(error)) from None
         return out
 
     def check(self, elements: int) -> None:
@@ -151,26 +163,30 @@ def _compiled(file: str):
     try:
         import mujoco
     except ImportError:
-        raise ValueError(MISSING) from None
+        raise Refusal(MISSING) from None
     # MuJoCo writes warnings to the screen and to a file; the checks below refuse what matters.
     mujoco.set_mju_user_warning(lambda _: None)
     path = Path(file)
     try:
         require(path.is_file(), f"{file} is no ordinary file" if path.exists() else f"there is no MJCF file {file}")
-        require(path.stat().st_size <= LARGEST_FILE, f"{file} is larger than {LARGEST_FILE / 1e6:.0f} MB: no MJCF is")
+        require(
+            path.stat().st_size <= LARGEST_FILE,
+            f"{file} is larger than {LARGEST_FILE / 1000000.0:.0f} MB",
+            because="no MJCF is",
+        )
         path.open("rb").close()
     except OSError as error:
-        raise ValueError(f"cannot read MJCF {file}: {error.strerror}") from None
+        raise Refusal(f"cannot read MJCF {file}", because=error.strerror) from None
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except Exception as error:  # MuJoCo raises many kinds of errors for a file that is no MJCF
         message = " ".join(str(error).split())
-        raise ValueError(f"{file} is no MJCF that MuJoCo reads: {message[:300]}") from None
+        raise Refusal(f"{file} is no MJCF that MuJoCo reads", because=message[:300]) from None
     if names := _not_finite(model):
-        raise ValueError(f"{file}: nan or inf in {names}: every number of an MJCF must be finite")
+        raise Refusal(f"nan or inf in {names}", where=file, because="every number of an MJCF must be finite")
     down = model.opt.gravity
     upright = down[2] < 0 and abs(down[0]) + abs(down[1]) <= 1e-9 * abs(down[2])
-    require(bool(upright), f"{file}: gravity must be along -z, the ground is at z = 0")
+    require(bool(upright), "gravity must be along -z, the ground is at z = 0", where=file)
     content = np.empty(mujoco.mj_sizeModel(model), np.uint8)  # with that of included files and meshes
     mujoco.mj_saveModel(model, None, content)
     return model, hashlib.sha256(content).hexdigest()[:16]

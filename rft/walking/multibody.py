@@ -17,7 +17,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from rft.checks import require
+from rft.refusal import require
 from rft.walking.facets import Facets, Grains, Poses, Surface
 from rft.walking.sdirk import FARTHEST, GAMMA, HALVINGS, LEAST_DECREASE, LEAST_SHARE, TOLERANCE
 
@@ -62,8 +62,8 @@ class Multibody:
         grains: Grains,
         control: Callable[[float, float], np.ndarray] | None = None,
     ):
-        require(model.nv > 0, "nothing in the model can move: it has no joints")
-        require(model.na == 0, "the model has actuators with a state of their own: drop their dyntype")
+        require(model.nv > 0, "nothing in the model can move", because="it has no joints")
+        require(model.na == 0, "the model has actuators with a state of their own", instead="drop their dyntype")
         mujoco.set_mju_user_warning(_ignore)
         _remove_contacts(model, surfaces)
         model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -124,7 +124,7 @@ class Multibody:
             self.step(h / 2, rate_time, halvings - 1)
             return
         finite = np.isfinite(data.qpos).all() and np.isfinite([self.work, self.loss]).all()
-        require(bool(finite), f"the time step at {start[0]:.4g} s cannot be solved: make steps shorter")
+        require(bool(finite), f"the time step at {start[0]:.4g} s cannot be solved", instead="make steps shorter")
         self.unsolved, self.defect = self.unsolved + 1, self.defect + self._step_residual
         self.residual = max(self.residual, self._step_residual)
 
@@ -243,7 +243,11 @@ def _remove_contacts(model: mujoco.MjModel, surfaces: Sequence[Surface]) -> None
         own |= model.geom_bodyid == surface.body if surface.geom is None else np.arange(model.ngeom) == surface.geom
     model.geom_contype[own] = model.geom_conaffinity[own] = 0
     paired = own[model.pair_geom1] | own[model.pair_geom2]
-    require(not paired.any(), "a <pair> of <contact> names a geom that touches the ground, and no other thing: drop it")
+    require(
+        not paired.any(),
+        "a <pair> of <contact> names a geom that touches the ground, and no other thing",
+        instead="drop it",
+    )
 
 
 def _ignore(_warning: str) -> None:

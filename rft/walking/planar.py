@@ -12,7 +12,7 @@ import numpy as np
 
 from rft.balance.newton import plus, times
 from rft.ground import Ground
-from rft.laws.catalogue import GRAVITY
+from rft.metres import GRAVITY
 from rft.plates.stress import PlateStress
 from rft.vectors import formula
 from rft.walking.elements import Elements, Outlines

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rft.checks import require
 from rft.ground import Ground
 from rft.plates.stress import PlateStress
+from rft.refusal import require
 from rft.walking.engines import Fineness, Walker
 from rft.walking.limit import Limit, LimitCycles, limit_cycles, predicted_progress
 from rft.walking.march import march
@@ -22,7 +22,7 @@ from rft.walking.stride import STUCK, Strides, Walk, compute_stride, cycles_to_s
 def refuse(walker: Walker) -> None:
     """Raise ValueError for a walker that this engine cannot compute."""
     planar = isinstance(walker.robot, Rhex | Roller)
-    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot: use --engine mujoco")
+    require(planar, f"the planar engine knows no {type(walker.robot).__name__} robot", instead="use --engine mujoco")
     require(isinstance(walker.stress, PlateStress), "a law of three dimensions takes --engine mujoco")
 
 

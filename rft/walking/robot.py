@@ -14,10 +14,11 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from rft.checks import Number, check_numbers, formatted, real_array, require
+from rft.checks import Number, check_numbers, real_array
 from rft.metres import LARGEST, metres
 from rft.plates.outline import Outline
 from rft.plates.shapes import Polygon, Shape
+from rft.refusal import formatted, require
 
 MOST_HIPS = 20
 SHORTEST = 1 / 8  # of a cycle: shorter parts get as many time steps, since all of the motion may lie in them
@@ -126,7 +127,11 @@ class Robot:
     def _check(self) -> None:
         """Raise ValueError for numbers out of range, and without legs."""
         check_numbers(self)
-        require(isinstance(self.legs, Shape), f"a robot without legs: legs must be a shape, got {formatted(self.legs)}")
+        require(
+            isinstance(self.legs, Shape),
+            "a robot without legs",
+            because=f"legs must be a shape, got {formatted(self.legs)}",
+        )
 
 
 @dataclass(frozen=True)
@@ -158,9 +163,11 @@ class Rhex(Robot):
     def __post_init__(self):
         self._check()
         hips = real_array("hips", self.hips)
-        require(hips.ndim == 1, f"hips must be a list of x in m, got {formatted(self.hips)}")
+        require(hips.ndim == 1, "hips must be a list of x in m", value=self.hips)
         require(
-            0 < len(hips) <= MOST_HIPS, f"a robot without legs: hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}"
+            0 < len(hips) <= MOST_HIPS,
+            "a robot without legs",
+            because=f"hips must be 1 to {MOST_HIPS} numbers, got {len(hips)}",
         )
         within = bool((np.abs(hips) <= self.length).all())
         require(within, f"hips must be within a body length, {self.length:g} m, of the centre of mass (in m)")
@@ -172,7 +179,7 @@ class Rhex(Robot):
             aside = real_array("aside", self.aside)
             valid = aside.shape == hips.shape and bool(((aside >= 0) & (aside <= LARGEST)).all())
             message = f"aside must be {len(hips)} numbers from 0 to {LARGEST:g} m, one for each hip"
-            require(valid, f"{message}, got {formatted(self.aside)}")
+            require(valid, message, value=self.aside)
             object.__setattr__(self, "aside", tuple(map(float, aside)))
 
     @property

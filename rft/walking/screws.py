@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.checks import formatted, in_range, real_array, require
+from rft.checks import in_range, real_array
 from rft.meshes import Screw, Spatial, wrench
 from rft.meshes.motions import rotations
+from rft.metres import GRAVITY
+from rft.refusal import require
 from rft.walking.craft import Screws
-from rft.walking.planar import GRAVITY
 
 TRIANGLES = 2000
 ANGLES = 12  # of a turn; 24 change the means by 5e-4
@@ -52,7 +53,7 @@ def turning(
     """Return the mean forces on a level screw with its axis ``height``, m, above the surface. rate: rad/s. slip: (...,), 0 as
     in a nut, 1 where the screw rotates without moving."""
     slip = real_array("slip", slip)
-    require(bool((np.abs(slip) <= 100).all()), f"slip must be within +-100, got {formatted(slip)}")
+    require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("height", height, -10.0, 10.0)
     in_range("rate", rate, 1e-9, 1e4)
     sense, mesh = screw.sense, screw.mesh(triangles)

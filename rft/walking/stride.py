@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rft.metres import GRAVITY
 from rft.walking.march import march
-from rft.walking.planar import GRAVITY, Robots, State
+from rft.walking.planar import Robots, State
 from rft.walking.robot import Robot, Tripod, intervals
 
 # A cycle is periodic where its start differs from the last one's, and from all to come, by at most this share of the speed of

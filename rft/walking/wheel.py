@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rft.checks import formatted, in_range, real_array, require
+from rft.checks import in_range, real_array
 from rft.ground import GroundEffect
 from rft.plates.loads import loads
 from rft.plates.shapes import Shape
 from rft.plates.stress import PlateStress
+from rft.refusal import require
 
 HALVINGS = 40  # of the interval that holds the hub's height
 ANGLES = 24  # of a turn of a wheel that is not round
@@ -40,8 +41,8 @@ def rolling(
     """
     slip, points = real_array("slip", slip), wheel.outline(elements)
     radius = getattr(wheel, "radius", None) if radius is None else radius
-    require(radius is not None, f"a {type(wheel).__name__} has no radius: give one")
-    require(bool((np.abs(slip) <= 100).all()), f"slip must be within +-100, got {formatted(slip)}")
+    require(radius is not None, f"a {type(wheel).__name__} has no radius", instead="give one")
+    require(bool((np.abs(slip) <= 100).all()), "slip must be within +-100", value=slip)
     in_range("load", load, 1e-6, 1e6)
     in_range("rate", rate, 1e-9, 1e4)
     reach = float(np.hypot(*points.points.T).max())

@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from geomech.core.errors import plain
 from geomech.geometry.connection import Connection
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Tube
+from rft.refusal import Refusal, printable
 from rft.registry import Registry, functions_with
 
 LONGEST_NAME = 60  # characters of what a file calls a frame, or a shape variable
@@ -56,7 +56,7 @@ class Stored:
     sized: bool = True
 
     def __post_init__(self):
-        object.__setattr__(self, "frame", plain(" ".join(self.frame.split()))[:LONGEST_NAME])
+        object.__setattr__(self, "frame", printable(" ".join(self.frame.split()))[:LONGEST_NAME])
 
     @property
     def table(self) -> Connection | Harmonics:
@@ -107,10 +107,11 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
     """values (N,) as ascending angles, or ValueError."""
     axis = numbers(name, values)
     if axis.ndim != 1 or len(axis) < 4 or not (np.diff(axis) > 0).all():
-        raise ValueError(f"has no grid: {name} must be at least 4 ascending angles in rad")
+        raise Refusal("has no grid", instead=f"{name} must be at least 4 ascending angles in rad")
     if np.abs(axis).max() > largest:
-        raise ValueError(
-            f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad: convert it if these are degrees"
+        raise Refusal(
+            f"has {name} up to {np.abs(axis).max():.4g} where angles are in rad",
+            instead="convert it if these are degrees",
         )
     return axis
 
@@ -126,12 +127,14 @@ def numbers(name: str, values) -> np.ndarray:
     """values as floats in the machine's order of bytes; ValueError if they are none, or not finite."""
     array = np.asarray(values)
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"has {name} that is no array of real numbers")
+        raise Refusal(f"has {name} that is no array of real numbers")
     array = array.astype(float)
     if not np.isfinite(array).all():
-        raise ValueError(f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}: mend it")
+        raise Refusal(f"has {name} that is not finite (nan or inf) at {_first(~np.isfinite(array))}", instead="mend it")
     if np.abs(array).max(initial=0.0) > LARGEST_ENTRY:
-        raise ValueError(f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}: mend it")
+        raise Refusal(
+            f"has {name} above {LARGEST_ENTRY:g} at {_first(np.abs(array) > LARGEST_ENTRY)}", instead="mend it"
+        )
     return array
 
 
@@ -141,17 +144,17 @@ def masks(name: str, values: np.ndarray, masked: np.ndarray, told: Mapping) -> N
     if masked.any() and "singular_shapes" not in told:
         numbers(name, values)
     if not np.isnan(values[..., masked]).all():
-        raise ValueError(f"has {name} at singular shapes, where A is nan: write it anew")
+        raise Refusal(f"has {name} at singular shapes, where A is nan", instead="write it anew")
     numbers(name, np.where(masked, 0.0, values))
 
 
 def checked_error(name: str, error: np.ndarray, A: np.ndarray, told: Mapping) -> np.ndarray:
     """Half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; or ValueError."""
     if error.shape != A.shape:
-        raise ValueError(f"has {name} of shape {error.shape} where A has {A.shape}")
+        raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
     masks(name, error, np.isnan(A).any((0, 1)), told)
     if (error < 0).any():
-        raise ValueError(f"has {name} below 0 where it is half of an interval of A")
+        raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)
 
 
@@ -187,4 +190,6 @@ def detected_sign(connection: Connection) -> str:
     for sign, value in (("+", 1.0), ("-", -1.0)):
         if (displacement(value * xi)[:, 0] < -least).all() and (displacement(-value * xi)[:, 0] > least).all():
             return sign
-    raise ValueError("does not tell the sign of A: say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot")
+    raise Refusal(
+        "does not tell the sign of A", instead="say sign = '+' for xi = + A alphadot, '-' for xi = - A alphadot"
+    )

@@ -31,6 +31,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
+from rft.refusal import Refusal
 
 ANGLES = ("alpha1", "alpha2")
 ENTRIES = tuple(f"A{row}{joint}" for row in ("x", "y", "theta") for joint in (1, 2))
@@ -46,7 +47,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     about = _about(found)
     A = _entries(found, axes, order, about)
     if not A.any():
-        raise ValueError("has a connection that is zero everywhere")
+        raise Refusal("has a connection that is zero everywhere")
     residual, error = _residual(found, A, order, about), _error(found, A, order, about)
     degree = about.get("interpolation", 3)
     degree = degree if degree in (1, 2, 3, 4, 5) and min(map(len, axes)) > degree else 3
@@ -68,18 +69,18 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
     """Those of the layout, arrays of real numbers, and what else there is; ValueError if one is missing."""
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
-        raise ValueError(f"is a MATLAB 7.3 (HDF5) file: {SAVE}")
+        raise Refusal("is a MATLAB 7.3 (HDF5) file", instead=SAVE)
     if raw[:3] == b"CDF":
-        raise ValueError("is no MATLAB file, but a NetCDF one: end its name in .nc")
+        raise Refusal("is no MATLAB file, but a NetCDF one", instead="end its name in .nc")
     try:
         found = _of_version_4(raw) if raw[:4] and 0 in raw[:4] else matlab.arrays(raw)
     except ValueError:
-        raise ValueError(f"is damaged, cut short, or no MATLAB file: {SAVE}") from None
+        raise Refusal("is damaged, cut short, or no MATLAB file", instead=SAVE) from None
     for name in (*ANGLES, *ENTRIES):
         if name not in found:
-            raise ValueError(f"has no {name}: a connection is {', '.join((*ANGLES, *ENTRIES))}")
+            raise Refusal(f"has no {name}", because=f"a connection is {', '.join((*ANGLES, *ENTRIES))}")
         if not isinstance(found[name], np.ndarray):
-            raise ValueError(f"has {name} that is no array of real numbers")
+            raise Refusal(f"has {name} that is no array of real numbers")
     return found
 
 
@@ -92,7 +93,7 @@ def _of_version_4(raw: bytes) -> dict[str, np.ndarray]:
             warnings.simplefilter("ignore")
             return loadmat(io.BytesIO(raw), variable_names=[*ANGLES, *ENTRIES])
     except Exception:
-        raise ValueError("damaged") from None
+        raise Refusal("damaged") from None
 
 
 def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
@@ -101,19 +102,20 @@ def _axes(found: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
     first, second = (numbers(name, found[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
         if not order:
-            raise ValueError(
-                "has alpha1 and alpha2 as rows, which leave the order open: say order = 'ndgrid' or 'meshgrid'"
+            raise Refusal(
+                "has alpha1 and alpha2 as rows, which leave the order open",
+                instead="say order = 'ndgrid' or 'meshgrid'",
             )
         return (angles("alpha1", first.ravel()), angles("alpha2", second.ravel())), order
     if first.ndim != 2 or first.shape != second.shape:
-        raise ValueError(f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid")
+        raise Refusal(f"has alpha1 {first.shape} and alpha2 {second.shape}, which span no grid")
     for name, (a, b) in zip(ORDERS, ((first, second), (first.T, second.T))):
         if max(np.ptp(a, axis=1).max(), np.ptp(b, axis=0).max()) <= 1e-9:
             if order not in ("", name):
-                raise ValueError(f"has arrays that run as {name}'s: drop order")
+                raise Refusal(f"has arrays that run as {name}'s", instead="drop order")
             return (angles("alpha1", a[:, 0]), angles("alpha2", b[0])), name
-    raise ValueError(
-        "has alpha1 and alpha2 that span no grid: one must change along rows alone, the other along columns"
+    raise Refusal(
+        "has alpha1 and alpha2 that span no grid", because="one must change along rows alone, the other along columns"
     )
 
 
@@ -132,7 +134,7 @@ def _entries(found: dict, axes, order: str, about: dict) -> np.ndarray:
     for name in ENTRIES:
         values = found[name] if found[name].dtype.kind == "f" else numbers(name, found[name])
         if values.shape != expected:
-            raise ValueError(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
+            raise Refusal(f"has {name} of shape {values.shape} where alpha1 and alpha2 make it {expected}")
         arrays[name] = _of_ndgrid(values, order).astype(float)
     masked = np.isnan([*arrays.values()]).any(0)
     for name, values in arrays.items():

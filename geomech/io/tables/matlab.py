@@ -12,6 +12,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rft.refusal import Refusal
+
 LARGEST = 500_000_000  # bytes of a file, inflated
 HEADER = 128  # bytes before the first element
 MATRIX, COMPRESSED = 14, 15  # types of elements
@@ -26,7 +28,7 @@ def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
     """Variables by name: arrays of real numbers, lines of text, None for anything else. ValueError for a damaged file."""
     marks = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     if (order := marks.get(raw[124:HEADER])) is None:
-        raise ValueError("no MATLAB file of version 5 to 7")
+        raise Refusal("no MATLAB file of version 5 to 7")
     found, left = {}, LARGEST
     for kind, data in _elements(raw[HEADER:], order):
         if kind == COMPRESSED:
@@ -34,10 +36,10 @@ def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
             try:
                 data = stream.decompress(data, left)
             except zlib.error:
-                raise ValueError("damaged") from None
+                raise Refusal("damaged") from None
             left -= len(data)
             if not stream.eof or left <= 0:
-                raise ValueError("cut short, or too large")
+                raise Refusal("cut short, or too large")
             ((kind, data),) = _elements(data, order)
         if kind == MATRIX and data:
             name, values = _matrix(data, order)
@@ -50,7 +52,7 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
     k = 0
     while k < len(data):
         if k + 8 > len(data):
-            raise ValueError("cut short")
+            raise Refusal("cut short")
         kind, size = struct.unpack_from(f"{order}II", data, k)
         small = kind >> 16
         if small:  # up to four bytes, in the place of the size
@@ -58,7 +60,7 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
         else:
             start, step = k + 8, 8 + size + (-size % 8 if kind != COMPRESSED else 0)
         if (small and small > 4) or start + size > len(data):
-            raise ValueError("cut short")
+            raise Refusal("cut short")
         yield kind, data[start : start + size]
         k += step
 
@@ -67,7 +69,7 @@ def _matrix(data: bytes, order: str) -> tuple[str, np.ndarray | str | None]:
     """(name, values) of one; ValueError if its parts do not fit each other."""
     parts = list(_elements(data, order))
     if len(parts) < 3 or len(parts[0][1]) != 8 or len(parts[1][1]) % 4:
-        raise ValueError("damaged")
+        raise Refusal("damaged")
     (flags,) = struct.unpack_from(f"{order}I", parts[0][1])
     shape = tuple(np.frombuffer(parts[1][1], f"{order}i4").tolist())
     name = parts[2][1].decode("latin-1")
@@ -83,5 +85,5 @@ def _matrix(data: bytes, order: str) -> tuple[str, np.ndarray | str | None]:
     for n in shape:  # as Python's own, which do not overflow
         size *= n
     if len(raw) != size * np.dtype(NUMBERS[kind]).itemsize:
-        raise ValueError("damaged")
+        raise Refusal("damaged")
     return name, np.frombuffer(raw, np.dtype(NUMBERS[kind]).newbyteorder(order)).reshape(shape, order="F")

@@ -26,6 +26,7 @@ from geomech.io.tables.base import (
     numbers,
     rms,
 )
+from rft.refusal import Refusal
 
 SOURCE = "write it anew with 'geomech connection SCENE -o FILE.nc'"
 FITTED = "write it anew with 'geomech fit LOG.csv -o FILE.nc'"
@@ -38,9 +39,9 @@ SHAPE = "shape variable "  # before the name of one that is no angle between lin
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
     """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
-        raise ValueError(_what_else(raw))
+        raise Refusal(_what_else(raw))
     if order not in ("", "ndgrid"):
-        raise ValueError("names its dimensions: drop order")
+        raise Refusal("names its dimensions", instead="drop order")
     from scipy.io import netcdf_file
 
     try:  # what is damaged makes SciPy raise whatever comes first
@@ -52,7 +53,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
             names = {name: _text(getattr(v, "long_name", b"")) for name, v in file.variables.items()}
             told = {name: value for name, value in vars(file).items() if not name.startswith("_")}
     except Exception:
-        raise ValueError(f"is damaged or cut short: {SOURCE}") from None
+        raise Refusal("is damaged or cut short", instead=SOURCE) from None
     stored = _stored(found, units, told, sign, sha256)
     shapes = [f"alpha_{k + 1}" for k in range(len(stored.connection.axes))]
     called = [names[x].removeprefix(SHAPE) if names[x].startswith(SHAPE) else x for x in shapes]
@@ -73,15 +74,15 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     joints = len(found["joint"][1]) if "joint" in found and found["joint"][1].ndim == 1 else 0
     names = tuple(f"alpha_{k + 1}" for k in range(joints))
     if missing := [name for name in ("joint", *names, "A", "fit_residual") if name not in found]:
-        raise ValueError(f"holds no connection, {missing[0]} is missing: {SOURCE}")
+        raise Refusal(f"holds no connection, {missing[0]} is missing", instead=SOURCE)
     for name in names:
         if units[name] not in ("", *ANGLES):
-            raise ValueError(f"has {name} in {units[name]!r}: shapes are angles in rad")
+            raise Refusal(f"has {name} in {units[name]!r}", because="shapes are angles in rad")
     axes = tuple(checked_axis(name, found[name][1]) for name in names)
     pick = lambda name, *lead: _array(found, name, (*lead, *names), axes)
     A, residual = pick("A", "component", "joint"), pick("fit_residual", "component")
     if A.shape[:2] != (3, joints) or residual.shape[0] != 3 or not _rows(found):
-        raise ValueError(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
+        raise Refusal(f"has A of shape {A.shape} where it must be (3, {joints}, ...), rows x, y, theta")
     masked = np.isnan(A).any((0, 1))
     masks("A", A, masked, told)
     unknown = np.isnan(residual).all() and not masked.all()
@@ -91,10 +92,10 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     length, unit = told.get("body_length", 1.0), UNITS.get(_text(told.get("length_unit", b"body length")))
     length = float(length) if np.ndim(length) == 0 and np.asarray(length).dtype.kind in "iuf" else np.nan
     if unit is None or not 0 < length < 1e9:
-        raise ValueError(f"has a body_length or length_unit that makes no sense: {SOURCE}")
+        raise Refusal("has a body_length or length_unit that makes no sense", instead=SOURCE)
     degree = int(d) if (d := told.get("interpolation", 3)) in (1, 2, 3, 4, 5) else 3
     if min(map(len, axes)) <= degree:
-        raise ValueError(f"has too few shapes for a spline of degree {degree}: {SOURCE}")
+        raise Refusal(f"has too few shapes for a spline of degree {degree}", instead=SOURCE)
     stated = next((s for s, text in SIGNS.items() if text == _text(told.get("sign_of_A", b""))), "+")
     sign = sign or stated
     turn = 1.0 if sign == "+" else -1.0
@@ -103,7 +104,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
         rows = pick("harmonics", "component", "coefficient")
         left = pick("harmonics_residual", "component") if "harmonics_residual" in found else residual
         if rows.shape[0] != 3 or left.shape[0] != 3 or rows.shape[1] % 2 or not rows.size:
-            raise ValueError(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
+            raise Refusal(f"has harmonics of shape {rows.shape} where it must be (3, an even number, ...)")
         harmonics = Harmonics(axes, turn * numbers("harmonics", rows), numbers("harmonics_residual", left), degree)
     size = {"unit": unit, "length": length} if sized else {}
     connection = Connection(axes, turn * A, residual, speed, degree, **size)
@@ -112,7 +113,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     frame = _text(told.get("frame", b"that of the table"))
     even = numbers("even_part", pick("even_part", "component")) if "even_part" in found and not masked.any() else None
     if even is not None and even.shape[0] != 3:
-        raise ValueError(f"has even_part of shape {even.shape} where it must be (3, ...)")
+        raise Refusal(f"has even_part of shape {even.shape} where it must be (3, ...)")
     _check_pairs(found, axes, masked)
     metric, power = _metric(found, told, axes, degree)
     has_error = "A_error" in found
@@ -127,7 +128,7 @@ def _known(found: dict, told: dict, turn: float) -> Known:
     """What is known along a gait (`geomech.geometry.tube`), A times ``turn``."""
     sized = {"gait": 2, "gait_A": 3, "gait_slope": 4, "gait_errors": 5, "gait_spread": 3, "gait_beyond": 1}
     if missing := [name for name in sized if name not in found or found[name][1].ndim != sized[name]]:
-        raise ValueError(f"has a gait, but no {missing[0]} that fits it: {FITTED}")
+        raise Refusal(f"has a gait, but no {missing[0]} that fits it", instead=FITTED)
     gait, A, slope, errors, spread, beyond = (numbers(name, found[name][1]) for name in sized)
     off = numbers("gait_off", found["gait_off"][1]) if "gait_off" in found else np.zeros((3, 2, 1))  # of an older file
     d, wide = len(gait), A.shape[-1]
@@ -143,9 +144,9 @@ def _known(found: dict, told: dict, turn: float) -> Known:
     )
     number = all(np.ndim(x) == 0 and np.asarray(x).dtype.kind in "iuf" for x in (level, factor))
     if not (all(right) and good and number and wide % 2 and gait.shape[1] % 2 and 0 < level < 1 and 0 < factor < 1e6):
-        raise ValueError(f"has a gait whose parts do not fit each other: {FITTED}")
+        raise Refusal("has a gait whose parts do not fit each other", instead=FITTED)
     if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
-        raise ValueError(f"has a gait that does not move: {FITTED}")
+        raise Refusal("has a gait that does not move", instead=FITTED)
     beyond, off = np.abs(beyond), np.abs(off)
     return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, beyond, off, float(factor), float(level))
 
@@ -157,17 +158,15 @@ def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsle
     if "metric" not in found and ("norm" not in found or power is None):
         return None, None
     if power is not None and (np.ndim(power) or np.asarray(power).dtype.kind not in "iuf" or not 0 < power < 100):
-        raise ValueError(f"has a power_degree that makes no sense: {SOURCE}")
+        raise Refusal("has a power_degree that makes no sense", instead=SOURCE)
     if "metric" in found:
         M = numbers("metric", _array(found, "metric", ("joint", "other_joint", *names), axes))
         if M.shape[:2] != (joints, joints) or not np.allclose(M, M.swapaxes(0, 1), rtol=0, atol=1e-9 * np.abs(M).max()):
-            raise ValueError(
-                f"has a metric of shape {M.shape} where it must be ({joints}, {joints}, ...) and symmetric"
-            )
+            raise Refusal(f"has a metric of shape {M.shape} where it must be ({joints}, {joints}, ...) and symmetric")
         return Metric(axes, M, degree), None if power is None else float(power)
     rows = numbers("norm", _array(found, "norm", ("norm_coefficient", *names), axes))
     if joints != 2 or len(rows) % 2 == 0:
-        raise ValueError(f"has a norm of shape {rows.shape} where it must be (an odd number, ...) of two joints")
+        raise Refusal(f"has a norm of shape {rows.shape} where it must be (an odd number, ...) of two joints")
     left = (
         numbers("norm_residual", _array(found, "norm_residual", names, axes))
         if "norm_residual" in found
@@ -180,12 +179,12 @@ def _check_pairs(found: dict, axes, masked: np.ndarray) -> None:
     """ValueError for a CCF of pairs of joints that fits neither grid nor pairs; what is looked up is made anew from A."""
     pairs = np.array([*combinations(range(1, len(axes) + 1), 2)], float)
     if "pair_joints" in found and not np.array_equal(found["pair_joints"][1], pairs):
-        raise ValueError(f"has pair_joints other than {pairs.astype(int).tolist()}: {SOURCE}")
+        raise Refusal(f"has pair_joints other than {pairs.astype(int).tolist()}", instead=SOURCE)
     dimensions = ("pair", "component", *(f"alpha_{k + 1}" for k in range(len(axes))))
     for name in {"ccf_pairs", "ccf_pairs_error"} & found.keys():
         values = _array(found, name, dimensions, axes)
         if values.shape[:2] != (len(pairs), 3):
-            raise ValueError(f"has {name} of shape {values.shape} where it must be ({len(pairs)}, 3, ...): {SOURCE}")
+            raise Refusal(f"has {name} of shape {values.shape} where it must be ({len(pairs)}, 3, ...)", instead=SOURCE)
         if not masked.any():
             numbers(name, values)
 
@@ -194,9 +193,11 @@ def _array(found: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndar
     """A variable, or ValueError unless its dimensions are those, in that order, and its shape ends in the grid's."""
     given, values = found[name]
     if given != dimensions:
-        raise ValueError(f"has {name} over ({', '.join(given)}) where it must be ({', '.join(dimensions)}): {SOURCE}")
+        raise Refusal(
+            f"has {name} over ({', '.join(given)}) where it must be ({', '.join(dimensions)})", instead=SOURCE
+        )
     if values.dtype.kind != "f" or values.shape[-len(axes) :] != tuple(map(len, axes)):
-        raise ValueError(f"has {name} of shape {values.shape} that does not fit its grid: {SOURCE}")
+        raise Refusal(f"has {name} of shape {values.shape} that does not fit its grid", instead=SOURCE)
     return values.astype(float)
 
 

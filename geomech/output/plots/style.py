@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from geomech.core.errors import SceneError
 from geomech.io.files import whole_file
+from rft.refusal import Refusal
 
 GREEK = ("alpha", "gamma", "theta")  # letters that names of shape variables and parameters begin with
 MARKED = 40  # points of a line up to which each has its marker
@@ -86,11 +86,11 @@ def axes_of(ax: Any) -> Any:
 
 
 def check_format(path: str | Path) -> Path:
-    """path if its ending is a figure format, else SceneError."""
+    """path if its ending is a figure format, else Refusal."""
     formats = (".png", ".pdf", ".svg")
     path = Path(path)
     if path.suffix.lower() not in formats:
-        raise SceneError(f"cannot draw {path}: end the name in {', '.join(formats)}")
+        raise Refusal(f"cannot draw {path}", instead=f"end the name in {', '.join(formats)}")
     return path
 
 

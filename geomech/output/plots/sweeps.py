@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from geomech.core.errors import SceneError
 from geomech.output.plots.displacements import medium_band, net
 from geomech.output.plots.style import MARKED, figure, quantity, styled
 from geomech.scene.model import Scene
 from geomech.study.cycles import AMPLITUDE
+from rft.refusal import Refusal
 
 PARAMETERS = {  # units of parameters, by the last part of their names; the others have none
     "gamma0": "rad", "length": "m", "frequency": "Hz", "mass": "kg", "drag": "N", "depth": "m", "radius": "BL",
@@ -30,9 +30,9 @@ OF_ROBOTS = {  # likewise, of scenes of robots
 
 def sweep_figure(scene: Any, results: Mapping):
     """Draw a sweep (`geomech.study.sweep`) over one parameter or two: net distance or speed, or the speed of a robot.
-    SceneError for more."""
+    Refusal for more."""
     if len(over := results["over"]) > 2:
-        raise SceneError(f"cannot draw {len(over)} parameters: sweep one or two, or leave --plot out")
+        raise Refusal(f"cannot draw {len(over)} parameters", instead="sweep one or two, or leave --plot out")
     return (_speed_figure if "status" in results else _net_figure)(scene, results)
 
 

@@ -1,0 +1,83 @@
+"""How a refusal is said: in one line that names the place, the value and the cure. The facts stay with the error.
+
+Nothing here needs NumPy, so that a command that refuses starts fast.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import unicodedata
+from collections.abc import Iterator
+from typing import Any
+
+
+class Refusal(ValueError):
+    """A request, scene, file or argument that makes no sense.
+
+    what: says what is wrong. value: what was given, where that tells more. where: the way there, outermost first (file or
+    scene, table, key, option). because: why it cannot be. instead: what to give or to do.
+    """
+
+    def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):
+        super().__init__(what)
+        self.what, self.value, self.because, self.instead = what, value, because, instead
+        self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
+
+    def __str__(self) -> str:
+        text = self.what if self.value is ... else f"{self.what}, got {formatted(self.value)}"
+        if reasons := "; ".join(filter(None, (self.because, self.instead))):
+            text = f"{text}: {reasons}"
+        for place in reversed(self.where):
+            text = f"{place} {text}" if place.endswith("]") else f"{place}: {text}"
+        return line(text)
+
+    def within(self, place: object) -> Refusal:
+        """Return the refusal with a place before its own, unless it names that already."""
+        if not str(self).startswith((f"{place}: ", f"{line(str(place))}: ")):
+            self.where = (str(place), *self.where)
+        return self
+
+
+@contextlib.contextmanager
+def located(place: object) -> Iterator[None]:
+    """Name the place in whatever ValueError comes from the statements within."""
+    try:
+        yield
+    except Refusal as refusal:
+        raise refusal.within(place) from None
+    except ValueError as error:
+        raise Refusal(str(error)).within(place) from None
+
+
+def require(condition: bool, what: str, **facts: Any) -> None:
+    """Raise ``Refusal(what, **facts)`` unless the condition holds."""
+    if not condition:
+        raise Refusal(what, **facts)
+
+
+def formatted(value: object, most: int = 60) -> str:
+    """Return repr(value) as one line of at most ``most`` characters."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python prints
+        text = "a very long number"
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def printable(text: str) -> str:
+    """Return text, which may hold what others wrote, as it may be shown: what steers a terminal, or is not seen, stands as its
+    escape. Lines, tabs and blanks stay. All that goes to a terminal or into HTML passes here."""
+    return re.sub(r"[^ -~\n\t]", _escaped, text)
+
+
+def _escaped(found: re.Match[str]) -> str:
+    letter = found[0]
+    is_shown = letter.isprintable() or unicodedata.category(letter) == "Zs"
+    return letter if is_shown else letter.encode("unicode_escape").decode()
+
+
+def line(text: str, most: int = 400) -> str:
+    """Return `printable` text as one line of at most ``most`` characters, cut before its end."""
+    text = printable(" ".join(text.split()))
+    return text if len(text) <= most else text[: most - 100] + " ... " + text[-80:]
