@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import scene as scenes
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import CATALOGUE
 
 pytestmark = pytest.mark.usefixtures("fastest")

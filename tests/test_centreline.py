@@ -16,7 +16,7 @@ from geomech import scene as scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
 from geomech.gaits.waves import arc_to_phase
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.study.sweep import Sweep
 from rft import Backbone
 from rft.refusal import Refusal

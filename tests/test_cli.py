@@ -18,8 +18,8 @@ from geomech.core.variables import Result
 from geomech.geometry import curvature
 from geomech.io import files
 from geomech.output import plots, report
-from geomech.study.bench import Study
 from geomech.study.report import Report
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 from geomech.text import accuracy
 

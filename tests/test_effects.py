@@ -12,7 +12,7 @@ from registry import EFFECTS
 
 from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse, Sine
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.text.explain import explain
 from rft import (
     CATALOGUE,

@@ -25,7 +25,7 @@ from figures import (
 )
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import CATALOGUE, Granular
 
 

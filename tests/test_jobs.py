@@ -28,8 +28,8 @@ from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scene import inputs, kinds
 from geomech.study import accuracy, cost, estimate, tiered, walking
-from geomech.study.bench import Study
 from geomech.study.motion import Trajectory
+from geomech.study.study import Study
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy

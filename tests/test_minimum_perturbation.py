@@ -11,7 +11,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates, curvature
 from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct

@@ -20,9 +20,9 @@ from geomech.gaits import Circle, Ellipse, Sine
 from geomech.geometry import connection, curvature
 from geomech.geometry.stretch import stretch
 from geomech.scene import Numerics, Scene
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.single import single as single_of
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.text.explain import explain
 from rft import Backbone, Chain, Coulomb, EndCaps, Serpenoid, Viscous

@@ -15,8 +15,8 @@ from geomech.geometry.coordinates import change_velocity
 from geomech.output import mat
 from geomech.scene import Scene
 from geomech.study import fields, sweep
-from geomech.study.bench import Study
-from geomech.study.offer import tiers
+from geomech.study.available import tiers
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous

@@ -20,9 +20,9 @@ from geomech.io.results import write_netcdf
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, load
 from geomech.study import fields, sweep, tables
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 

@@ -32,7 +32,7 @@ def python(code, **env):
 
 def test_parts_are_reached_from_the_top():
     from geomech.scene import Numerics, Scene, load, toml
-    from geomech.study.bench import Study
+    from geomech.study.study import Study
 
     assert (geomech.load, geomech.toml, geomech.Scene, geomech.Numerics, geomech.Study) == (
         load,

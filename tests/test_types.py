@@ -16,9 +16,9 @@ from geomech.geometry import connection, curvature, family, harmonics, reconstru
 from geomech.geometry.field import Field
 from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.study import accuracy, sweep, undulation
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.tiers.area import area

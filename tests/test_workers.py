@@ -27,7 +27,7 @@ from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
 from geomech.scene import kinds
 from geomech.study import accuracy, cycles, sweep, tiered
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import threads as threaded
 from rft.balance import backend
 from rft.laws import LAWS

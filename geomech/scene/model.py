@@ -1,4 +1,4 @@
-"""A scene: what is simulated and how finely. A value; what is computed for one, `geomech.study.bench.Study` remembers."""
+"""A scene: what is simulated and how finely. A value; what is computed for one, `geomech.study.study.Study` remembers."""
 
 from __future__ import annotations
 
