@@ -19,6 +19,7 @@ from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import in_frame
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass").with_numerics(grid=7)
 
 

@@ -21,6 +21,7 @@ from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"
 ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)

@@ -704,7 +704,7 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
     loops = Loops(2, 2, 2.5, 32)
     cycles, aim = Phases(loops, velocity), Aim("displacement")
     first = loops.of(Circle(amplitude=0.5))
-    p = ascend(cycles, aim, first, most=40)
+    p = ascend(cycles, aim, first, max_steps=40)
     assert np.abs(loops.cycle(p)[0]).max() <= 1.1
     assert aim.value(cycles(p))[0] > 1.5 * aim.value(cycles(first))[0]
 
