@@ -18,7 +18,7 @@ from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import suiting
-from geomech.run.cost import BASE, Cost, duration
+from geomech.run.cost import BASE, LONGEST, Cost, duration
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
@@ -129,11 +129,11 @@ def run(
 
 @dataclass(frozen=True)
 class Walking(Question):
-    """The walk of a robot. engine: in place of the scene's. longest: seconds, see `run`."""
+    """The walk of a robot. engine: in place of the scene's. limited: with at most `LONGEST` seconds of computing, see `run`."""
 
     scene: WalkerScene
     engine: str | None = None
-    longest: float = field(default=math.inf, compare=False)
+    limited: bool = field(default=False, compare=False)
 
     @property
     def title(self) -> str:
@@ -146,7 +146,7 @@ class Walking(Question):
         return price(self.scene, by=self.engine)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_walk(self.scene, run(self.scene, self.engine, progress, self.longest))
+        return of_walk(self.scene, run(self.scene, self.engine, progress, LONGEST if self.limited else math.inf))
 
 
 def of_walk(scene: WalkerScene, run: Walked) -> Result:
