@@ -114,7 +114,7 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
     alpha, alphadot = np.full((2, 7), 0.3) * [[1], [-2]], np.cos(np.arange(14.0)).reshape(2, 7)
     np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
-    assert fine.evaluations == 24 * exact.evaluations
+    assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
     assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
     assert fine.refined().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"

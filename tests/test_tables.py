@@ -436,7 +436,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in described(bare)
+        assert told == [LENGTHS] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.held.connection.unit, bare.held.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)
