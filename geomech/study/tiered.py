@@ -16,7 +16,7 @@ from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.available import tiers
-from geomech.study.study import Study
+from geomech.study.study import Study, refuse_outside
 from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
@@ -62,7 +62,7 @@ class Settings:
         tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
         if any(table and table.axes for table in tables):
             with located(scene.name):
-                Study(scene).refuse_outside()
+                refuse_outside(scene)
 
     def cost(self) -> Cost:
         scene = self.scene
