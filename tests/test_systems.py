@@ -147,7 +147,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
     with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
-        study.with_numerics(regularisation=1e-3)
+        study.turned(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 

@@ -42,7 +42,7 @@ SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks a
 
 class Study(Faced):
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
-    depends on. `with_numerics` returns a study with other numerics that shares them."""
+    depends on. `turned` returns a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -58,7 +58,7 @@ class Study(Faced):
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def with_numerics(self, **numerics) -> Study:
+    def turned(self, **numerics) -> Study:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
