@@ -117,8 +117,8 @@ def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize)
     in a batch."""
     if not uncertainty.uncertain(scene.system):
         return []
-    phases = max(uncertainty.PHASES, 8 * gait.harmonics)
-    return uncertainty.points(scene.system) * direct(scene, gait, count, phases, together, checked=False)
+    phases, points = max(uncertainty.PHASES, 8 * gait.harmonics), uncertainty.points(scene.system)
+    return points * direct(scene, gait, count, phases, together, checked=False) + (points - 1) * frame(scene)
 
 
 def direct(
