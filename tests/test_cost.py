@@ -68,6 +68,9 @@ def large(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", [n for n in LARGE if n != "phases"])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(run_cost, "ENOUGH", 0.05)  # what is refused is far beyond what may be
+    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 2000)  # three small batches tell
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
+    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1 << 15)
     before = sorted(p.name for p in large.iterdir())
     code, out, err = run(*LARGE[name])
     assert (code, out) == (2, "")
@@ -105,6 +108,7 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
 
+@pytest.mark.usefixtures("fastest")
 def test_pieces_change_no_numbers(monkeypatch):
     """What is computed in groups is what it is at once."""
     scene = GLASS.with_numerics(grid=7, phases=48, harmonics=5)

@@ -36,7 +36,7 @@ from geomech.study.single import single
 from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
-from geomech.text import measured as told
+from geomech.text import measured as texts
 from geomech.text.explain import explain
 from rft import se2
 from rft.refusal import Refusal
@@ -202,7 +202,7 @@ def test_where_A_jumps_its_error_is_told():
     t = 2 * np.pi * np.arange(128) / 128
     found, told_off = f.along(t)
     off = np.abs(found - true_A(f, corner, t))[:, 2, 1]
-    scatter = dataclasses.replace(f.known, off=0 * f.known.off).error_at(t)
+    scatter = dataclasses.replace(f, known=dataclasses.replace(f.known, off=0 * f.known.off)).along(t)[1]
     assert np.mean(off <= told_off[:, 2, 1]) > 0.92 > 0.82 > np.mean(off <= scatter[:, 2, 1])
     wider = (told_off - scatter).max(0)
     assert wider[2, 1] > 0.05 and wider[0].max() < 0.01  # which does not jump
@@ -447,7 +447,7 @@ def test_joints_that_follow_from_others_are_named(noise, rows, said):
     f = measured.fit_log(log)
     found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f))  # noise moves the third digit
     assert re.match("fitted along the gait alone: " + said, found)
-    assert results.status(f) in told.described(f)
+    assert results.status(f) in texts.described(f)
     if noise == 1e-3 and len(rows) == 1:
         kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
         assert results.status(measured.fit_log(kept, harmonics=2)) == "fitted"
@@ -716,7 +716,7 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
-    assert told.told(f)["status"].startswith("fitted along the gait alone")
+    assert texts.fit_numbers(f)["status"].startswith("fitted along the gait alone")
 
 
 def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous, monkeypatch):

@@ -19,6 +19,7 @@ from geomech.tiers.path import path
 from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous, se2
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID = Viscous(2.0)
 
 

@@ -261,7 +261,6 @@ HARD = {
 }
 
 
-@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("case", HARD)
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):

@@ -1,4 +1,4 @@
-"""Methods of values that are no business of theirs: how a notebook shows them, and what saves and loads them.
+"""Methods of values that their classes do not need to know: how they are shown, saved and loaded.
 
 `geomech.face` registers them as the package is imported, before any value's class exists; the classes know none of them.
 """

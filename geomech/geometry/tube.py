@@ -8,7 +8,7 @@ Dynamics 94, 1933 (2018), here with the phase of the nearest point). All are Fou
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -146,7 +146,7 @@ class Known:
     factor: float
     level: float
 
-    def deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
+    def _deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
         """(phases (...,), deviations (..., d)) of shapes (..., d)."""
         t = self.loop.nearest(alpha)
         return t, alpha - self.loop.shape(t)
@@ -161,22 +161,14 @@ class Known:
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
         return np.sqrt(_between(self.off**2, t) @ np.stack([along, 1 - along], -2))
 
-    def error_at(self, t) -> np.ndarray:
-        """(..., 3, d): of A at phases t (...) of the gait."""
-        squares = (series(self.errors[:, :, :, 0], t) ** 2).sum(-3)
-        return self.factor * np.sqrt(squares + self.off_at(t) ** 2)
-
     def reach(self, alpha) -> np.ndarray:
         """(...,): how far shapes (..., d) are from the gait, 1 where the data end."""
-        t, delta = self.deviation(real_array("alpha", alpha))
+        t, delta = self._deviation(real_array("alpha", alpha))
         return np.sqrt(np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta))
 
-    def terms(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """(waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of whole_i,j,m,k terms_j,m waves_k with `whole`."""
-        return self.terms_at(self.loop.nearest(alpha), alpha, alphadot)
-
-    def terms_at(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """`terms` with the phases t (...) of the nearest points."""
+    def terms(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """(waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of whole_i,j,m,k terms_j,m waves_k with `whole`, at
+        shapes and rates (..., d), the nearest points to which have phases t (...)."""
         normal = np.einsum("...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t))
         one = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
         return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[..., None, :]
@@ -186,17 +178,9 @@ class Known:
         """(3, d, d, 2 K + 1): A, and then its slopes."""
         return np.concatenate([self.A[:, :, None], self.slope], 2)
 
-    def scaled(self, by: np.ndarray) -> Known:
-        """With the components of xi times ``by`` (3,)."""
-        rows = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
-        errors = np.moveaxis(rows(np.moveaxis(self.errors, 1, 0)), 0, 1)
-        return replace(
-            self, A=rows(self.A), slope=rows(self.slope), errors=errors, beyond=rows(self.beyond), off=rows(self.off)
-        )
-
     def of(self, alpha) -> np.ndarray:
         """A (..., 3, d) at shapes (..., d), wherever these are."""
-        w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
+        w, terms = self.terms(self.loop.nearest(alpha), alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.whole, w, terms)
 
     def reached(self, alpha) -> np.ndarray:
@@ -209,7 +193,7 @@ class Known:
     def of_error(self, alpha) -> np.ndarray:
         """(..., 3, d): of `of`."""
         t = self.loop.nearest(alpha)
-        w, terms = self.terms_at(t, alpha, np.ones(np.shape(alpha)))
+        w, terms = self.terms(t, alpha, np.ones(np.shape(alpha)))
         squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
         return self.factor * np.sqrt(sum(squares) + self.off_at(t) ** 2)
 
@@ -217,7 +201,7 @@ class Known:
         """(..., 3): the CCF of two joints at shapes (..., 2), of this connection or another ``whole`` along the same gait.
         alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the slope."""
         whole = self.whole if whole is None else whole
-        t, delta = self.deviation(alpha)
+        t, delta = self._deviation(alpha)
         rate, bend, n = self.loop.shape(t, 1), self.loop.shape(t, 2), self.loop.normals(t)[..., 0]
         speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
         ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
@@ -234,7 +218,7 @@ class Known:
 
     def error(self, alpha, alphadot) -> np.ndarray:
         """(..., 3): of the net pose of gaits alpha, alphadot (..., N, d)."""
-        w, terms = self.terms(alpha, alphadot)
+        w, terms = self.terms(self.loop.nearest(alpha), alpha, alphadot)
         of = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
         net = displacement(of(self.whole))
         apart = [displacement(of(self.whole + x)) - net for x in self.errors]

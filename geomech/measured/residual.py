@@ -32,18 +32,16 @@ class Residual(NamedTuple):
     """Misfit of a fit.
 
     residual: (3,), rms misfit of xi, over that of the joint rates. explained: (3,), share of the squares of xi that the
-    fit explains. off: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.Known`."""
+    fit explains. standard_error: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.Known`."""
 
     residual: np.ndarray
     explained: np.ndarray
-    off: np.ndarray
+    standard_error: np.ndarray
 
 
 def residual_of(known: Known, samples: Samples, varies: int) -> Residual:
     """Return the misfit of ``known`` on the samples, with the error of the truncated series."""
-    predicted = lambda alpha, rate: np.einsum(
-        "ijmk,nk,njm->ni", known.whole, *known.terms_at(samples.phase, alpha, rate)
-    )
+    predicted = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms(samples.phase, alpha, rate))
     misfit = samples.xi - predicted(samples.alpha, samples.rate)
     residual = np.sqrt((misfit**2).mean(0) / (samples.rate**2).sum(-1).mean())
     explained = 1 - (misfit**2).mean(0) / samples.xi.var(0).clip(1e-300)

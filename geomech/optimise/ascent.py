@@ -11,36 +11,39 @@ from geomech.optimise.aims import Aim
 from geomech.optimise.problem import EVEN, Enough, Problem, is_feasible
 from geomech.optimise.stroke import Stroke
 
-STRIDE = 0.5  # largest change of x (rad, if joints have 2.5) in TOGETHER steps
-TOGETHER = 50
+TRUST_RADIUS = 0.5  # largest change of x (rad, if joints have 2.5) in STEPS_PER_RUN steps
+STEPS_PER_RUN = 50
 TRIES = 2.5  # cycles per step, at most on average
-SETTLING, INSIDE = 8, 1e-9  # steps of Newton's method, and their margin inside the constraints
-SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after an infeasible loop or no progress; and at the end
+NEWTON_STEPS, INSIDE = 8, 1e-9  # steps of Newton's method, and their margin inside the constraints
+SHORTER, SHORTEST = 0.25, 0.01  # of the trust radius: after an infeasible loop or no progress; and at the end
 
 
 def ascend(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, most: int = 100, tolerance: float = 1e-6,
+    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
     stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, on_cycle: Callable = lambda: None,
     even: float = EVEN,
 ) -> np.ndarray:  # fmt: skip
     """Return the loop with the locally largest ``aim`` that an ascent from the loop ``p`` reaches.
 
-    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. most: steps.
+    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. max_steps: steps.
     stroke: the loop is a `Stroke`, and stays one. singularity: a function of shapes that is 0 at singular ones; it
     stays at least ``away`` from 0. on_cycle: called after every cycle. even: see `Problem`."""
-    problem, once = Problem(cycles, aim, p, on_cycle, TRIES * most, even), Stroke(cycles.loops, p) if stroke else None
-    constraints = problem.constraints(turn, once, singularity, away)
-    same = lambda x: once is None or once.winding(problem.loop(x)) == 1
-    x, remaining, stride = problem.first, most, STRIDE
-    while remaining > 0 and stride > SHORTEST * STRIDE:
-        ascent = _Ascent(problem.objective, constraints, same)
-        end = ascent.run(x, stride, p.size, min(remaining, TOGETHER), tolerance)
-        begun, x = x, x if ascent.best is None else ascent.best
+    problem, once_round = (
+        Problem(cycles, aim, p, on_cycle, TRIES * max_steps, even),
+        Stroke(cycles.loops, p) if stroke else None,
+    )
+    constraints = problem.constraints(turn, once_round, singularity, away)
+    is_same_stroke = lambda x: once_round is None or once_round.winding(problem.loop(x)) == 1
+    x, remaining, trust_radius = problem.first, max_steps, TRUST_RADIUS
+    while remaining > 0 and trust_radius > SHORTEST * TRUST_RADIUS:
+        ascent = _Ascent(problem.objective, constraints, is_same_stroke)
+        end = ascent.run(x, trust_radius, p.size, min(remaining, STEPS_PER_RUN), tolerance)
+        previous, x = x, x if ascent.best is None else ascent.best
         remaining = 0 if end == "spent" else remaining - max(ascent.steps, 1)
-        moved = np.abs(x - begun)[: p.size].max()
-        if end == "converged" and moved < stride * (1 - 1e-6):
+        moved = np.abs(x - previous)[: p.size].max()
+        if end == "converged" and moved < trust_radius * (1 - 1e-6):
             break
-        stride *= (SHORTER if end == "infeasible" else 1.0) * (SHORTER if moved == 0 else 1.0)
+        trust_radius *= (SHORTER if end == "infeasible" else 1.0) * (SHORTER if moved == 0 else 1.0)
     return problem.loop(x)
 
 
@@ -54,7 +57,7 @@ def project(
     problem = Problem(cycles, aim, p, lambda: None, np.inf)
     constraints = problem.constraints(turn, Stroke(cycles.loops, p) if stroke else None, singularity, away, dense=True)
     x = problem.first
-    for _ in range(SETTLING):
+    for _ in range(NEWTON_STEPS):
         at = [(rule["type"], rule["fun"](x)) for rule in constraints]
         if all(np.abs(y).max() <= cycles.exact if kind == "eq" else y.min() >= 0 for kind, y in at):
             break
@@ -82,11 +85,11 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
 class _Ascent:
     """A recorder of iterates: it stores the best feasible one, or the last where none was feasible."""
 
-    def __init__(self, objective: Callable, constraints: list[dict], same: Callable):
-        self.objective, self.constraints, self.same, self.best, self.least, self.steps = (
+    def __init__(self, objective: Callable, constraints: list[dict], is_same_stroke: Callable):
+        self.objective, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
             objective,
             constraints,
-            same,
+            is_same_stroke,
             None,
             np.inf,
             -1,
@@ -94,7 +97,7 @@ class _Ascent:
 
     def __call__(self, x: np.ndarray) -> None:
         self.steps += 1
-        if not self.same(x):
+        if not self.is_same_stroke(x):
             raise RuntimeError("a loop of another number of strokes")
         value = (
             self.objective(x)[0]
@@ -104,21 +107,27 @@ class _Ascent:
         if value < self.least or (self.least == np.inf and np.isfinite(x).all()):
             self.best, self.least = np.array(x), value
 
-    def run(self, x: np.ndarray, stride: float, moving: int, most: int, tolerance: float) -> str:
-        """Run at most ``most`` steps from x, with the first ``moving`` numbers within ``stride`` of it, and return how
-        they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke; or "spent".
-        """
+    def run(self, x: np.ndarray, trust_radius: float, moving: int, max_steps: int, tolerance: float) -> str:
+        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``trust_radius`` of it, and
+        return how they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke;
+        or "spent"."""
         from scipy.optimize import minimize
 
-        radius = np.where(np.arange(len(x)) < moving, stride, np.inf)
+        radius = np.where(np.arange(len(x)) < moving, trust_radius, np.inf)
         try:
             self(x)
             with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds
                 warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
                 solution = minimize(
-                    self.objective, x, jac=True, method="SLSQP", constraints=self.constraints,
-                    bounds=np.stack([x - radius, x + radius], -1), options={"maxiter": most, "ftol": tolerance}, callback=self,
-                )  # fmt: skip
+                    self.objective,
+                    x,
+                    jac=True,
+                    method="SLSQP",
+                    constraints=self.constraints,
+                    bounds=np.stack([x - radius, x + radius], -1),
+                    options={"maxiter": max_steps, "ftol": tolerance},
+                    callback=self,
+                )
         except Enough:
             return "spent"
         except RuntimeError:

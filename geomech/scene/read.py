@@ -80,8 +80,9 @@ def load(scene: str | Path) -> Scene | Any:
             instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
     made = parse(text, str(scene))
-    for line in getattr(getattr(made, "system", None), "assumed", ()):
-        note(line)
+    system = getattr(made, "system", None)
+    for line in getattr(system, "assumed", ()):
+        note(f"{system.file}: {line}")
     return made
 
 

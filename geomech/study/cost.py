@@ -20,7 +20,7 @@ from geomech.run.cost import BASE, Cost, assumed
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.systems.base import System
-from geomech.systems.capabilities import at_once, costed, pieces_of, refined, settling, solver_of, stored
+from geomech.systems.capabilities import at_once, balance_size, pieces_of, refined, settling, solver_of, stored
 from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
@@ -57,9 +57,8 @@ def price(jobs: Sequence[Job]) -> Cost:
             if solver_of(system) is None:
                 besides += CLOSED * job.count
             else:
-                seconds += assumed(
-                    job.weight * job.count, costed(system).evaluations, system.traits.linear, job.batches
-                )
+                points = balance_size(system).evaluations
+                seconds += assumed(job.weight * job.count, points, system.traits.linear, job.batches)
     return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides, steps)
 
 
@@ -118,8 +117,8 @@ def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize)
     in a batch."""
     if not uncertainty.uncertain(scene.system):
         return []
-    phases = max(uncertainty.PHASES, 8 * gait.harmonics)
-    return uncertainty.points(scene.system) * direct(scene, gait, count, phases, together, checked=False)
+    phases, points = max(uncertainty.PHASES, 8 * gait.harmonics), uncertainty.points(scene.system)
+    return points * direct(scene, gait, count, phases, together, checked=False) + (points - 1) * frame(scene)
 
 
 def direct(
@@ -133,7 +132,8 @@ def direct(
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, at_once(system, phases))
-    stored = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
+    size = balance_size(system)
+    stored = group * (60 * size.elements + size.memory) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
     solves = (lambda n: n) if all_phases else (lambda n: solved(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]

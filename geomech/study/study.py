@@ -34,8 +34,6 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
-from geomech.tiers.harmonic import HARMONIC
-from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
@@ -44,7 +42,7 @@ SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks a
 
 class Study(Faced):
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
-    depends on. `with_numerics` returns a study with other numerics that shares them."""
+    depends on. `turned` returns a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -60,7 +58,7 @@ class Study(Faced):
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def with_numerics(self, **numerics) -> Study:
+    def turned(self, **numerics) -> Study:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
@@ -75,12 +73,6 @@ class Study(Faced):
 
     methods = property(lambda self: methods(self.scene.system))
     tiers = property(lambda self: tiers(self.scene.system))
-
-    @property
-    def lookups(self) -> tuple[str, ...]:
-        """Tiers that approximate the system's velocity, of those available."""
-        s = self.scene
-        return tuple(m for m in self.tiers if not TIERS[m].plan(s.system, s.numerics, s.gait, None).exact)
 
     def _stored(self, name: str, key: tuple, build: Callable):
         """Return the value of build(), the seconds that it took, and whether it was stored before."""
@@ -108,9 +100,9 @@ class Study(Faced):
     def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
         """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
         with located(self.scene.name):
-            how = _tier(tier)
-            how.refuse(self.scene.system)
-            return self._plan(how, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            chosen = _tier(tier)
+            chosen.refuse(self.scene.system)
+            return self._plan(chosen, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
 
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
@@ -124,26 +116,13 @@ class Study(Faced):
         with located(self.scene.name):
             return self._built(plan.table, progress)[0] if plan.table else None
 
-    def refuse_connection(self) -> None:
-        """Refuse a system without connection."""
-        with located(self.scene.name):
-            fitted.refuse(self.scene.system)
-
-    @property
-    def has_connection(self) -> bool:
-        """Whether the system has a connection, and few enough joints for a plain study to fit it."""
-        return PATH.is_offered(self.scene.system)
-
-    def compute_field(self, progress: Callable | None = None) -> None:
-        """Compute `fitted` now. progress: called with the fraction done."""
-        self._fitted(progress)
-
     @property
     def fitted(self) -> Connection:
         """Least-squares connection on the scene's grid."""
-        return self._fitted()
+        return self.compute_field()
 
-    def _fitted(self, progress: Callable | None = None) -> Connection:
+    def compute_field(self, progress: Callable | None = None) -> Connection:
+        """Return `fitted`. progress: called with the fraction done."""
         with located(self.scene.name):
             fitted.refuse(self.scene.system)
             return self._built(self._connection(), progress)[0]
@@ -156,13 +135,7 @@ class Study(Faced):
     @property
     def harmonics(self) -> Harmonics | None:
         """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
-        return self.compute_harmonics() if self.has_harmonics else None
-
-    @property
-    def has_harmonics(self) -> bool:
-        """Whether there are `harmonics`."""
-        system = self.scene.system
-        return not system.traits.linear and HARMONIC.is_offered(system)
+        return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
@@ -242,14 +215,6 @@ class Study(Faced):
         loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
         plan = self.plan(method, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
-
-    def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
-        """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
-        system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
-        field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
-        shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
-        in_groups(shapes, chosen, at_once(system, phases))
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
         """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
@@ -342,8 +307,17 @@ class Study(Faced):
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
                 self._refuse_singular(plan, gait, sampled, phases)
             if any(plan.table and plan.table.axes for plan in chosen.values()):
-                self.refuse_outside(gait, sampled, phases)
+                refuse_outside(scene, gait, sampled, phases)
         return gait, amplitudes, chosen
+
+
+def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+    """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
+    system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
+    field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
+    in_groups(shapes, chosen, at_once(system, phases))
 
 
 def _tier(name: str) -> Tier:

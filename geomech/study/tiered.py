@@ -16,9 +16,9 @@ from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.available import tiers
-from geomech.study.study import Study
+from geomech.study.study import Study, refuse_outside
 from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
-from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
 from rft.refusal import Refusal, located
@@ -62,7 +62,7 @@ class Settings:
         tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
         if any(table and table.axes for table in tables):
             with located(scene.name):
-                Study(scene).refuse_outside()
+                refuse_outside(scene)
 
     def cost(self) -> Cost:
         scene = self.scene
@@ -143,11 +143,12 @@ def applies(knob: Knob, scene: Scene) -> bool:
         return False
     if setting == "regularisation" and solver_of(system) is None:
         return False
-    of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points per joint: hours
+    if knob.tier not in tiers(system):
         return False
-    if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
-        return False
+    if knob.tier != DIRECT.name:
+        of_a_field = TIERS[knob.tier].common and (stored(system, "connection") or system.joints > 2)
+        if of_a_field or _plan(scene, knob.tier).exact:  # from 7 to 61 points per joint: hours
+            return False
     return setting != "pieces" or pieces_of(system) > 0
 
 

@@ -24,7 +24,7 @@ from geomech.systems.capabilities import (
     Refinable,
     Stepped,
     Symbolic,
-    Tunable,
+    Uncertain,
     capability,
     refined,
     stored,
@@ -64,7 +64,6 @@ class Framed:
     joints = property(lambda self: self.inner.joints)
     length = property(lambda self: self.inner.length)
     closed = property(lambda self: self.inner.closed)
-    solver = property(lambda self: self.inner.solver)
     settling = 0.0
 
     def capability(self, kind: type) -> Any:
@@ -72,7 +71,7 @@ class Framed:
         inner = capability(self.inner, kind)
         if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
             return self
-        own = (Dissipative, Drawable, Refinable, Diagnosed, Tunable)
+        own = (Dissipative, Drawable, Refinable, Diagnosed, Uncertain)
         return None if inner is None or kind is Symbolic else self if kind in own else inner
 
     @property
@@ -144,15 +143,22 @@ class Framed:
         inner = refined(self.inner)
         return None if inner is None else dataclasses.replace(self, inner=inner)
 
+    @property
+    def covariance(self) -> Any:
+        return capability(self.inner, Uncertain).covariance
+
+    def varied(self, step) -> Framed:
+        # With a frame of its own, as the system would have if its parameters were these.
+        return dataclasses.replace(self, inner=capability(self.inner, Uncertain).varied(step))
+
     def with_solver(self, solver) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(solver))
-
-    def in_frame(self, frame: str) -> System:
-        return self if frame == NAME else in_frame(self.inner, frame)
 
 
 def in_frame(system: System, frame: str) -> System:
     """Return a system seen from another of its frames; ValueError if it has none of that name."""
+    if isinstance(system, Framed):
+        return system if frame == NAME else in_frame(system.inner, frame)
     if own := getattr(system, "in_frame", None):
         return own(frame)
     if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:

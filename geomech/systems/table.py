@@ -190,12 +190,7 @@ class Table:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the file leaves open, and how it is taken, in notes."""
-        return tuple(f"{self.file}: {line}" for line in self.left_open)
-
-    @property
-    def left_open(self) -> tuple[str, ...]:
-        """The lines of `assumed`, without the file's name."""
+        """Lines on what the file does not say, and how it is taken."""
         return self.held.said if self.held.sized or self.body_length is not None else (*self.held.said, LENGTHS)
 
     @classmethod

@@ -8,6 +8,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.study.intrusion import Estimate
+from geomech.text.grains import effect_lines
 
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
@@ -16,19 +17,19 @@ def numbers(result: Result) -> dict[str, Any]:
     """Return the columns, and the errors of force, N, and moment, N m; None where there are none."""
     error, parts = result.attributes["error"], result.subject[0].parts
     known = {k: x if np.isfinite(x) else None for k, x in error._asdict().items()}
-    told = {"force": known["force"], "moment": known["moment"], f"from_{parts}": error.count}
-    return {**{v.name: v.values.tolist() for v in result.variables}, "estimate": told}
+    estimate = {"force": known["force"], "moment": known["moment"], f"from_{parts}": error.count}
+    return {**{v.name: v.values.tolist() for v in result.variables}, "estimate": estimate}
 
 
 def text(result: Result) -> str:
-    """Return extremes of force and moment, and where they are; their errors; work."""
+    """Return the extremes of force and moment with their places and errors, and the work."""
     (scene, found), error = result.subject, result.attributes["error"]
     columns = {v.name: v.values for v in result.variables}
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__
     lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
     if matched := getattr(scene, "matched", ""):
         lines.append(matched)
-    lines += scene.effects_told()
+    lines += effect_lines(scene.effects)
     place = "angle" if "angle" in columns else max((n for n in "xyz" if n in columns), key=lambda n: np.ptp(columns[n]))
     names = [n for n in columns if n.startswith(("force", "moment")) and not (n == "moment" and "moment_y" in columns)]
     for name in names:

@@ -13,8 +13,9 @@ import numpy as np
 
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
+from geomech.geometry.images import solved_count
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import costed, near
+from geomech.systems.capabilities import Costed, capability, near
 from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers, real_array
 from rft.premise import ALL, Premise
@@ -171,7 +172,8 @@ def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return costed(system).solved(gait, phases)
+    costed = capability(system, Costed)
+    return phases if costed is None else solved_count(gait, phases, costed.traits)
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

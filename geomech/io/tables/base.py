@@ -96,7 +96,9 @@ def scaled(held: Stored, factor: float) -> Stored:
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
     c, h = held.connection, held.harmonics
     more = {"unit": held.unit, "length": held.length}
-    more |= {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
+    if isinstance(c, Tube):
+        known = {name: times(getattr(c.known, name)) for name in ("A", "slope", "beyond", "off")}
+        more["known"] = replace(c.known, errors=c.known.errors * by[:, None, None, None], **known)
     c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
