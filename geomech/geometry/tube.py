@@ -164,11 +164,6 @@ class Known:
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
         return np.sqrt(_between(self.off**2, t) @ np.stack([along, 1 - along], -2))
 
-    def error_at(self, t) -> np.ndarray:
-        """(..., 3, d): of A at phases t (...) of the gait."""
-        squares = (series(self.errors[:, :, :, 0], t) ** 2).sum(-3)
-        return self.factor * np.sqrt(squares + self.off_at(t) ** 2)
-
     def reach(self, alpha) -> np.ndarray:
         """(...,): how far shapes (..., d) are from the gait, 1 where the data end."""
         t, delta = self._deviation(real_array("alpha", alpha))

@@ -87,7 +87,9 @@ class Fitted:
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
-        return series(self.known.A, t), self.known.error_at(t)
+        known = self.known
+        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.off_at(t) ** 2
+        return series(known.A, t), known.factor * np.sqrt(variance)
 
     @property
     def misfit(self) -> np.ndarray:
@@ -174,7 +176,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
-    known = replace(known, beyond=beyond, off=residual.off)
+    known = replace(known, beyond=beyond, off=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
