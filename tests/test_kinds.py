@@ -49,10 +49,10 @@ class Bare:
     """A law that supplies its traction and nothing else."""
 
     def __init__(self, law):
-        self.of = law
+        self.connection = law
 
     def traction(self, v_t, v_n, eps=0.0):
-        return self.of.traction(v_t, v_n, eps)
+        return self.connection.traction(v_t, v_n, eps)
 
 
 LAW = """

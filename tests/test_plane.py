@@ -10,7 +10,7 @@ from test_cli import geomech
 from geomech import Numerics, Scene, Study
 from geomech.gaits import Circle, Fourier, Wave
 from geomech.geometry import connection
-from geomech.geometry.plane import Plane, Seen, looked_up, plane
+from geomech.geometry.plane import Plane, ProjectedGait, interpolated_plane, plane
 from geomech.geometry.traits import Traits
 from geomech.geometry.two_form import spanned, spanned_by, two_form
 from geomech.output import plots
@@ -87,8 +87,8 @@ def test_planes_have_the_curvature_of_the_pair(pair):
     right = system.ccf(shapes, i, j) if i < j else -system.ccf(shapes, j, i)
     np.testing.assert_allclose(np.moveaxis(cut.ccf.values, 0, -1), right, atol=1e-12)
     np.testing.assert_allclose(study.two_form.slice(i, j, at).values, cut.ccf.values, atol=1e-12)
-    np.testing.assert_allclose(looked_up(study.fitted, pair, at).connection.A, cut.connection.A, atol=1e-12)
-    assert study.plane(pair, at) is cut and cut.held == [k for k in range(3) if k not in pair]
+    np.testing.assert_allclose(interpolated_plane(study.fitted, pair, at).connection.A, cut.connection.A, atol=1e-12)
+    assert study.plane(pair, at) is cut and cut.fixed == [k for k in range(3) if k not in pair]
 
 
 def test_a_plane_is_that_of_the_whole_field_in_sand():
@@ -201,7 +201,7 @@ def test_rows_of_planes_say_what_is_held_and_gaits_cast_shadows():
     flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
     for at, lies in ((-0.2, True), (-0.1, False)):
         cut = Plane((0, 2), (0.0, at, 0.0), study.plane((0, 2)).connection)
-        assert Seen(flat, cut).lies == lies
+        assert ProjectedGait(flat, cut).lies_in_plane == lies
         fig = plots.planes_figure([cut], flat)
         assert bool(fig.get_supxlabel()) != lies
 
@@ -242,8 +242,8 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
         centre=(0.1, 0.2, 0.0, -0.1),
     )
     scene = Scene(Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64))
-    looked_up, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
-    found = looked_up.study(*asked)
+    interpolated_plane, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
+    found = interpolated_plane.study(*asked)
     assert "field" in found["seconds"]
     monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
     study = Study(scene)
@@ -337,8 +337,8 @@ def test_a_surface_says_what_its_shades_mean():
     study = Study(Scene(Cubic(), LOOP, Numerics(grid=6, extent=1.2)))
     flat = Fourier(cos=((0.5,), (0.0,), (0.0,)), sin=((0.0,), (0.0,), (0.4,)), centre=(0.1, -0.2, 0.15))
     cut = study.plane((0, 2))
-    drawn = plots.ccf_surface(cut.ccf, 1, [Seen(flat, cut)])
-    signs = np.sign(cut.ccf(Seen(flat, cut).shape(np.linspace(0, 6, 50), np.linspace(0, 1, 9)))[..., 1])
+    drawn = plots.ccf_surface(cut.ccf, 1, [ProjectedGait(flat, cut)])
+    signs = np.sign(cut.ccf(ProjectedGait(flat, cut).shape(np.linspace(0, 6, 50), np.linspace(0, 1, 9)))[..., 1])
     found = [text.get_text() for text in drawn.get_legend().get_texts()]
     assert found == [way for sign, way in ((1, "to the left"), (-1, "to the right")) if (sign * signs > 0).any()]
 

@@ -31,7 +31,7 @@ class Image(NamedTuple):
     factor: np.ndarray
 
     def of(self, xi: np.ndarray) -> np.ndarray:
-        """Velocities (s, C, 3) at the images of shapes with velocities xi."""
+        """Return velocities (s, C, 3) at the images of shapes with velocities xi."""
         return self.factor * xi[:, self.source]
 
 
@@ -61,7 +61,7 @@ def mirrored(alpha: np.ndarray, count: int) -> list[Image]:
 
 
 def _matched(unit: np.ndarray, turned: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """[(source, sign (C, 1))] with unit = sign turned[source], or [] if the turned directions are others."""
+    """Return [(source, sign (C, 1))] with unit = sign turned[source], or [] if the turned directions are others."""
     products = unit @ turned.T
     source = np.abs(products).argmax(1)
     sign = np.sign(np.take_along_axis(products, source[:, None], 1))
@@ -70,7 +70,7 @@ def _matched(unit: np.ndarray, turned: np.ndarray) -> list[tuple[np.ndarray, np.
 
 
 def to_solve(found: Sequence[Image], size: int) -> np.ndarray:
-    """Mask (size,) of the shapes that are no later image of another."""
+    """Return mask (size,) of the shapes that are no later image of another."""
     first, own = np.ones(size, bool), np.arange(size)
     for image in found:
         first &= own <= image.index
@@ -87,11 +87,11 @@ class Around(NamedTuple):
     factor: np.ndarray | float
 
     def some(self, x: np.ndarray | None) -> np.ndarray | None:
-        """(..., n, k), of the phases that are solved, from (..., N, k)."""
+        """Return (..., n, k), of the phases that are solved, from (..., N, k)."""
         return None if x is None else x[..., self.solved, :]
 
     def whole(self, xi: np.ndarray) -> np.ndarray:
-        """Velocities (..., N, 3) at all phases from those (..., n, 3) at the phases that are solved."""
+        """Return velocities (..., N, 3) at all phases from those (..., n, 3) at the phases that are solved."""
         return self.factor * xi[..., self.source, :]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
-from geomech.geometry.tube import Known, Loop, Tube, grid_of, series, tube
+from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
 from geomech.measured import cycles, regression, slips, smooth, unknowns
 from geomech.measured.left import left
@@ -38,7 +38,7 @@ class Fitted:
     that is why they do not. length: of the body in m; 1 for a log in body lengths."""
 
     log: Log
-    known: Known
+    known: TaylorSeries
     times: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
@@ -77,11 +77,11 @@ class Fitted:
     def tube(self) -> Tube:
         """The connection near the mean gait, with a grid for pictures and files."""
         wide = float(np.sqrt(np.einsum("iip->pi", self.known.spread).min()))
-        extent = max(np.ptp(a) for a in grid_of(self.known, 2))
+        extent = max(np.ptp(a) for a in covering_grid(self.known, 2))
         joints = len(self.log.joints)
         most = min(MOST_POINTS, int(MOST_SHAPES ** (1 / joints)))
         points = int(np.clip(np.ceil(3 * extent / wide), min(31, most), most))
-        return tube(self.known, grid_of(self.known, points), self.residual, self.unit, self.length)
+        return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """(A (T, 3, d) at phases t of the mean gait, half widths of its interval)."""
@@ -91,7 +91,7 @@ class Fitted:
     def misfit(self) -> np.ndarray:
         """(3,), rms over the phase of what A may be off by along the gait, for what is left of xi beyond noise and what the
         series cuts off."""
-        return np.sqrt((self.known.off[:, 0] ** 2).mean(-1))
+        return np.sqrt((self.known.standard_error[:, 0] ** 2).mean(-1))
 
 
 def fit_log(
@@ -158,11 +158,11 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     A, errors = (held.split(x, loop) for x in (found, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
-    known = Known(
+    known = TaylorSeries(
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
         np.zeros((3, 2, 1)), regression.factor(len(held.square), level), level,
     )  # fmt: skip
-    if (largest := max(np.abs(known.whole).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
+    if (largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
         raise log.wrong(
             f"entries of A come out as large as {largest:.1g}",
             instead="give x and y in body lengths or m, and joints that move",
@@ -172,7 +172,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_off**2  # less what the mean leaves open
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     over = left(known, samples, varies)
-    known = replace(known, beyond=beyond, off=over.off)
+    known = replace(known, beyond=beyond, standard_error=over.off)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
@@ -193,14 +193,14 @@ def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
     return poses.mean(0), regression.factor(len(poses), level) * np.sqrt((errors**2).sum(0))
 
 
-def _net(known: Known) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(net pose (3,) of the mean gait, its shapes and their rates (PHASES, d))."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
-    return displacement(np.einsum("nij,nj->ni", known.of(alpha), alphadot)), alpha, alphadot
+    return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
 
 
-def _cycles(log: Log, known: Known, phase, count, joints, pose):
+def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
     """(times (C + 1,), measured (C, 3), predicted (C, 3))."""
     from scipy.interpolate import CubicSpline
 
@@ -209,7 +209,7 @@ def _cycles(log: Log, known: Known, phase, count, joints, pose):
     growing = np.maximum.accumulate(phase)
     times = np.interp(marks, growing, log.t)
     w, terms = known.terms_at(known.loop.projected(joints.values, phase), joints.values, joints.rates)
-    xi = np.einsum("ijmk,nk,njm->ni", known.whole, w, terms)
+    xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
     heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
     way = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
     poses = (pose.values, np.stack([way.real, way.imag, heading], -1))

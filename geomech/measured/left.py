@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geomech.geometry.tube import Known, series
+from geomech.geometry.tube import TaylorSeries, series
 from geomech.measured.reach import PLACES, WIDTH
 from geomech.measured.regression import RATES, Samples
 
@@ -29,16 +29,16 @@ SLOWEST = 0.03  # of its rms: the rate across the gait, at least
 
 class Left(NamedTuple):
     """residual: (3,), rms of what is left of xi, over that of the joint rates. explained: (3,), share of the squares of xi that
-    is not left. off: (3, 2, PLACES) of `geomech.geometry.tube.Known`."""
+    is not left. off: (3, 2, PLACES) of `geomech.geometry.tube.TaylorSeries`."""
 
     residual: np.ndarray
     explained: np.ndarray
     off: np.ndarray
 
 
-def left(known: Known, samples: Samples, varies: int) -> Left:
+def left(known: TaylorSeries, samples: Samples, varies: int) -> Left:
     """What ``known`` leaves of the samples, and cuts off."""
-    told = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.whole, *known.terms_at(samples.phase, alpha, rate))
+    told = lambda alpha, rate: np.einsum("ijmk,nk,njm->ni", known.combined, *known.terms_at(samples.phase, alpha, rate))
     all_of_it = samples.xi - told(samples.alpha, samples.rate)
     residual = np.sqrt((all_of_it**2).mean(0) / (samples.rate**2).sum(-1).mean())
     explained = 1 - (all_of_it**2).mean(0) / samples.xi.var(0).clip(1e-300)
@@ -56,7 +56,7 @@ def left(known: Known, samples: Samples, varies: int) -> Left:
     return Left(residual, explained, np.sqrt(square).transpose(2, 0, 1))
 
 
-def _cut_off(known: Known) -> np.ndarray:
+def _cut_off(known: TaylorSeries) -> np.ndarray:
     """(2, PLACES, 3): squares of what the upper harmonics of A make along the gait and across it, less those of their noise."""
     t = 2 * np.pi * np.arange(PLACES) / PLACES
     upper = np.arange(known.A.shape[-1]) > 2 * int(UPPER * (known.A.shape[-1] // 2))

@@ -14,8 +14,9 @@ LEAST = 0.02  # of the gait's size: as far from it A is that of the gait, where 
 
 
 def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:
-    """(d, d, P) of `tube.Known`: at phases, REACH^2 times the covariance of deviations, without their noise; or the square of
-    ``within``, rad, in all directions. Along the gait, where nothing deviates, it is the mean of what it is across."""
+    """(d, d, P) of `tube.TaylorSeries`: at phases, REACH^2 times the covariance of deviations, without their noise; or the
+    square of ``within``, rad, in all directions. Along the gait, where nothing deviates, it is the mean of what it is
+    across."""
     d = samples.alpha.shape[1]
     least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
     if within is not None or not varied:

@@ -81,8 +81,8 @@ def of_fit(fit: Fitted) -> Result:
     """Return A with its error, the CCF of two joints, and all that a lookup near the gait takes; the NetCDF file of it is read
     by `Connection.load` and [system] kind = "table"."""
     tube, unit = fit.tube, fit.unit
-    error = tube.at_grid(tube.known.of_error)
-    found = [*fields.of_connection(tube, error), *fields.of_known(tube.known, unit), fields.of_reach(tube)]
+    error = tube.at_grid(tube.taylor.connection_error)
+    found = [*fields.of_connection(tube, error), *fields.of_known(tube.taylor, unit), fields.of_reach(tube)]
     if len(tube.axes) == 2:
         found.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
     axes = fields.coordinates(tube.axes, [(name, "rad") for name in angles_of(tube.axes)])

@@ -12,7 +12,7 @@ from geomech.optimise.request import Request
 from geomech.scene.model import Scene
 from geomech.scene.write import gait_table
 from geomech.systems.base import length_unit
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Optimum:
         """The scene with the best gait, in a field that holds it."""
         scene, gait = self.request.scene, self.best.gait
         scene = scene.changed(gait=gait)
-        if isinstance(gait, Sine) or stored(scene.system, "connection"):
+        if isinstance(gait, Sine) or stored_table(scene.system, "connection"):
             return scene
         reach = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
         return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(reach)))

@@ -20,7 +20,7 @@ from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near, stored
+from geomech.systems.capabilities import Dissipative, OwnMetric, capability, near_gait, stored_table
 from geomech.systems.framed import Framed, in_frame
 from geomech.systems.premises import listed, refuse
 from rft.checks import in_range
@@ -76,7 +76,7 @@ class Request:
         and self.system.traits.singularity is None,
         doc="Whether a table leads near.",
     )  # fmt: skip
-    stored = property(lambda self: stored(self.system, "connection"))
+    stored_table = property(lambda self: stored_table(self.system, "connection"))
 
     @cached_property
     def power(self) -> Callable | None:
@@ -84,7 +84,7 @@ class Request:
         own metric for a system that has one; None where nothing tells what moving costs."""
         system = self.system
         if self.stored:
-            told, degree, box = stored(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
+            told, degree, box = stored_table(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
             return told and (lambda alpha, alphadot, xi: told.norm(np.clip(alpha, *box), alphadot) ** degree)
         if own := capability(system, OwnMetric):
             return lambda alpha, alphadot, xi: own.squared_speed(alpha, alphadot)
@@ -178,10 +178,10 @@ def checked(
         in_range("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
         towards = "" if direction is None else direction
-        if near(system):
+        if near_gait(system):
             raise Refusal(
                 "no gait but one to search",
-                because=f"A is known near {near(system)} alone",
+                because=f"A is known near {near_gait(system)} alone",
                 instead="measure more varied cycles",
             )
         wanted = Aim(aim, towards, system.length, **limits)
@@ -216,7 +216,9 @@ def checked(
             )
         if wanted.name == "turning" and _never_turns(request):
             whose = (
-                f"{told_by(system)} tells a body whose" if stored(system, "connection") else f"the {kind_of(system)}'s"
+                f"{told_by(system)} tells a body whose"
+                if stored_table(system, "connection")
+                else f"the {kind_of(system)}'s"
             )
             raise Refusal(
                 "no gait turns it",
@@ -228,7 +230,7 @@ def checked(
 
 def told_by(system: System) -> str:
     """A system, or its file."""
-    return "the table's file" if stored(system, "connection") else f"the {kind_of(system)}"
+    return "the table's file" if stored_table(system, "connection") else f"the {kind_of(system)}"
 
 
 def _in_mirror(request: Request) -> bool:
@@ -238,7 +240,7 @@ def _in_mirror(request: Request) -> bool:
 
 def _stays(system: System) -> bool:
     """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
-    if system.traits.steps or not system.traits.linear or stored(system, "connection"):
+    if system.traits.steps or not system.traits.linear or stored_table(system, "connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
         system = in_frame(system, "mean")

@@ -13,7 +13,7 @@ from geomech.study.bench import Study
 from geomech.study.fields import recorded
 from geomech.study.shape_space import check_two_joints
 from geomech.systems.base import length_unit, shape_labels
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 
 
 def save_connection(path: str | Path, study: Study, sign: str = "+", order: str = "ndgrid") -> None:
@@ -30,7 +30,7 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
     even = study.even_part  # counts at half of all directions
     left = fitted.residual if even is None else np.sqrt(fitted.residual**2 + even**2 / 2)
     rest = {} if np.isnan(left[:, ~np.isnan(fitted.A).any((0, 1))]).any() else {RESIDUAL: left}
-    if (error := stored(scene.system, "A_error")) is not None:
+    if (error := stored_table(scene.system, "A_error")) is not None:
         rest[ERROR] = error
     factor = 1.0 if sign == "+" else -1.0
     shapes = dict(zip(("alpha1", "alpha2"), np.meshgrid(*fitted.axes, indexing="ij")))

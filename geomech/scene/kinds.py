@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.io.files import read_text
-from geomech.systems.functions import class_of
+from geomech.systems.functions import class_from_function
 from rft.refusal import Refusal, formatted, located
 from rft.registry import REGISTRIES, Registry, home, place
 
@@ -43,7 +43,7 @@ def register(part: Any = None, /, **members: Any) -> Any:
         return lambda function: register(function, **members)
     for name, value in members.items():
         setattr(part, name, value)
-    registered = class_of(part) if isinstance(part, types.FunctionType) and hasattr(part, "joints") else part
+    registered = class_from_function(part) if isinstance(part, types.FunctionType) and hasattr(part, "joints") else part
     registry_of(registered).register(registered)
     return part
 

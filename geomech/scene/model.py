@@ -18,7 +18,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.sizes import Physical
 from geomech.systems import KINDS as SYSTEMS
-from geomech.systems.base import Cycle, System, as_system, given, kind_of, note_angles
+from geomech.systems.base import Cycle, System, as_system, kind_of, note_angles, unwrapped
 from geomech.systems.capabilities import solver_of, with_solver
 from geomech.systems.swimmer import PARTS
 from geomech.tiers.base import Numerics
@@ -93,7 +93,7 @@ class Scene(Told):
         own = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with located(self.name):
             of_system = {k: v for k, v in changes.items() if k not in own}
-            system = given(own.get("system", self.system))
+            system = unwrapped(own.get("system", self.system))
             for name in of_system:
                 choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
             if of_system:

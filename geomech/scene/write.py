@@ -16,7 +16,7 @@ from geomech.scene.medium import MEDIUM
 from geomech.scene.model import SWIMMER, Scene, checked_scene
 from geomech.scene.read import from_tables
 from geomech.scene.sections import Each, Keys, Section, sections_of, variants
-from geomech.systems.base import given
+from geomech.systems.base import unwrapped
 from geomech.systems.capabilities import solver_of
 from geomech.systems.framed import Framed
 from geomech.systems.swimmer import Swimmer, name_in
@@ -154,7 +154,7 @@ def _named(part: Any) -> Any:
     """Return the object inside a system that a scene file can name."""
     if isinstance(part, Framed):
         return _named(part.inner)
-    return given(part)
+    return unwrapped(part)
 
 
 def _numerics(scene: Scene) -> dict:

@@ -28,7 +28,7 @@ from geomech.study.offer import METHODS as METHODS
 from geomech.study.offer import methods, tiers
 from geomech.study.results import Displacements
 from geomech.systems.base import refuse_singular, shape_labels
-from geomech.systems.capabilities import at_once, stored
+from geomech.systems.capabilities import gaits_per_batch, stored_table
 from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
@@ -208,8 +208,8 @@ class Study(Faced):
     def even_part(self) -> np.ndarray | None:
         """What of the velocity is even in alphadot, as skin friction makes it (`connection.even_part`): None if nothing."""
         system = self.scene.system
-        if stored(system, "connection"):
-            return stored(system, "even part")
+        if stored_table(system, "connection"):
+            return stored_table(system, "even part")
         build = lambda: even_part(system.velocity, self.fitted.axes, system.traits)
         return self._stored("even part", fitted.key(self.scene.numerics, ("grid", "extent")), build)[0]
 
@@ -243,7 +243,7 @@ class Study(Faced):
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
         shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
-        in_groups(shapes, every, at_once(system, n.phases))
+        in_groups(shapes, every, gaits_per_batch(system, n.phases))
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""

@@ -14,7 +14,7 @@ from geomech.study import cost, tables, uncertainty
 from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
-from geomech.systems.capabilities import pieces_of, settling, solver_of
+from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved
 from geomech.tiers.direct import DIRECT
 from rft.checks import is_number, real_array
@@ -100,11 +100,11 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
         if (2 * pieces > FINEST_PIECES) if coarse_pieces else (2 * phases > MOST_PHASES):
             break
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
-        finer_scene = scene.with_numerics(pieces=pieces) if pieces_of(scene.system) else scene
+        finer_scene = scene.with_numerics(pieces=pieces) if pieces_per_length(scene.system) else scene
         ask(cost.direct(finer_scene, gait, len(worse), phases))
         finer, now, left = in_groups(finer_scene, gait, amplitudes[worse], phases)
         stalled = (now + left > 0.9 * error[worse])[:, 0].all() and phases > 1024
         poses[worse], error[worse], of_pieces[worse], open_ = finer, now + left, left, worse
         if stalled:
             break
-    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_of(scene.system) else {})}
+    return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_per_length(scene.system) else {})}

@@ -21,7 +21,15 @@ from geomech.run.cost import BASE, Cost, assumed
 from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.systems.base import System
-from geomech.systems.capabilities import at_once, costed, pieces_of, refined, settling, solver_of, stored
+from geomech.systems.capabilities import (
+    costed,
+    gaits_per_batch,
+    pieces_per_length,
+    refined,
+    settling,
+    solver_of,
+    stored_table,
+)
 from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved
@@ -129,8 +137,8 @@ def direct(
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
-    group = min(max(1, count), together, at_once(system, phases))
-    held = group * (60 * costed(system).elements + costed(system).held) if stepping else 0
+    group = min(max(1, count), together, gaits_per_batch(system, phases))
+    held = group * (60 * costed(system).elements + costed(system).memory) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
     solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
@@ -156,7 +164,7 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
     quarter, system = phases // 4, scene.system
     runs = [(phases, 1.0)]
     runs += [(phases // k, 1.0) for k in (2, 4, 8)] if system.traits.steps else []
-    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_of(system) else []
+    runs += [(quarter, 2.0), (phases, 0.5), (phases, 0.25)] if pieces_per_length(system) else []
     return runs + ([(quarter, 1.0)] if refined(system) else [])
 
 
@@ -180,7 +188,7 @@ def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
 def of_even_part(scene: Scene) -> list[Job]:
     """What of the velocity is even in alphadot (`Study.even_part`): a look at a few shapes, and at all where it is not odd."""
     system = scene.system
-    if stored(system, "connection"):
+    if stored_table(system, "connection"):
         return []
     shapes = math.prod(len(a) for a in fitted.axes(system, scene.numerics))
     looked_at = EVEN_SHAPES + (0 if system.traits.odd else shapes)
@@ -196,7 +204,7 @@ def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> l
 def of_metric(scene: Scene) -> list[Job]:
     """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics
-    if stored(system, "metric"):
+    if stored_table(system, "metric"):
         return []
     if effort.shared(system):
         return built(scene, effort.shared_table(system, n))
@@ -212,4 +220,4 @@ def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)
     jobs += once(phases // 2) + once(phases // 4) if system.traits.steps else []
-    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_of(system) else [])
+    return jobs + ([job._replace(weight=2.0) for job in once(phases // 4)] if pieces_per_length(system) else [])

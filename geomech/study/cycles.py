@@ -19,7 +19,7 @@ from geomech.study.batch import beside, kind
 from geomech.study.cost import direct, of_medium, price
 from geomech.study.grid import Grid, at_points
 from geomech.systems.base import length_unit
-from geomech.systems.capabilities import at_once
+from geomech.systems.capabilities import gaits_per_batch
 
 HELD = 200  # bytes of a point: its row, and what becomes of it on the way to a file
 MAKING = 6e-4  # s that a scene takes to be made of its tables, measured
@@ -46,7 +46,7 @@ class Cycles:
         return grid
 
     def together(self, scene: Scene) -> int:
-        return min(SAMPLES_TOGETHER, at_once(scene.system, scene.numerics.phases))
+        return min(SAMPLES_TOGETHER, gaits_per_batch(scene.system, scene.numerics.phases))
 
     def rows(self, scenes: list[Scene], amplitudes: list[float] | None) -> np.ndarray:
         """Return x, y, theta, errors of position and heading, and standard deviations of QUANTITIES where the medium is

@@ -13,7 +13,7 @@ from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.tube import Known, Tube
+from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
 from geomech.io.results import units_of, write_netcdf
 from geomech.io.tables.netcdf import SHAPE
@@ -23,7 +23,7 @@ from geomech.study import effort
 from geomech.study.bench import Study
 from geomech.study.tables import COMPONENTS
 from geomech.systems.base import System, length_unit, shape_labels
-from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored
+from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
 from geomech.systems.framed import Framed
 
 ERROR_OF_CCF = "estimated error of ccf: largest difference, at a shape and its neighbours, from half the grid's points"
@@ -68,9 +68,9 @@ def attributes(study: Study) -> dict:
 def variables(study: Study) -> list[Variable]:
     """Return what a study tells of shape space, without its coordinates."""
     unit = length_unit(study.scene.system)
-    found = of_connection(study.fitted, stored(study.scene.system, "A_error"))
+    found = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
     if isinstance(study.fitted, Tube):
-        found += [*of_known(study.fitted.known, unit), of_reach(study.fitted)]
+        found += [*of_known(study.fitted.taylor, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
         what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
         found.append(of_ccf(study.curvature, study.curvature_error, what))
@@ -113,7 +113,7 @@ def of_reach(tube: Tube) -> Variable:
     return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", told)
 
 
-def of_known(known: Known, unit: str) -> list[Variable]:
+def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     """What a connection near one gait is looked up in (`geomech.geometry.tube`)."""
     units, order = (
         f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)",
@@ -140,7 +140,7 @@ def of_known(known: Known, unit: str) -> list[Variable]:
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
-            "gait_off", ("component", "along_and_across", "place"), known.off, units,
+            "gait_off", ("component", "along_and_across", "place"), known.standard_error, units,
             "at equally spaced phases: standard errors of A along the mean gait, and across it, for what is left of xi",
         ),
     ]  # fmt: skip

@@ -20,7 +20,7 @@ from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems import Swimmer
 from geomech.systems.base import System, refuse_singular
-from geomech.systems.capabilities import near
+from geomech.systems.capabilities import near_gait
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
@@ -117,7 +117,7 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
     if own:
         size = abs(gait.amplitude)
-        if near(scene.system):
+        if near_gait(scene.system):
             return _near(scene, gait)
         found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
         return [float(np.copysign(a, gait.amplitude)) for a in found]

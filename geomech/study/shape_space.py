@@ -21,7 +21,7 @@ from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 from geomech.tiers.fitted import fits
 from rft.refusal import Refusal, located
 
@@ -99,7 +99,7 @@ class ShapeSpace(Question):
                 f"{joints} joints have {len(pairs)} pairs",
                 instead=f"say which, such as --pair 1,{joints}, or give a chain [body] modes",
             )
-        return [(one, through(self.scene, one, self.held, self.pair is not None)) for one in pairs]
+        return [(one, through(self.scene, one, self.stored, self.pair is not None)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
@@ -188,7 +188,7 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
     if angles is None:
         return at
     extent = scene.numerics.extent
-    if not (stored(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
+    if not (stored_table(scene.system, "connection") or all(abs(a) <= extent for a in angles)):
         raise Refusal(
             f"the angles must lie within the field's {extent:g} rad",
             where="--slice",

@@ -9,7 +9,7 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
-from geomech.geometry.field import UNTOLD
+from geomech.geometry.field import UNKNOWN_UNIT
 from geomech.io.results import units_of
 from geomech.scene.model import Scene, frequency_of
 from geomech.systems.base import length_unit
@@ -207,4 +207,4 @@ def error_of(table: Mapping, quantity: str, tier: str) -> np.ndarray:
 
 def unit_of(table: Mapping, quantity: str) -> str:
     """Return the unit of one of QUANTITIES, of a table that may be a user's own."""
-    return "rad" if quantity == "heading" else table.get("units", {}).get(quantity, UNTOLD)
+    return "rad" if quantity == "heading" else table.get("units", {}).get(quantity, UNKNOWN_UNIT)

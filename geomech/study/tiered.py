@@ -18,7 +18,7 @@ from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.bench import Study
 from geomech.study.offer import tiers
-from geomech.systems.capabilities import is_closed, own_error, pieces_of, solver_of, stored
+from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
@@ -92,7 +92,7 @@ class Settings:
         scene = self.scene
         if knob is None:
             finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
-            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_of(scene.system) else finest
+            finest = finest.with_numerics(pieces=FINE_PIECES) if pieces_per_length(scene.system) else finest
             return finest.with_numerics(phases=_truth_phases(scene))
         setting = knob.setting or knob.name
         if value is not None:
@@ -121,10 +121,10 @@ class Settings:
         return {**entry, "buys": knob.buys}
 
     @property
-    def own_error(self) -> float:
+    def table_error(self) -> float:
         """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
-        return float(own_error(self.scene.system, *shapes)[..., 0].max())
+        return float(table_error(self.scene.system, *shapes)[..., 0].max())
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         return cheapest(lines, tolerance, self.own_error)
@@ -144,11 +144,11 @@ def applies(knob: Knob, scene: Scene) -> bool:
     if setting == "regularisation" and solver_of(system) is None:
         return False
     of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (stored(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+    if of_a_field and (stored_table(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
         return False
     if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False
-    return setting != "pieces" or pieces_of(system) > 0
+    return setting != "pieces" or pieces_per_length(system) > 0
 
 
 def _plan(scene: Scene, tier: str) -> Plan:

@@ -79,12 +79,12 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 
 
 @dataclass(frozen=True)
-class Given:
+class WrappedSystem:
     """A system of a velocity alone, or of an object that lacks some of the five members. `as_system` makes one.
 
     given: the function, or the object. joints, length, traits: as of `System`."""
 
-    given: Any
+    unwrapped: Any
     joints: int
     length: float = 1.0
     traits: Traits = NOTHING
@@ -94,16 +94,16 @@ class Given:
         in_range("length", self.length, 1e-9, 1e9)
         if not isinstance(self.traits, Traits):
             raise Refusal("traits must be Traits(...)", value=self.traits)
-        if not _takes_two(self._velocity):
+        if not _accepts_two(self._velocity):
             raise Refusal(f"the velocity of {self.kind} must take (alpha, alphadot)")
 
     @property
     def kind(self) -> str:
-        return kind_of(self.given)
+        return kind_of(self.wrapped)
 
     @property
     def _velocity(self) -> Callable:
-        return getattr(self.given, "velocity", self.given)
+        return getattr(self.wrapped, "velocity", self.wrapped)
 
     @cached_property
     def _batched(self) -> Callable:
@@ -116,18 +116,18 @@ class Given:
         return evaluate(self._batched, alpha, alphadot, masked=self.traits.singularity is not None)
 
     def run(self, alpha, alphadot, work: bool = False) -> Cycle:
-        own = getattr(self.given, "run", None)
-        return integrated(self, alpha, alphadot) if own is None else own(alpha, alphadot)
+        method = getattr(self.wrapped, "run", None)
+        return integrated(self, alpha, alphadot) if method is None else method(alpha, alphadot)
 
     def __reduce__(self) -> tuple:
-        return Given, (self.given, self.joints, self.length, self.traits)
+        return WrappedSystem, (self.wrapped, self.joints, self.length, self.traits)
 
     def capability(self, kind: type) -> Any:
         """Return the object given, if it has the ability."""
-        return self.given if isinstance(self.given, kind) else None
+        return self.wrapped if isinstance(self.wrapped, kind) else None
 
 
-def _takes_two(function: Callable) -> bool:
+def _accepts_two(function: Callable) -> bool:
     try:
         inspect.signature(function).bind(None, None)
     except TypeError:
@@ -137,28 +137,28 @@ def _takes_two(function: Callable) -> bool:
     return True
 
 
-def as_system(given: Any, joints: int | None = None) -> System:
+def as_system(unwrapped: Any, joints: int | None = None) -> System:
     """Return a system from whatever has a velocity: itself where it has the five members, else with defaults for those it
     lacks. joints: of a function that does not say them. ValueError, one line, for anything else."""
-    if not isinstance(given, type) and all(hasattr(given, name) for name in MEMBERS):
-        refuse_mutable(given)
-        if not isinstance(given.traits, Traits):
-            raise Refusal(f"traits of the {kind_of(given)} must be Traits(...)", value=given.traits)
-        return given
-    function = getattr(given, "velocity", given)
-    joints = getattr(given, "joints", joints)
-    if isinstance(given, type) or not callable(function) or joints is None:
+    if not isinstance(unwrapped, type) and all(hasattr(unwrapped, name) for name in MEMBERS):
+        refuse_mutable(unwrapped)
+        if not isinstance(unwrapped.traits, Traits):
+            raise Refusal(f"traits of the {kind_of(unwrapped)} must be Traits(...)", value=unwrapped.traits)
+        return unwrapped
+    function = getattr(unwrapped, "velocity", unwrapped)
+    joints = getattr(unwrapped, "joints", joints)
+    if isinstance(unwrapped, type) or not callable(function) or joints is None:
         raise Refusal(
             "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot)",
-            value=given,
+            value=unwrapped,
         )
-    refuse_mutable(given)
-    return Given(given, joints, getattr(given, "length", 1.0), getattr(given, "traits", NOTHING))
+    refuse_mutable(unwrapped)
+    return WrappedSystem(unwrapped, joints, getattr(unwrapped, "length", 1.0), getattr(unwrapped, "traits", NOTHING))
 
 
-def given(system: Any) -> Any:
+def unwrapped(system: Any) -> Any:
     """Return what `as_system` was given."""
-    return system.given if isinstance(system, Given) else system
+    return system.wrapped if isinstance(system, WrappedSystem) else system
 
 
 def kind_of(system: Any) -> str:
@@ -187,16 +187,16 @@ def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
 
 def refuse_singular(system: System, alpha) -> None:
     """ValueError naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
-    if own := getattr(system, "refuse_singular", None):
-        own(alpha)
+    if method := getattr(system, "refuse_singular", None):
+        method(alpha)
         return
     singularity = system.traits.singularity
     if singularity is None:
         return
     d = singularity(alpha)
-    met = (d == 0) | (d * np.roll(d, -1, -1) < 0)
-    if met.any():
-        shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[met][0])
+    singular = (d == 0) | (d * np.roll(d, -1, -1) < 0)
+    if singular.any():
+        shape = ", ".join(f"{x:.3g}" for x in np.asarray(alpha)[singular][0])
         raise Refusal(
             f"the gait meets the singular shape near alpha = ({shape}), where {system.traits.singular}",
             instead="move its centre, or lower the amplitude",

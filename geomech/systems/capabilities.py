@@ -26,8 +26,8 @@ STEPPED_TOGETHER = 1 << 22  # likewise of time steps, each of which takes its ti
 
 def capability(system: System, kind: type[T]) -> T | None:
     """Return the object with which a system has an ability, a protocol of this module; None if it has not."""
-    if own := getattr(system, "capability", None):
-        return own(kind)
+    if method := getattr(system, "capability", None):
+        return method(kind)
     return system if isinstance(system, kind) else None
 
 
@@ -79,12 +79,12 @@ class Drawable(Protocol):
 class Tabulated(Protocol):
     """A velocity that is looked up in tables of its own; read wherever a table would be computed."""
 
-    near: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
+    near_gait: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
 
     def table(self, name: str) -> Any:
         """Return the table "connection", "harmonics", "metric", "even part" or "A_error"; None without it."""
 
-    def own_error(self, alpha, alphadot) -> np.ndarray:
+    def table_error(self, alpha, alphadot) -> np.ndarray:
         """Return (..., 2), body lengths and rad: what the tables leave of the net pose of cycles (..., N, d)."""
 
 
@@ -114,10 +114,10 @@ class Costed(Protocol):
 
     elements: int  # straight parts of the body
     evaluations: int  # places at which forces are evaluated for one velocity
-    held: int  # numbers that time stepping remembers for each sample
+    memory: int  # numbers that time stepping remembers for each sample
     batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
 
-    def solved(self, alpha, alphadot) -> int:
+    def solved_phases(self, alpha, alphadot) -> int:
         """Return at how many phases of cycles (..., N, d) a balance is solved: the others are images of these."""
 
 
@@ -170,13 +170,13 @@ class Recorded(Protocol):
         """Return them by name."""
 
 
-def stored(system: System, name: str) -> Any:
+def stored_table(system: System, name: str) -> Any:
     """Return the table of that name that a system looks up; None where tables are computed."""
     tabulated = capability(system, Tabulated)
     return None if tabulated is None else tabulated.table(name)
 
 
-def pieces_of(system: System) -> int:
+def pieces_per_length(system: System) -> int:
     """Return the pieces to a body length that effects which vary along elements see; 0 without such effects."""
     subdivided = capability(system, Subdivided)
     return 0 if subdivided is None else subdivided.cut
@@ -190,10 +190,10 @@ def refined(system: System) -> System | None:
 
 def power(system: System, alpha, alphadot) -> np.ndarray:
     """Return the power (...) of a dissipative system at shapes and rates (..., d), as `Dissipative` has it."""
-    return driven(system, alpha, alphadot)[1]
+    return velocity_and_power(system, alpha, alphadot)[1]
 
 
-def driven(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+def velocity_and_power(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
     """Return xi (..., 3) and power (...) of the same solutions; ValueError for a system that says no power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
@@ -219,7 +219,7 @@ def with_solver(system: System, changes: Mapping[str, Any]) -> System:
     return system.with_solver(replace(system.solver, **changes)) if changes else system
 
 
-def at_once(system: System, phases: int) -> int:
+def gaits_per_batch(system: System, phases: int) -> int:
     """Return how many amplitudes of a gait are run side by side, at least one: more take more memory and no less time."""
     cost = costed(system)
     if cost.batched:
@@ -227,19 +227,19 @@ def at_once(system: System, phases: int) -> int:
     if not system.traits.steps:
         return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * cost.elements)))
     # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.held // 8))
+    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.memory // 8))
 
 
-def near(system: System) -> str:
+def near_gait(system: System) -> str:
     """Return the one gait near which alone a system is known, in words; "" where it is known everywhere."""
     tabulated = capability(system, Tabulated)
-    return "" if tabulated is None else tabulated.near
+    return "" if tabulated is None else tabulated.near_gait
 
 
-def own_error(system: System, alpha, alphadot) -> np.ndarray:
+def table_error(system: System, alpha, alphadot) -> np.ndarray:
     """Return (..., 2), body lengths and rad: what tables leave of the net pose of cycles (..., N, d); 0 without tables."""
     tabulated = capability(system, Tabulated)
-    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.own_error(alpha, alphadot)
+    return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.table_error(alpha, alphadot)
 
 
 def is_closed(system: System) -> bool:
@@ -254,10 +254,10 @@ class ClosedForm:
 
     system: System
     elements = evaluations = 1
-    held = 0
+    memory = 0
     batched = False
 
-    def solved(self, alpha, alphadot) -> int:
+    def solved_phases(self, alpha, alphadot) -> int:
         return np.shape(alpha)[-2]
 
 

@@ -54,7 +54,7 @@ class Momentum:
         check_numbers(self)
         object.__setattr__(self, "lengths", Chain(self.lengths, self.length, self.frame).lengths)
 
-    def of_links(self, name: str, least: float, most: float) -> None:
+    def check_per_link(self, name: str, least: float, most: float) -> None:
         """ValueError if the field of this name is not empty, nor a number from least to most for each link."""
         x = real_array(name, getattr(self, name))
         if x.shape not in ((0,), (len(self.lengths),)) or not ((least <= x) & (x <= most)).all():

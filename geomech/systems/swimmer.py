@@ -71,18 +71,19 @@ class Swimmer:
     def _agree(self) -> None:
         """ValueError if effects, or the body, say different things of the same swimmer."""
         sized = self.body.length != 1.0
-        for what, said in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
-            said += [(e.kind, getattr(e, what)) for e in self.effects if hasattr(e, what)]
-            for name, value in said[1:]:
-                if np.any(np.asarray(value) != said[0][1]):
+        for quantity, values in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
+            values += [(e.kind, getattr(e, quantity)) for e in self.effects if hasattr(e, quantity)]
+            for name, value in values[1:]:
+                if np.any(np.asarray(value) != values[0][1]):
                     raise Refusal(
-                        f"{said[0][0]} gives {what} = {said[0][1]!r} and {name} {value!r}", because="it is one swimmer"
+                        f"{values[0][0]} gives {quantity} = {values[0][1]!r} and {name} {value!r}",
+                        because="it is one swimmer",
                     )
 
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
     closed = property(lambda self: is_closed(self.medium))
-    held = property(lambda self: sum(e.memory_size for e in self.effects))
+    memory = property(lambda self: sum(e.memory_size for e in self.effects))
 
     @cached_property
     def traits(self) -> Traits:
@@ -199,8 +200,8 @@ class Swimmer:
         """Body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (..., 3) where
         that is known; see `rft.body_velocity`. ValueError if shape alone does not settle them."""
         refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
-        asked = self._settings("tolerance", "backend")
-        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **asked)
+        settings = self._settings("tolerance", "backend")
+        return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **settings)
 
     def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
         """xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did not converge."""
@@ -210,8 +211,8 @@ class Swimmer:
         s = self.solve(alpha, alphadot)
         if str(s.status) == "unconverged":
             raise Refusal("the force balance did not converge", instead="raise [numerics] regularisation")
-        told = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
-        return {"xi": s.xi.tolist(), **told}
+        status = {"status": str(s.status), "residual": float(s.residual), "iterations": int(s.iterations)}
+        return {"xi": s.xi.tolist(), **status}
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
         from geomech.symbolic import connections
@@ -231,14 +232,14 @@ class Swimmer:
 
     def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
         """The gait phase after phase (`rft.time_steps`), unchecked."""
-        asked = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
-        of = Swimmer.time_steps, self, alpha, alphadot, cycles is None
+        settings = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
+        context = Swimmer.time_steps, self, alpha, alphadot, cycles is None
 
         def advance(stepping: Stepping, state: State, count: int, with_work: bool) -> tuple[State, list[Row]]:
             step = partial(stepping.step, with_work=with_work)
-            return iterate(step, state, count, (*of, with_work), Row)
+            return iterate(step, state, count, (*context, with_work), Row)
 
-        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **asked)
+        return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **settings)
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
         """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
@@ -248,24 +249,24 @@ class Swimmer:
         speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
             images = around(alpha, alphadot, self.traits)
-            asked = (images.some(x) for x in (alpha, alphadot, start))
-            solution = self._of_gaits(speed.size, images.count).solve(*asked).checked()
+            samples = (images.some(x) for x in (alpha, alphadot, start))
+            solution = self._for_gaits(speed.size, images.count).solve(*samples).checked()
             xi = images.whole(solution.xi)
-            done = self._of_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
-            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, done, 1, 0.0 * speed)
+            work_done = self._for_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
+            return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, work_done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()
         net = displacement(steps.xi) if self._repeats(steps) else steps.displacement
         to_come = steps.drift if self.settling else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
-    def solved(self, alpha, alphadot) -> int:
+    def solved_phases(self, alpha, alphadot) -> int:
         return around(alpha, alphadot, self.traits).count
 
-    def _of_gaits(self, count: int, phases: int) -> Swimmer:
+    def _for_gaits(self, count: int, phases: int) -> Swimmer:
         """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
         effects = tuple(e.take(np.repeat(np.arange(count), phases)) for e in self.effects)
-        same = all(a is b for a, b in zip(effects, self.effects))
-        return self if same else dataclasses.replace(self, effects=effects)
+        unchanged = all(a is b for a, b in zip(effects, self.effects))
+        return self if unchanged else dataclasses.replace(self, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
         """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series
@@ -280,8 +281,8 @@ class Swimmer:
             if self._repeats(steps):
                 return repeated(poses(steps.xi), cycles)
         steps = self.time_steps(alpha, alphadot, before + cycles, path=True).checked()
-        own = steps.path[before * len(alpha) :]
-        return rft.se2.compose(rft.se2.inverse(own[:1]), own)
+        poses_after = steps.path[before * len(alpha) :]
+        return rft.se2.compose(rft.se2.inverse(poses_after[:1]), poses_after)
 
     @property
     def batched(self) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import costed, near
+from geomech.systems.capabilities import costed, near_gait
 from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers, real_array
 from rft.premise import ALL, Premise
@@ -146,7 +146,7 @@ class Tier:
         if system.joints not in self.joints:
             raise Refusal(f"the {self.name} tier {self.takes}, this body has {system.joints}", instead=self.instead)
         if self.meets_singular_shapes(system):
-            gait = near(system)
+            gait = near_gait(system)
             why = f"A is known near {gait} alone" if gait else f"the {kind_of(system)} has singular shapes"
             raise Refusal(f"the {self.name} tier sums a field up, and {why}", instead="use path or direct")
 
@@ -171,7 +171,7 @@ def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return costed(system).solved(*gait.cycle(phases, gait.amplitude or 1.0))
+    return costed(system).solved_phases(*gait.cycle(phases, gait.amplitude or 1.0))
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from geomech.gaits import Gait
 from geomech.geometry.connection import SAMPLES_TOGETHER, Velocity, evaluate
 from geomech.geometry.gait import checked_gait
 from geomech.geometry.reconstruct import displacement
-from geomech.systems.capabilities import at_once
+from geomech.systems.capabilities import gaits_per_batch
 from geomech.tiers.base import Plan, Tier, in_groups, solved
 from rft.checks import in_range
 from rft.premise import NONE
@@ -47,7 +47,7 @@ def _plan(system, numerics, gait: Gait, amplitudes) -> Plan:
     """The system runs the gait (`System.run`), by symmetry from as few of its phases as tell the others."""
     phases = numerics.phases
     run = lambda some: system.run(*gait.cycle(phases, some)).net
-    predict = lambda table, some: run(None) if some is None else in_groups(run, some, at_once(system, phases))
+    predict = lambda table, some: run(None) if some is None else in_groups(run, some, gaits_per_batch(system, phases))
     return Plan(predict, balances=_balances(system, gait), exact=True)
 
 

@@ -12,12 +12,12 @@ from geomech.geometry import connection
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import inside
 from geomech.geometry.images import images, mirrored, to_solve
-from geomech.geometry.plane import Plane, looked_up, shapes_of
+from geomech.geometry.plane import Plane, interpolated_plane, plane_shapes
 from geomech.geometry.plane import plane as fit_plane
 from geomech.geometry.traits import Traits
 from geomech.systems import premises
-from geomech.systems.base import Given, System, length_unit, shape_labels
-from geomech.systems.capabilities import stored
+from geomech.systems.base import System, WrappedSystem, length_unit, shape_labels
+from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import Framed
 from geomech.tiers.base import Numerics, Table
 from rft.premise import ALL
@@ -44,7 +44,7 @@ def directions(system: System, numerics: Numerics) -> int:
 def axes(system: System, numerics: Numerics) -> tuple[np.ndarray, ...]:
     """Return the axes of the field; ValueError if there is none, or one too large."""
     refuse(system)
-    if own := stored(system, "connection"):
+    if own := stored_table(system, "connection"):
         return own.axes
     d, n = system.joints, numerics.grid
     if n**d > LARGEST_GRID:
@@ -63,7 +63,7 @@ def fits(joints: int) -> int:
 def is_too_large(system: System, numerics: Numerics) -> bool:
     """Return whether tiers do without the field of so many shapes, and solve for A at those of the gait and of the surfaces
     that it spans."""
-    return system.joints > 3 and not stored(system, "connection") and numerics.grid**system.joints > FIELD
+    return system.joints > 3 and not stored_table(system, "connection") and numerics.grid**system.joints > FIELD
 
 
 def table(system: System, numerics: Numerics) -> Table:
@@ -85,18 +85,23 @@ def key(numerics: Numerics, names: tuple[str, ...]) -> tuple:
 
 
 def _build(system: System, numerics: Numerics, progress: Callable | None) -> Connection:
-    if own := stored(system, "connection"):
+    if own := stored_table(system, "connection"):
         return own if own.length else replace(own, unit=length_unit(system), length=system.length)
     if isinstance(system, Framed):
         return system.fitted(progress)
-    count, known = directions(system, numerics), {"traits": system.traits, "trusted": not isinstance(system, Given)}
+    count, known = (
+        directions(system, numerics),
+        {"traits": system.traits, "trusted": not isinstance(system, WrappedSystem)},
+    )
     known |= {"unit": length_unit(system), "length": system.length}
     return connection.fit(system.velocity, axes(system, numerics), count, numerics.interpolation, progress, **known)
 
 
 def at_shapes(system: System, numerics: Numerics) -> Callable:
     """Return the connection as a function of shapes (..., d), without a field."""
-    return connection.fitted_at(system.velocity, system.joints, directions(system, numerics), system.traits.linear)
+    return connection.connection_function(
+        system.velocity, system.joints, directions(system, numerics), system.traits.linear
+    )
 
 
 def solved_at(system: System, numerics: Numerics) -> int:
@@ -109,8 +114,8 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
 
     ValueError if there is no connection, or if the plane lies outside the field."""
     refuse(system)
-    if own := stored(system, "connection"):
-        return looked_up(own, pair, at)
+    if own := stored_table(system, "connection"):
+        return interpolated_plane(own, pair, at)
     axis = connection.grid(1, numerics.grid, numerics.extent)[0]
     at = inside((axis,) * system.joints, at, [name for name, _ in shape_labels(system)])
     count = directions(system, numerics)
@@ -120,17 +125,17 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
 
 def balances_of_plane(system: System, numerics: Numerics, pair: tuple[int, int], at) -> int:
     """Return the velocities that `plane` takes."""
-    if stored(system, "connection"):
+    if stored_table(system, "connection"):
         return 0
     axis, count = connection.grid(1, numerics.grid, numerics.extent)[0], directions(system, numerics)
-    alpha = shapes_of((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
+    alpha = plane_shapes((axis, axis), pair, np.asarray(at)).reshape(-1, system.joints)
     return int(to_solve(mirrored(alpha, count) if system.traits.halved else (), len(alpha)).sum()) * count
 
 
 def solved_shapes(system: System, numerics: Numerics, count: int) -> int:
     """Return the number of shapes of the field that are solved, each for ``count`` directions of alphadot; 0 of one that is
     stored."""
-    if stored(system, "connection"):
+    if stored_table(system, "connection"):
         return 0
     return _solved_shapes(system.joints, numerics.grid, count, system.traits.halved, system.traits.reversible)
 

@@ -10,7 +10,7 @@ import numpy as np
 from geomech.core.knob import Knob
 from geomech.geometry import harmonics
 from geomech.geometry.harmonics import Harmonics
-from geomech.systems.capabilities import stored
+from geomech.systems.capabilities import stored_table
 from geomech.tiers import fitted
 from geomech.tiers.base import Plan, Table, Tier
 from geomech.tiers.direct import itself
@@ -58,7 +58,7 @@ def _axes(system, numerics) -> tuple[np.ndarray, ...]:
 
 
 def _build(system, numerics, progress: Callable | None) -> Harmonics:
-    if own := stored(system, "harmonics"):
+    if own := stored_table(system, "harmonics"):
         return own
     count, degree = directions(system, numerics), numerics.interpolation
     known = {"highest": highest(system, numerics), "traits": system.traits}

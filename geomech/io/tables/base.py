@@ -46,7 +46,7 @@ class Stored:
     frame: str = "that of the table"
     sign: str = "+"
     order: str = "ndgrid"
-    said: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
     sha256: str = ""
     shapes: tuple[str, ...] = ()
     metric: Metric | Finsler | None = None
@@ -69,7 +69,7 @@ class Stored:
         return self.harmonics.highest if self.harmonics else 1
 
     @property
-    def told(self) -> bool:
+    def has_residual(self) -> bool:
         """Whether the file tells what its fit left of the velocity."""
         return bool(np.isfinite(self.table.residual).any())
 
@@ -96,7 +96,7 @@ def scaled(held: Stored, factor: float) -> Stored:
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
     c, h = held.connection, held.harmonics
     more = {"unit": held.unit, "length": held.length}
-    more |= {"known": c.known.scaled(by)} if isinstance(c, Tube) else {}
+    more |= {"taylor": c.taylor.scaled(by)} if isinstance(c, Tube) else {}
     c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     even, error = (x if x is None else times(x) for x in (held.even, held.A_error))

@@ -12,7 +12,7 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.tube import Known, Loop, Tube
+from geomech.geometry.tube import Loop, TaylorSeries, Tube
 from geomech.io.tables.base import (
     FORMATS,
     ROWS,
@@ -124,7 +124,7 @@ def _stored(found: dict, units: dict, told: dict, sign: str, sha256: str) -> Sto
     )  # fmt: skip
 
 
-def _known(found: dict, told: dict, turn: float) -> Known:
+def _known(found: dict, told: dict, turn: float) -> TaylorSeries:
     """What is known along a gait (`geomech.geometry.tube`), A times ``turn``."""
     sized = {"gait": 2, "gait_A": 3, "gait_slope": 4, "gait_errors": 5, "gait_spread": 3, "gait_beyond": 1}
     if missing := [name for name in sized if name not in found or found[name][1].ndim != sized[name]]:
@@ -148,7 +148,9 @@ def _known(found: dict, told: dict, turn: float) -> Known:
     if d < 2 or not np.abs(gait[:, 1:]).max(initial=0.0) > 0:
         raise Refusal("has a gait that does not move", instead=FITTED)
     beyond, off = np.abs(beyond), np.abs(off)
-    return Known(Loop(gait), turn * A, turn * slope, turn * errors, spread, beyond, off, float(factor), float(level))
+    return TaylorSeries(
+        Loop(gait), turn * A, turn * slope, turn * errors, spread, beyond, off, float(factor), float(level)
+    )
 
 
 def _metric(found: dict, told: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:

@@ -12,7 +12,7 @@ from geomech.gaits import Gait
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.geometry.metric import Finsler, Metric
-from geomech.geometry.plane import Plane, Seen
+from geomech.geometry.plane import Plane, ProjectedGait
 from geomech.geometry.two_form import TwoForm
 from geomech.output.plots.maps import ANGLES, PHASES, TITLES, Labels, ccf_map, draw_gait, largest
 from geomech.output.plots.style import blank, figure, quantity, styled
@@ -100,8 +100,8 @@ def planes_figure(
     variables. beside: the plane of a single one in another body frame, below on the same scales. names: of the two frames."""
     labels, rows = labels or _angles(planes), []
     for one in [*planes, *([] if beside is None else [beside])]:
-        seen = [] if gait is None else [Seen(gait, one)]
-        on, off = ([x for x in seen if x.lies == lies] for lies in (True, False))
+        seen = [] if gait is None else [ProjectedGait(gait, one)]
+        on, off = ([x for x in seen if x.lies_in_plane == lies] for lies in (True, False))
         rows.append(Row(one.ccf, one.error, on, [labels[k] for k in one.pair], off))
     told = [f"{told_at(one, labels)}; frame {name}" for one, name in zip([planes[0], beside], names)]
     return _ccf_rows(rows, style, None, told or [told_at(one, labels) for one in planes], same=beside is not None)
@@ -128,8 +128,8 @@ def _angles(planes: Sequence[Plane]) -> Labels:
 
 def told_at(plane: Plane, labels: Labels) -> str:
     """Where the joints are that are held on a plane."""
-    told = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.held)
-    return f"{told} {labels[plane.held[0]][1]}" if plane.held else ""
+    told = ", ".join(f"{quantity(labels[k][0])} = {plane.at[k]:.3g}".replace("-", MINUS_SIGN) for k in plane.fixed)
+    return f"{told} {labels[plane.fixed[0]][1]}" if plane.fixed else ""
 
 
 def _ccf_rows(rows: Sequence[Row], style: str, metric, names: Sequence[str], same: bool):
