@@ -1,4 +1,4 @@
-"""What a system is: five members, and how whatever has fewer is made one."""
+"""The interface of a system: five members, and adapters for objects that have fewer."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class System(Protocol):
 
     @property
     def traits(self) -> Traits:
-        """What algorithms may use to save work."""
+        """Facts that algorithms may use to save work."""
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
         """Return xi (..., 3) at shapes and rates (..., d), in the body frame; nan at singular shapes."""
@@ -70,7 +70,9 @@ class System(Protocol):
 
 
 def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
-    """Return the cycle of a velocity that follows from shape alone: its integral. Classes take this as their ``run``.
+    """Return the cycle of a velocity that follows from shape alone, by integration. Classes take this as their ``run``.
+
+    Refusal at a singular shape.
 
     ValueError at a singular shape."""
     refuse_singular(system, alpha)
@@ -80,7 +82,9 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 
 @dataclass(frozen=True)
 class WrappedSystem:
-    """A system of a velocity alone, or of an object that lacks some of the five members. `as_system` makes one.
+    """A system made by `as_system` from a velocity alone, or from an object that lacks some of the five members.
+
+    wrapped: the function, or the object. joints, length, traits: as of `System`.
 
     given: the function, or the object. joints, length, traits: as of `System`."""
 
@@ -107,7 +111,7 @@ class WrappedSystem:
 
     @cached_property
     def _batched(self) -> Callable:
-        """The velocity for many shapes at once, whichever it takes."""
+        """The velocity for many shapes at once, whether or not the wrapped one takes them."""
         alpha, rates = np.random.default_rng(0).normal(size=(2, 3, self.joints))
         return in_batches(self._velocity, *np.broadcast_arrays(alpha[:, None], rates))
 
@@ -123,7 +127,7 @@ class WrappedSystem:
         return WrappedSystem, (self.wrapped, self.joints, self.length, self.traits)
 
     def capability(self, kind: type) -> Any:
-        """Return the object given, if it has the ability."""
+        """Return the wrapped object, if it has the ability."""
         return self.wrapped if isinstance(self.wrapped, kind) else None
 
 
@@ -138,8 +142,8 @@ def _accepts_two(function: Callable) -> bool:
 
 
 def as_system(unwrapped: Any, joints: int | None = None) -> System:
-    """Return a system from whatever has a velocity: itself where it has the five members, else with defaults for those it
-    lacks. joints: of a function that does not say them. ValueError, one line, for anything else."""
+    """Return a system from an object with a velocity: the object itself where it has the five members, else with
+    defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else."""
     if not isinstance(unwrapped, type) and all(hasattr(unwrapped, name) for name in MEMBERS):
         refuse_mutable(unwrapped)
         if not isinstance(unwrapped.traits, Traits):
@@ -157,7 +161,7 @@ def as_system(unwrapped: Any, joints: int | None = None) -> System:
 
 
 def unwrapped(system: Any) -> Any:
-    """Return what `as_system` was given."""
+    """Return the object that `as_system` received."""
     return system.wrapped if isinstance(system, WrappedSystem) else system
 
 
@@ -167,7 +171,7 @@ def kind_of(system: Any) -> str:
 
 
 def note_angles(system: System, largest: float) -> None:
-    """UnitWarning if the largest of some shape variables is a joint angle beyond a full turn."""
+    """Warn (`UnitWarning`) if the largest of some shape variables is a joint angle beyond a full turn."""
     if system.traits.joint_angles:
         check_angle("a joint angle", largest)
 
@@ -186,7 +190,7 @@ def shape_labels(system: System) -> tuple[tuple[str, str], ...]:
 
 
 def refuse_singular(system: System, alpha) -> None:
-    """ValueError naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
+    """Raise Refusal naming the first shape at which a closed path alpha (..., N, joints) meets a singular one."""
     if method := getattr(system, "refuse_singular", None):
         method(alpha)
         return
@@ -204,7 +208,7 @@ def refuse_singular(system: System, alpha) -> None:
 
 
 def refuse_mutable(*parts) -> None:
-    """ValueError for a part of a class that has no hash: tables are kept under the system that they are of."""
+    """Raise Refusal for a part of a class without a hash: tables are stored under the system that they belong to."""
     for part in parts:
         if type(part).__hash__ is None:
             raise Refusal(

@@ -33,7 +33,7 @@ def capability(system: System, kind: type[T]) -> T | None:
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A velocity that is computed nearly; read by `geomech.study.estimate` to see by how much."""
+    """A velocity with a numerical error; read by `geomech.study.estimate`, which estimates it."""
 
     closed: bool  # whether the refined one has exact integrals over elements, else a finer rule
 
@@ -44,7 +44,7 @@ class Refinable(Protocol):
 
 @runtime_checkable
 class Subdivided(Protocol):
-    """A body that effects which vary along an element cut into pieces; read by estimates of the error that leaves."""
+    """A body that effects which vary along an element cut into pieces; read by estimates of the error of that cut."""
 
     cut: int  # pieces to a body length; 0 without such effects
 
@@ -77,7 +77,7 @@ class Drawable(Protocol):
 
 @runtime_checkable
 class Tabulated(Protocol):
-    """A velocity that is looked up in tables of its own; read wherever a table would be computed."""
+    """A velocity that is interpolated in tables of its own; read wherever a table would be computed."""
 
     near_gait: str  # the one gait near which alone it is known, in words; "" where it is known everywhere
 
@@ -85,22 +85,23 @@ class Tabulated(Protocol):
         """Return the table "connection", "harmonics", "metric", "even part" or "A_error"; None without it."""
 
     def table_error(self, alpha, alphadot) -> np.ndarray:
-        """Return (..., 2), body lengths and rad: what the tables leave of the net pose of cycles (..., N, d)."""
+        """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that the tables
+        cause."""
 
 
 @runtime_checkable
 class Uncertain(Protocol):
-    """Parameters that are not known for certain; read by `geomech.study.uncertainty`."""
+    """Parameters with a covariance; read by `geomech.study.uncertainty`."""
 
     covariance: Any  # (n, n)
 
     def varied(self, step) -> System:
-        """Return the system with parameters off by ``step`` (n,); ValueError if that is none."""
+        """Return the system with parameters changed by ``step`` (n,); Refusal if there is no such system."""
 
 
 @runtime_checkable
 class Stepped(Protocol):
-    """Cycles that are not all alike; read by `geomech.study.motion` and `choose`."""
+    """Cycles that differ from one another; read by `geomech.study.motion` and `choose`."""
 
     settling: float  # change of displacement at which cycles count as repeating, body lengths or rad; 0 if they are not run on
 
@@ -118,7 +119,7 @@ class Costed(Protocol):
     batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
 
     def solved_phases(self, alpha, alphadot) -> int:
-        """Return at how many phases of cycles (..., N, d) a balance is solved: the others are images of these."""
+        """Return at how many phases of cycles (..., N, d) a balance is solved; the others are images of these."""
 
 
 @runtime_checkable
@@ -167,17 +168,18 @@ class Recorded(Protocol):
     """Attributes for a file of its connection; read by `geomech.output`."""
 
     def about(self) -> Mapping[str, Any]:
-        """Return them by name."""
+        """Return the attributes by name."""
 
 
 def stored_table(system: System, name: str) -> Any:
-    """Return the table of that name that a system looks up; None where tables are computed."""
+    """Return the table of that name that a system interpolates; None where tables are computed."""
     tabulated = capability(system, Tabulated)
     return None if tabulated is None else tabulated.table(name)
 
 
 def pieces_per_length(system: System) -> int:
-    """Return the pieces to a body length that effects which vary along elements see; 0 without such effects."""
+    """Return the pieces per body length into which effects that vary along elements cut the body; 0 without such
+    effects."""
     subdivided = capability(system, Subdivided)
     return 0 if subdivided is None else subdivided.cut
 
@@ -189,12 +191,13 @@ def refined(system: System) -> System | None:
 
 
 def power(system: System, alpha, alphadot) -> np.ndarray:
-    """Return the power (...) of a dissipative system at shapes and rates (..., d), as `Dissipative` has it."""
+    """Return the power (...) of a dissipative system at shapes and rates (..., d), in the unit of
+    `Dissipative.power`."""
     return velocity_and_power(system, alpha, alphadot)[1]
 
 
 def velocity_and_power(system: System, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-    """Return xi (..., 3) and power (...) of the same solutions; ValueError for a system that says no power."""
+    """Return xi (..., 3) and power (...) of the same solutions; Refusal for a system without a power."""
     dissipative = capability(system, Dissipative)
     if dissipative is None:
         raise Refusal(f"no power with the {kind_of(system)}", because="nothing says what a change of shape costs it")
@@ -220,7 +223,7 @@ def with_solver(system: System, changes: Mapping[str, Any]) -> System:
 
 
 def gaits_per_batch(system: System, phases: int) -> int:
-    """Return how many amplitudes of a gait are run side by side, at least one: more take more memory and no less time."""
+    """Return how many amplitudes of a gait are run at a time, at least one: more take more memory and no less time."""
     cost = costed(system)
     if cost.batched:
         return sys.maxsize
@@ -231,19 +234,20 @@ def gaits_per_batch(system: System, phases: int) -> int:
 
 
 def near_gait(system: System) -> str:
-    """Return the one gait near which alone a system is known, in words; "" where it is known everywhere."""
+    """Return the one gait near which alone a system is valid, in words; "" where it is valid everywhere."""
     tabulated = capability(system, Tabulated)
     return "" if tabulated is None else tabulated.near_gait
 
 
 def table_error(system: System, alpha, alphadot) -> np.ndarray:
-    """Return (..., 2), body lengths and rad: what tables leave of the net pose of cycles (..., N, d); 0 without tables."""
+    """Return the errors (..., 2), body lengths and rad, of the net pose of cycles (..., N, d) that tables cause; 0
+    without tables."""
     tabulated = capability(system, Tabulated)
     return np.zeros((*np.shape(alpha)[:-2], 2)) if tabulated is None else tabulated.table_error(alpha, alphadot)
 
 
 def is_closed(system: System) -> bool:
-    """Return whether a system computes its velocity nearly, and `refined` has exact integrals."""
+    """Return whether a system computes its velocity with an error, and `refined` has exact integrals."""
     refinable = capability(system, Refinable)
     return refinable is not None and refinable.closed
 

@@ -34,7 +34,7 @@ class FloatingChain(Momentum):
         self.check_per_link("inertias", 1e-6, 1e6)
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
-        """Masses are parts of the whole."""
+        """Return masses, as shares of the whole chain's, and inertias of the links (`Momentum.inertia`)."""
         lengths = [number(x) for x in self.lengths]
         masses = [number(x) for x in self.masses] or lengths
         rod = number(1) / 12

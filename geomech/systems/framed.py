@@ -39,9 +39,9 @@ NAME = "minimum-perturbation"
 
 @dataclass(frozen=True)
 class Framed:
-    """A system in the frame in which its own connection, fitted on a grid, is smallest. What is not said here is the inner
-    system's. axes, directions, degree: of that fit. The frame is a field over the grid, so shapes outside have none; what
-    the direct tier and time stepping give is carried over to it, and agrees with other frames to rounding."""
+    """A system in the frame in which its own connection, fitted on a grid, is smallest. Other members are the inner
+    system's. axes, directions, degree: of that fit. The frame is a field over the grid, so shapes outside have none.
+    Results of the direct tier and of time stepping are transformed to it, and agree with other frames to roundoff."""
 
     inner: System
     axes: tuple[tuple[float, ...], ...]
@@ -68,7 +68,7 @@ class Framed:
     settling = 0.0
 
     def capability(self, kind: type) -> Any:
-        """Return what the inner system has, carried over to this frame where that makes a difference."""
+        """Return the ability of the inner system, transformed to this frame where that makes a difference."""
         inner = capability(self.inner, kind)
         if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
             return self
@@ -84,7 +84,7 @@ class Framed:
         return self._build(None)
 
     def _build(self, progress: Callable | None) -> tuple[Frame, Connection]:
-        """The frame, and the connection in it: of the same velocities, carried over."""
+        """Return the frame, and the connection in it: of the same velocities, transformed."""
         axes, unit = tuple(map(np.array, self.axes)), connection.directions(self.joints, self.directions)
         inverse = np.linalg.pinv(unit)
         reduce = lambda xi: (np.einsum("jc,sci->ijs", inverse, xi), xi.transpose(1, 2, 0))
@@ -111,7 +111,7 @@ class Framed:
         return self._frame_and_connection[1]
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) in the frame; ValueError outside its grid."""
+        """Return xi (..., 3) in the frame; ValueError outside its grid."""
         return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
@@ -125,13 +125,13 @@ class Framed:
         return {**inner, "xi": change_velocity(inner["xi"], *self.field(alpha, alphadot)).tolist()}
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
-        """Return the inner system's cycle, carried over; ``start``, of this frame's velocities, is of no use to that."""
+        """Return the inner system's cycle, transformed; ``start``, of this frame's velocities, is of no use to that."""
         cycle = self.inner.run(alpha, alphadot, work) if work else self.inner.run(alpha, alphadot)
         xi = change_velocity(cycle.xi, *self.field(alpha, alphadot))
         return cycle._replace(xi=xi, net=self.field.net(cycle.net, np.asarray(alpha)[..., 0, :]))
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
-        """Return g h of the inner frame's poses g, seen from the first."""
+        """Return the poses g h (cycles N + 1, 3), with g those of the inner frame, relative to the first."""
         inner = repeated(poses(self.inner.run(alpha, alphadot).xi), cycles)
         h = self.field.pose(np.concatenate([np.tile(alpha, (cycles, 1)), alpha[:1]]))
         return se2.compose(se2.inverse(h[0]), se2.compose(inner, h))
@@ -152,7 +152,7 @@ class Framed:
 
 
 def in_frame(system: System, frame: str) -> System:
-    """Return a system seen from another of its frames; ValueError if it has none of that name."""
+    """Return a system in another of its frames; Refusal if it has none of that name."""
     if method := getattr(system, "in_frame", None):
         return method(frame)
     if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:
@@ -161,7 +161,7 @@ def in_frame(system: System, frame: str) -> System:
 
 
 def formula(system: System) -> tuple[Any, tuple[Any, ...]]:
-    """Return A (3, joints) as a sympy Matrix and its shape variables (`geomech.symbolic`); ValueError if there is none."""
+    """Return A (3, joints) as a sympy Matrix and its shape variables (`geomech.symbolic`); Refusal if there is none."""
     if isinstance(system, Framed):
         raise Refusal(f"no formula in the {NAME} frame, which is a field of numbers", instead="take another frame")
     if (symbolic := capability(system, Symbolic)) is None:

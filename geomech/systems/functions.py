@@ -12,7 +12,8 @@ from geomech.systems.base import SYSTEMS
 
 
 def class_from_function(function: Callable) -> type:
-    """Return the class of systems that a function with ``joints`` makes. Parameters after alpha and alphadot are its fields."""
+    """Return a class of systems from a function that has an attribute ``joints``. Parameters after alpha and alphadot
+    are its fields."""
     _, _, *more = inspect.signature(function, eval_str=True).parameters.values()
     unset = inspect.Parameter.empty
     fields = [
@@ -39,5 +40,5 @@ def class_from_function(function: Callable) -> type:
 
 
 def _rebuild(kind: str, values: dict[str, Any]) -> Any:
-    """Return a system as it was sent to another process, where its function is registered, too."""
+    """Return a system that was sent to another process, in which its function is registered, too."""
     return SYSTEMS[kind](**values)

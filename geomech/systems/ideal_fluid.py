@@ -41,7 +41,8 @@ class IdealFluidSwimmer(Momentum):
         self.check_per_link("inertias", 1e-6, 1e6)
 
     def inertia(self, number=float) -> tuple[list[Any], list[list[Any]]]:
-        """In units of pi rho times the square of the body's length, per unit depth."""
+        """Return masses and inertias of the links (`Momentum.inertia`), in units of pi rho times the square of the
+        body's length, per unit depth."""
         body, aspect = sum(number(x) for x in self.lengths), number(self.aspect)
         a = [number(x) / body / 2 for x in self.lengths]
         b = [aspect * x for x in a]

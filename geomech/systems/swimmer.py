@@ -69,7 +69,7 @@ class Swimmer:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # not what is cached
 
     def _agree(self) -> None:
-        """ValueError if effects, or the body, say different things of the same swimmer."""
+        """Raise Refusal if effects, or the body, contradict each other about the swimmer's frequency or length."""
         sized = self.body.length != 1.0
         for quantity, values in (("frequency", []), ("length", [("[body]", self.body.length)] if sized else [])):
             values += [(e.kind, getattr(e, quantity)) for e in self.effects if hasattr(e, quantity)]
@@ -105,7 +105,7 @@ class Swimmer:
         )
 
     def capability(self, kind: type) -> Swimmer | None:
-        """Return itself if it has the ability, which hangs on its medium, its body and its effects."""
+        """Return itself if it has the ability, which depends on its medium, its body and its effects."""
         medium = self.medium
         has = {
             Drawable: hasattr(self.body, "points"),
@@ -116,7 +116,7 @@ class Swimmer:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """What breaks premises: the law whose drag is of no one power of the speed, and effects."""
+        """Parts that break premises: the law whose drag is of no one power of the speed, and effects."""
         law = () if is_rate_independent(self.medium) else (Part("law", name_in(LAWS, self.medium), RATES),)
         return law + tuple(Part("effect", e.kind, e.breaks) for e in self.effects)
 
@@ -137,7 +137,8 @@ class Swimmer:
         return self.medium.covariance
 
     def varied(self, step) -> Swimmer:
-        """The same in a medium whose uncertain parameters are off by ``step`` (n,); ValueError if that is no medium."""
+        """Return the swimmer in a medium whose uncertain parameters are changed by ``step`` (n,); Refusal if that is no
+        medium."""
         changed = {name: getattr(self.medium, name) + float(d) for name, d in zip(self.medium.uncertain, step)}
         try:
             return dataclasses.replace(self, medium=dataclasses.replace(self.medium, covariance=None, **changed))
@@ -155,7 +156,7 @@ class Swimmer:
 
     @property
     def engine(self) -> str:
-        """Of `rft.effects.ENGINES`, the cheapest that is right for the effects."""
+        """The cheapest of `rft.effects.ENGINES` that is right for the effects."""
         return rft.effects.engine(self.effects)
 
     @property
@@ -166,8 +167,8 @@ class Swimmer:
 
     @property
     def cut(self) -> int:
-        """Pieces to a body length that effects which vary along elements see: as asked for, or whole elements where these
-        are shorter; 0 without such effects."""
+        """Pieces per body length into which effects that vary along elements cut the body: as requested, or whole
+        elements where these are shorter; 0 without such effects."""
         if not any(e.varies_along for e in self.effects):
             return 0
         return max(self.solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
@@ -192,19 +193,20 @@ class Swimmer:
         return dataclasses.replace(self, body=dataclasses.replace(self.body, frame=frame))
 
     def _settings(self, *names: str) -> dict:
-        """Of the solver, and the effects, as rft takes them."""
+        """Return settings of the solver, and the effects, as arguments of rft's functions."""
         names = ("loads", "regularisation", "pieces", *names)
         return {"effects": self.effects, **{name: getattr(self.solver, name) for name in names}}
 
     def solve(self, alpha, alphadot, start=None) -> rft.Solution:
-        """Body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (..., 3) where
-        that is known; see `rft.body_velocity`. ValueError if shape alone does not settle them."""
+        """Return body velocities with residual and status for alpha, alphadot (..., joints), begun from ``start`` (...,
+        3) where given; see `rft.body_velocity`. Refusal if they do not follow from shape alone."""
         refuse(self, "body velocity from shape alone", SHAPE_ALONE, "run a whole gait by the direct tier")
         settings = self._settings("tolerance", "backend")
         return rft.body_velocity(self.medium, self.body, alpha, alphadot, start=start, **settings)
 
     def velocity(self, alpha, alphadot, start=None) -> np.ndarray:
-        """xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did not converge."""
+        """Return xi (..., 3) in the body's frame, begun from ``start`` as in `solve`; RuntimeError if any sample did
+        not converge."""
         return self.solve(alpha, alphadot, start).checked().xi
 
     def diagnosed(self, alpha, alphadot) -> dict:
@@ -227,11 +229,11 @@ class Swimmer:
         return self.work(alpha, alphadot, xi).power / self.length
 
     def work(self, alpha, alphadot, xi) -> rft.Work:
-        """Power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
+        """Return power, internal moments and slip of a solution of `solve`; see `rft.work_done`."""
         return rft.work_done(self.medium, self.body, alpha, alphadot, xi, **self._settings())
 
     def time_steps(self, alpha, alphadot, cycles: int | None, work: bool = False, path: bool = False) -> rft.TimeSteps:
-        """The gait phase after phase (`rft.time_steps`), unchecked."""
+        """Return the gait computed phase after phase (`rft.time_steps`), without checking convergence."""
         settings = {"cycles": cycles, "with_work": work, "with_path": path, **self._settings("tolerance", "backend")}
         context = Swimmer.time_steps, self, alpha, alphadot, cycles is None
 
@@ -242,9 +244,9 @@ class Swimmer:
         return rft.time_steps(self.medium, self.body, alpha, alphadot, advance=advance, **settings)
 
     def run(self, alpha, alphadot, work: bool = False, start=None) -> Cycle:
-        """A gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, run by the cheapest engine that is
-        right; balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a force
-        balance did not converge or cycles did not become periodic."""
+        """Run a gait given by alpha, alphadot (..., N, joints) at N equally spaced phases, by the cheapest engine that
+        is right. Balances begin from ``start`` as in `solve`, steps of time from the step before. RuntimeError if a
+        force balance did not converge or cycles did not become periodic."""
         rates = alphadot.reshape(-1, self.joints).T
         speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
@@ -263,18 +265,19 @@ class Swimmer:
         return around(alpha, alphadot, self.traits).count
 
     def _for_gaits(self, count: int, phases: int) -> Swimmer:
-        """This swimmer for so many gaits of so many phases each, where effects have a parameter for each gait."""
+        """Return the swimmer for ``count`` gaits of ``phases`` phases each, where effects have a parameter for each
+        gait."""
         effects = tuple(e.take(np.repeat(np.arange(count), phases)) for e in self.effects)
         unchanged = all(a is b for a, b in zip(effects, self.effects))
         return self if unchanged else dataclasses.replace(self, effects=effects)
 
     def _repeats(self, steps: rft.TimeSteps) -> bool:
-        """Whether one cycle is like another: the velocity is then periodic, and its integral exact for the series
-        through it."""
+        """Return whether cycles are equal: the velocity is then periodic, and its integral exact for the series through
+        it."""
         return not self.traits.lacks & Premise.SE2_SYMMETRIC and (steps.status == "periodic").all()
 
     def path(self, alpha, alphadot, cycles: int = 1) -> np.ndarray:
-        """Return poses of the limit cycle; where cycles do not repeat, from the one that `run` gives."""
+        """Return poses of the limit cycle; where cycles do not repeat, from the cycle that `run` returns."""
         before = (self.solver.cycles or 1) - 1
         if not self.traits.lacks & Premise.SE2_SYMMETRIC:
             steps = self.time_steps(alpha, alphadot, self.solver.cycles).checked()
@@ -302,7 +305,8 @@ class Swimmer:
 
 
 def _has_joint_angles(body: rft.Body) -> bool:
-    """Whether shape variables are angles of joints: bodies of a few have amplitudes of bends, or of modes, in their place."""
+    """Return whether shape variables are angles of joints; bodies with few have amplitudes of bends, or of modes,
+    instead."""
     plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
     return plain and getattr(body, "modes", None) is None
 

@@ -1,4 +1,4 @@
-"""A table of the connection read from a file: what another run, another program or an experiment found.
+"""A table of the connection read from a file: the result of another run, another program or an experiment.
 
 Where the file has the odd harmonics of the velocity beside A (`geomech.geometry.harmonics`), xi depends on the direction of
 alphadot as in the scene it came from, and A is its linear part; else xi = A alphadot.
@@ -105,7 +105,7 @@ class Table:
         )  # fmt: skip
 
     def capability(self, kind: type) -> Table | None:
-        """Return itself if it has the ability: power or a metric of its own where the file tells them."""
+        """Return itself if it has the ability: power or a metric of its own where the file has them."""
         metric, degree = self.stored.metric, self.stored.power_degree
         absent = {Dissipative: metric is None or degree is None, OwnMetric: metric is None or degree is not None}
         return self if isinstance(self, kind) and not absent.get(kind) else None
@@ -127,7 +127,7 @@ class Table:
         )
 
     def refuse_singular(self, alpha) -> None:
-        """ValueError for shapes that the data of a measured gait do not reach, and how far off they are."""
+        """Raise Refusal for shapes that the data of a measured gait do not reach; it says how far away they are."""
         if self.tube is not None:
             self.tube.checked(alpha)
 
@@ -138,19 +138,19 @@ class Table:
 
     @cached_property
     def A_error(self) -> np.ndarray | None:
-        """(3, joints, N_1, ...), half widths of intervals of A on the file's grid, as the file has them, else of what is known
-        near a measured gait; None where nothing tells them."""
+        """Half widths (3, joints, N_1, ...) of intervals of A on the file's grid, from the file, else from the Taylor
+        series about a measured gait; None where there are none."""
         if self.stored.A_error is None and self.tube is not None:
             return self.tube.at_grid(self.tube.taylor.connection_error)
         return self.stored.A_error
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """xi (..., 3) looked up; ValueError outside the table's grid."""
+        """Return the interpolated xi (..., 3); Refusal outside the table's grid."""
         return self.stored.table.velocity(alpha, alphadot)
 
     def diagnosed(self, alpha, alphadot) -> dict:
-        """Return {"xi", "status", "residual"}: the length of the vector of what the fit leaves, rms over directions, None if
-        that is unknown."""
+        """Return {"xi", "status", "residual"}: the residual is the norm of that of the fit, rms over directions; None
+        if the file has none."""
         residual = (
             np.linalg.norm(self._times(self.stored.table.residual, alpha, alphadot))
             if self.stored.has_residual
@@ -160,17 +160,21 @@ class Table:
         return {"xi": xi, "status": "looked up", "residual": residual if residual is None else float(residual)}
 
     def _times(self, values, alpha, alphadot) -> np.ndarray:
-        """(..., 3): values (3, N_1, ...) at a shape times |alphadot|; near one gait they are the same everywhere."""
+        """Return values (3, N_1, ...) at a shape times |alphadot|: (..., 3); near one gait they are the same
+        everywhere."""
         if self.tube is not None:
             known = values[:, np.isfinite(values[0])]  # nowhere, where the data reach no point of the grid
             return (known[:, 0] if known.size else np.zeros(3)) * np.linalg.norm(alphadot, axis=-1)[..., None]
         return Field(self.stored.table.axes, values, 1)(alpha) * np.linalg.norm(alphadot, axis=-1)[..., None]
 
     def table_error(self, alpha, alphadot) -> np.ndarray:
-        """(..., 2), body lengths and rad: the fit's residual summed up along the gait, what is left of the heading with its
-        lever, and the larger change with half the grid. What harmonics up to k leave swings k times as fast as A's, and
-        sums up like a random walk of k steps; what is even in alphadot does not, and a gait may keep to directions where it is
-        largest, sqrt(2) times the rms of one harmonic. Nor do intervals of A, which may be off the same way all along."""
+        """Return (..., 2), body lengths and rad: the fit's residual summed along the gait, the error of the heading
+        times its lever, and the larger change with half the grid.
+
+        The residual of harmonics up to k oscillates k times as fast as that of A, and adds up like a random walk of k
+        steps. The part that is even in alphadot does not: a gait may stay in directions where it is largest, sqrt(2)
+        times the rms of one harmonic. Nor do intervals of A, whose errors may have one sign along the whole gait.
+        """
         if self.tube is not None:
             x, y, theta = np.moveaxis(self.tube.taylor.error(alpha, alphadot), -1, 0)
             return np.stack([np.hypot(x, y) / self.length, theta], -1)
@@ -200,7 +204,7 @@ class Table:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the file leaves open, and how it is taken, in notes."""
+        """Assumptions about facts that the file does not state, as notes."""
         return tuple(f"{self.file}: {line}" for line in self.assumptions)
 
     @property
