@@ -108,17 +108,19 @@ class Problem(NamedTuple):
     def with_points(self, points: Contact, terms: Sequence[tuple[float, float, float]]) -> Problem:
         """Return the problem with more points, each with all of these dry terms (q, k_t, k_n)."""
         new = np.repeat(np.array(terms, float)[:, :, None, None], len(points.station), 2)
-        count = max(len(self.point_terms), len(new))
-
-        def padded(x):
-            return np.concatenate([x, np.broadcast_to(NO_TERM, (count - len(x), 3, x.shape[2], 1))])
-
-        terms_of_all = np.concatenate([padded(self.point_terms), padded(new)], 2)
-        return self._replace(points=self.points.joined(points), point_terms=terms_of_all)
+        if len(self.points.station):
+            count = max(len(self.point_terms), len(new))
+            new = np.concatenate([_padded(x, count) for x in (self.point_terms, new)], 2)
+        return self._replace(points=self.points.joined(points), point_terms=new)
 
 
 NO_TERM = np.array([1.0, 0.0, 0.0])[:, None, None]  # (q, k_t, k_n)
 NO_POINT_TERMS = np.zeros((0, 3, 0, 1))
+
+
+def _padded(terms: np.ndarray, count: int) -> np.ndarray:
+    """Return dry terms (T, 3, n, 1) of points as ``count`` terms, the added ones without drag."""
+    return np.concatenate([terms, np.broadcast_to(NO_TERM, (count - len(terms), *terms.shape[1:]))])
 
 
 def mapped(function: Callable, *records):
@@ -142,8 +144,8 @@ class Assembly(NamedTuple):
     """A law, a subdivided body and effects: everything that does not depend on shapes and rates, built by `assemble`.
 
     station, fraction: (n, 1), centres of the elements along the body and their fractions of its length. buried: (n, 1),
-    of `Contact`. no_points: an empty contact. n_elements: number of elements and added points. Other fields as in
-    `Problem`."""
+    of `Contact`. no_points: an empty contact. n_elements: number of elements and added points. n_law_points: number of
+    points at which the law is evaluated, elements times nodes of the rule. Other fields as in `Problem`."""
 
     medium: Any
     law: Any
@@ -158,18 +160,14 @@ class Assembly(NamedTuple):
     buried: np.ndarray
     no_points: Contact
     n_elements: int
+    n_law_points: int
 
-    def problem(self, alpha: np.ndarray, alphadot: np.ndarray, site=None) -> Problem:
-        """Return the balance at shapes and rates (joints, B)."""
-        problem = self.without_effects(alpha, alphadot)
+    def problem(self, alpha: np.ndarray, alphadot: np.ndarray, speed: np.ndarray | None = None) -> Problem:
+        """Return the balance at shapes and rates (joints, B), with a scale of speed (B,), by default the joint speed."""
+        problem = self.without_effects(alpha, alphadot, joint_speed(self.body, alphadot) if speed is None else speed)
         for effect in self.effects:
-            problem = effect.apply(problem, site, None)
+            problem = effect.apply(problem, None, None)
         return problem
-
-    @property
-    def n_law_points(self) -> int:
-        """Number of points of the body at which the law is evaluated: elements times nodes of the rule."""
-        return self.n_elements * np.size(getattr(self.law, "nodes", 0.0))
 
     def take(self, index) -> Assembly:
         """Return the assembly with the effects' parameters at the samples ``index``."""
@@ -177,20 +175,14 @@ class Assembly(NamedTuple):
         unchanged = all(a is b for a, b in zip(effects, self.effects))
         return self if unchanged else self._replace(effects=effects)
 
-    def without_effects(self, alpha, alphadot) -> Problem:
+    def without_effects(self, alpha, alphadot, speed) -> Problem:
         """Return the balance without effects."""
         e = self.body.motion(alpha, alphadot)
         x, y = e.r_t * e.s + e.r_n * e.c, e.r_n * e.s - e.r_t * e.c
-        speed, mean = joint_speed(self.body, alphadot)[None], self.fraction.T
+        speed, mean = speed[None], self.fraction.T
         frame = Frame(mean @ x, mean @ y, force_scale(self, speed), speed)
         sides = Contact(e, self.station, self.buried)
         return Problem(*self[:6], sides, self.no_points, NO_POINT_TERMS, ZERO, NO_MEMORY, None, frame)
-
-    def rescaled(self, problem: Problem, speed: np.ndarray) -> Problem:
-        """Return the problem with another scale of speed (B,)."""
-        speed = speed[None]
-        frame = problem.frame._replace(speed_scale=speed, force_scale=force_scale(self, speed))
-        return problem._replace(frame=frame)
 
 
 def assemble(medium, body: Body, effects: Sequence = (), rule: str = "exact", pieces: int = 40) -> Assembly:
@@ -228,15 +220,18 @@ def _assembled(medium, body, effects, rule, pieces) -> Assembly:
         is_linear(medium),
     )
     adding = tuple(effect for effect in ordered if effect.adds_points)
-    assembly = Assembly(*law_and_units, body, adding, station, fraction, np.ones_like(station), no_points, 0)
+    assembly = Assembly(*law_and_units, body, adding, station, fraction, np.ones_like(station), no_points, 0, 0)
     n_elements = len(station) + len(assembly.problem(zero, zero + 1.0).points.station)
-    return assembly._replace(effects=ordered, n_elements=n_elements)
+    n_law_points = n_elements * np.size(getattr(assembly.law, "nodes", 0.0))
+    return assembly._replace(effects=ordered, n_elements=n_elements, n_law_points=n_law_points)
 
 
 def force_scale(assembly: Assembly, speed: np.ndarray) -> np.ndarray:
-    """Return the unit of residuals (1, B): drag at the samples' speeds, in dry media not below the drag at unit
+    """Return the unit of residuals (1, B or 1): drag at the samples' speeds, in dry media not below the drag at unit
     speed."""
     medium, unit = assembly.medium, assembly.axial_drag
+    if assembly.homogeneous:
+        return unit * ONE
     if assembly.linear:
         return unit * speed
     viscous = getattr(medium, "viscous", None)

@@ -19,10 +19,10 @@ class Refusal(ValueError):
     scene, table, key, option). because: why it cannot be. instead: what to give or to do.
     """
 
-    def __init__(self, what: str, *, value: Any = ..., where: str | tuple = (), because: str = "", instead: str = ""):
+    def __init__(self, what: str, *, value: Any = ..., where: Any = (), because: str = "", instead: str = ""):
         super().__init__(what)
         self.what, self.value, self.because, self.instead = what, value, because, instead
-        self.where: tuple[str, ...] = (where,) if isinstance(where, str) else tuple(where)
+        self.where = tuple(map(str, where if isinstance(where, tuple) else (where,)))
 
     def __str__(self) -> str:
         text = self.what if self.value is ... else f"{self.what}, got {formatted(self.value)}"
@@ -32,15 +32,15 @@ class Refusal(ValueError):
             text = f"{place} {text}" if place.endswith("]") else f"{place}: {text}"
         return line(text)
 
-    def within(self, place: str) -> Refusal:
+    def within(self, place: object) -> Refusal:
         """Return the refusal with a place before its own, unless it names that already."""
-        if self.where[:1] != (place,) and not self.what.startswith(f"{place}: "):
-            self.where = (place, *self.where)
+        if not str(self).startswith((f"{place}: ", f"{line(str(place))}: ")):
+            self.where = (str(place), *self.where)
         return self
 
 
 @contextlib.contextmanager
-def located(place: str) -> Iterator[None]:
+def located(place: object) -> Iterator[None]:
     """Name the place in whatever ValueError comes from the statements within."""
     try:
         yield

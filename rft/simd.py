@@ -270,6 +270,34 @@ def store(context, x, i, value):
     return types.void(x, i, vector), emit
 
 
+@intrinsic
+def add_vector(context, x, i, value):
+    """Add a vector to x[i, :] of an array (n, 8), each of its numbers rounded as it is."""
+
+    def emit(context, builder, sig, args):
+        row = _pointer(context, builder, sig, args)
+        builder.store(builder.fadd(builder.load(row, align=8), args[2]), row, align=8)
+        return context.get_dummy_value()
+
+    return types.void(x, i, vector), emit
+
+
+@intrinsic
+def add_lanes(context, x, i, value):
+    """Add the eight numbers of a vector to x[i, 0], one after the other."""
+
+    def emit(context, builder, sig, args):
+        double = ir.DoubleType()
+        first = builder.bitcast(_pointer(context, builder, sig, args), double.as_pointer())
+        name, module = f"llvm.vector.reduce.fadd.v{WIDTH}f64", builder.module
+        kind = ir.FunctionType(double, [double, DOUBLES])
+        add = module.globals.get(name) or ir.Function(module, kind, name)
+        builder.store(builder.call(add, [builder.load(first), args[2]]), first)
+        return context.get_dummy_value()
+
+    return types.void(x, i, vector), emit
+
+
 def _pointer(context, builder, sig, args):
     array = context.make_array(sig.args[0])(context, builder, args[0])
     row = builder.mul(context.cast(builder, args[1], sig.args[1], types.int64), ir.IntType(64)(WIDTH))

@@ -262,7 +262,7 @@ class Stepping:
         return [self._problem(k) for k in range(self.phases)]
 
     def _problem(self, k: int) -> Problem:
-        return self.assembly.rescaled(self.assembly.problem(self.alpha[k], self.alphadot[k]), self.scales[k])
+        return self.assembly.problem(self.alpha[k], self.alphadot[k], self.scales[k])
 
     def problem(self, k: int) -> Problem:
         """Return the balance at the phase 2 pi k / N, without effects that depend on the past or the place."""
@@ -312,7 +312,7 @@ class Stepping:
         def problem_at(index):
             return problem if index.size == scale.size else problem.take(index)
 
-        return solve(problem_at, scale, self.accuracy, problem.law, self.assembly.n_law_points, self.backend, 1, guess)
+        return solve(problem_at, scale, self.accuracy, self.assembly, self.backend, 1, guess)
 
     def _after_cycle(self, s: State, problem: Problem, site: Site) -> State:
         """Return the state at the end of a cycle with a new record of cycles, extrapolated if cycles are to repeat."""

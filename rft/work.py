@@ -65,9 +65,9 @@ def work_done(
     assembly = assembly._replace(effects=tuple(e for e in assembly.effects if not e.breaks & SHAPE_ALONE))
     alpha, alphadot = (x.reshape(-1, body.joints).T for x in (alpha, alphadot))
     xi = xi.reshape(-1, 3).T / np.array([[body.length], [body.length], [1.0]])
-    problem, speed = assembly.problem(alpha, alphadot), joint_speed(body, alphadot)
+    speed = joint_speed(body, alphadot)
     scale = np.where(speed > 0, speed, 1.0)  # of a body at rest any scale will do
-    problem = assembly.rescaled(problem, scale)
+    problem = assembly.problem(alpha, alphadot, scale)
     work = element_work(problem, half_lengths(body), xi, regularisation * scale)
     return Work(work.power.reshape(batch) * body.length, *(x.reshape((*batch, *x.shape[1:])) for x in work[1:]))
 

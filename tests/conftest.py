@@ -17,21 +17,12 @@ BY_HAND = {"soak", "benchmark"}
 
 
 @pytest.fixture
-def own_parts(monkeypatch):
+def own_parts():
     """Parts of one's own, and the modules they came in, are forgotten after the test."""
-    from geomech.scene import kinds
-    from rft.registry import REGISTRIES
+    from commands import own_parts
 
-    before = {group: dict(registry) for group, registry in REGISTRIES.items()}
-    modules = set(sys.modules)
-    for name in ("_code", "_files"):
-        monkeypatch.setattr(kinds, name, {})
-    yield
-    for group, registry in REGISTRIES.items():
-        registry.restore(before.get(group, registry))
-    for name in set(sys.modules) - modules:
-        if name.startswith(kinds.PLUGIN):
-            del sys.modules[name]
+    with own_parts():
+        yield
 
 
 def pytest_addoption(parser):
@@ -122,17 +113,9 @@ def solved_by(request):
 
 
 @pytest.fixture
-def geomech(tmp_path, monkeypatch, capsys):
+def geomech(tmp_path, monkeypatch):
     """Runs a command in an empty folder: (exit code, standard output, standard error)."""
-    from geomech import cli
+    from commands import geomech
 
     monkeypatch.chdir(tmp_path)
-
-    def run(*args):
-        monkeypatch.setattr(sys, "argv", ["geomech", *map(str, args)])
-        with pytest.raises(SystemExit) as left:
-            cli.main()
-        said = capsys.readouterr()
-        return left.value.code, said.out, said.err
-
-    return run
+    return geomech

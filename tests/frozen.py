@@ -14,26 +14,20 @@ in `namespace` at most.
 from __future__ import annotations
 
 import contextlib
-import functools
-import io
 import itertools
 import json
 import math
-import os
 import pathlib
 import re
 import shlex
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
-from unittest import mock
 
+import commands
 import numpy as np
-import typer.main
 from words import TOLERANCE, WORD, flat, line_holds, masked, names, number_of, numbers, of_file, text_holds
 
 DATA = pathlib.Path(__file__).parent / "data"
@@ -51,29 +45,14 @@ FILES = {
 
 # What a command does.
 
-MADE = functools.cache(typer.main.get_command)  # 20 ms, and the same each time
-
 
 def geomech(*args: str) -> tuple[str, str, str]:
     """(exit code, standard output, standard error) of a command in this process."""
-    from geomech import cli
-
-    out, err, before = io.StringIO(), io.StringIO(), sys.argv
-    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    sys.argv = ["geomech", *args]
     try:
-        made = mock.patch.object(typer.main, "get_command", MADE)
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), made:
-            cli.main()
-    except SystemExit as left:
-        return str(left.code or 0), out.getvalue(), err.getvalue()
+        code, out, err = commands.geomech(*args)
     except Exception as fault:  # of the program, whose traceback Python prints
-        return f"raises {type(fault).__name__}", out.getvalue(), err.getvalue()
-    finally:
-        sys.argv = before
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-    raise AssertionError("a command ends by SystemExit")
+        return f"raises {type(fault).__name__}", "", ""
+    return str(code or 0), out, err
 
 
 @contextlib.contextmanager
@@ -115,26 +94,13 @@ def ran(line: str) -> list[str]:
     return [*told, f"exit {code}"]
 
 
-def ran_apart(lines: list[str]) -> list[list[str]]:
-    """`ran` by a process of its own: what a --plugin registers would stay in this one."""
-    path = os.pathsep.join([str(DATA.parents[1]), os.environ.get("PYTHONPATH", "")])
-    asked = [sys.executable, __file__, "--apart", *lines]
-    told = subprocess.run(asked, capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path})
-    return json.loads(told.stdout.splitlines()[-1])
-
-
 def outcomes(lines: list[str]) -> dict[str, list[str]]:
     """What comes of commands, each in a fresh copy of data/frozen."""
-    apart = [line for line in lines if "--plugin" in line]
     found = {}
     for line in lines:
-        if line not in apart:
-            with place():
-                found[line] = ran(line)
-    if apart:
-        with place():
-            found |= zip(apart, ran_apart(apart))
-    return {line: found[line] for line in lines}
+        with place(), commands.own_parts():
+            found[line] = ran(line)
+    return found
 
 
 def read_commands() -> dict[str, list[str]]:
@@ -415,7 +381,5 @@ def write_files() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--apart"]:
-        print(json.dumps([ran(line) for line in sys.argv[2:]]))
-    elif sys.argv[1:] == ["--files"]:
+    if sys.argv[1:] == ["--files"]:
         write_files()

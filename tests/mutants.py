@@ -4,11 +4,12 @@
 
 `mutants.toml` beside this file says which tests watch a module, what is left out and which mutants are no bugs. Mutants
 live in copies of the tree in the system's temporary folder, one a worker; the checkout is only read. A mutant is killed
-when a test fails, or takes far longer than without it. Survivors are printed as what they change.
+when a test fails; time-outs, far longer than without it, are counted apart. Survivors are printed as what they change.
 """
 
 import argparse
 import ast
+import collections
 import copy
 import difflib
 import importlib
@@ -22,6 +23,7 @@ import signal
 import sys
 import tempfile
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -143,12 +145,12 @@ def start(tree: Path, tests: list[str], seconds: float) -> int:
         os._exit(1)
 
 
-def hunted(some: list[Mutant], folder: Path, jobs: int) -> dict[Mutant, str]:
-    """'passed', 'failed' or 'time-out' of each, so many at a time, each in a copy of the tree below ``folder``."""
+def hunted(some: list[Mutant], folder: Path, jobs: int) -> Iterator[tuple[Mutant, str]]:
+    """Each with "survived", "killed" or "time-out", so many at a time, each in a copy of the tree below ``folder``."""
     trees = [folder / str(k) for k in range(jobs)]
     for tree in trees:
         shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "results"))
-    usual, running, found = {}, {}, {}
+    usual, running = {}, {}
     for name in sorted({name for m in some for name in watch(m.file)}):
         _, status, used = os.wait4(start(trees[0], [name], 600), 0)
         if status:
@@ -165,9 +167,7 @@ def hunted(some: list[Mutant], folder: Path, jobs: int) -> dict[Mutant, str]:
             done, tree = running.pop(child)
             (tree / done.file).write_text(done.source)
             trees.append(tree)
-            found[done] = "time-out" if os.WIFSIGNALED(status) else "failed" if status else "passed"
-            print(f"{found[done]:8} {done.file}:{done.line}", flush=True)
-    return found
+            yield done, "time-out" if os.WIFSIGNALED(status) else "killed" if status else "survived"
 
 
 def main() -> None:
@@ -185,15 +185,17 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # clean up then too
     for name in HEAVY.split():
         importlib.import_module(name)
-    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        found = hunted(some, Path(folder), asked.jobs)
     known = {(x["file"], x["change"].strip()): x["why"] for x in TABLE.get("equivalent", ())}
-    left = [(m, known.get((m.file, m.change()))) for m in found if found[m] == "passed"]
-    for m, why in left:
-        print(f"\n{m.file}:{m.line} {'no bug: ' + why if why else 'SURVIVED'}\n{m.change()}")
-    survived, used = sum(why is None for _, why in left), resource.getrusage(resource.RUSAGE_CHILDREN)
-    killed, minutes = len(some) - len(left), (used.ru_utime + used.ru_stime) / 60
-    print(f"\n{killed} killed, {survived} survived, {len(left) - survived} are no bugs; {minutes:.1f} minutes of CPU")
+    counts = collections.Counter()
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+        for m, outcome in hunted(some, Path(folder), asked.jobs):
+            why = known.get((m.file, m.change())) if outcome == "survived" else None
+            counts["no bug" if why else outcome] += 1
+            more = f" no bug: {why}" if why else f"\n{m.change()}" if outcome == "survived" else ""
+            print(f"{outcome:8} {m.file}:{m.line}{more}", flush=True)
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    told = ", ".join(f"{count} {outcome}" for outcome, count in sorted(counts.items()))
+    print(f"\n{told}; {(used.ru_utime + used.ru_stime) / 60:.1f} minutes of CPU")
 
 
 if __name__ == "__main__":

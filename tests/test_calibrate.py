@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from commands import geomech
 from scipy.stats import norm, qmc
 
-from geomech import cli, scene
+from geomech import scene
 from geomech.io.rows import Rows
 from geomech.scene import drag
 from geomech.study import calibration
@@ -29,15 +30,8 @@ def noisy(seed=0, psi=PSI, size=0.03, medium=Granular(1.8, 0.24)):  # noqa: B008
     return rod_drag(psi, *(exact(medium, 0.7, psi) + np.random.default_rng(seed).normal(0, size, (2, psi.size))))
 
 
-def printed(capsys, *args):
-    with pytest.raises(SystemExit) as left:
-        cli.main(["calibrate", *map(str, args)])
-    out, err = capsys.readouterr()
-    return left.value.code, out, err
-
-
-def test_the_sample_has_its_published_fit(capsys):
-    code, out, err = printed(capsys, "dem-rod-drag", "--json")
+def test_the_sample_has_its_published_fit():
+    code, out, err = geomech("calibrate", "dem-rod-drag", "--json")
     found = json.loads(out)
     assert (code, err) == (0, "")
     assert list(found)[:6] == ["law", "C", "gamma0_deg", "k", "covariance", "rms"]
@@ -272,17 +266,17 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_files_get_one_line(name, tmp_path, capsys):
+def test_bad_files_get_one_line(name, tmp_path):
     text, said = BAD[name]
     file, out = tmp_path / "drag.csv", tmp_path / "m.toml"
     file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    code, printed_out, err = printed(capsys, file, "-o", out, "--plot", tmp_path / "m.png")
+    code, printed_out, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "m.png")
     assert (code, printed_out, err.count("\n")) == (2, "", 1), err
     assert err.startswith("error: ") and said in err and "drag.csv" in err
     assert [p.name for p in tmp_path.iterdir()] == ["drag.csv"]
 
 
-def test_files_that_cannot_be_read(tmp_path, capsys, monkeypatch):
+def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     huge = tmp_path / "huge.csv"
     with huge.open("wb") as file:
         file.truncate(drag.LARGEST_FILE + 1)
@@ -291,16 +285,16 @@ def test_files_that_cannot_be_read(tmp_path, capsys, monkeypatch):
         (tmp_path, "no ordinary file"),
         (tmp_path / "x.csv", "No such file"),
     ):
-        code, _, err = printed(capsys, path)
+        code, _, err = geomech("calibrate", path)
         assert code == 2 and said in err and err.count("\n") == 1
-    code, _, err = printed(capsys, "dem-rod-dragg")
+    code, _, err = geomech("calibrate", "dem-rod-dragg")
     assert code == 2 and "did you mean 'dem-rod-drag'" in err
 
 
-def test_other_spellings_of_a_good_file(tmp_path, capsys):
+def test_other_spellings_of_a_good_file(tmp_path):
     plain = tmp_path / "plain.csv"
     plain.write_text(GOOD)
-    want = json.loads(printed(capsys, plain, "--json")[1])
+    want = json.loads(geomech("calibrate", plain, "--json")[1])
     assert (want["C"], want["gamma0_deg"]) == pytest.approx((1.8, math.degrees(0.24)), rel=1e-3)
     assert (
         want["k"] is None and want["axial_stress_Pa"] is None and want["axial_force_N"] == pytest.approx(3.7, rel=1e-3)
@@ -316,17 +310,17 @@ def test_other_spellings_of_a_good_file(tmp_path, capsys):
     ):
         file = tmp_path / "other.csv"
         file.write_bytes(text.encode())
-        found = json.loads(printed(capsys, file, "--json")[1])
+        found = json.loads(geomech("calibrate", file, "--json")[1])
         assert (found["C"], found["rms"]) == (want["C"], want["rms"])
 
 
-def test_weights_of_a_file(tmp_path, capsys):
+def test_weights_of_a_file(tmp_path):
     """A row that weighs nothing is as good as none, however wrong it is."""
     file, found = tmp_path / "drag.csv", []
     rows = GOOD.split()
     for extra in (["45,9.0,0.5,0"], []):
         file.write_text("\n".join([rows[0] + ",weight", *(f"{row},2" for row in rows[1:]), *extra]))
-        found.append(json.loads(printed(capsys, file, "--json")[1]))
+        found.append(json.loads(geomech("calibrate", file, "--json")[1]))
     for key in ("C", "covariance", "axial_force_N", "rms"):
         np.testing.assert_allclose(found[0][key], found[1][key], rtol=1e-5, atol=1e-15)
     assert len(found[0]["residuals"]["psi_deg"]) == len(found[1]["residuals"]["psi_deg"]) + 1
@@ -346,6 +340,7 @@ def test_weights_of_a_file(tmp_path, capsys):
         (["16 mm diameter rod, 80 mm long, in 6 mm beads at 30 mm depth"], (0.008, 0.08, 0.03, None)),
         (["rod 16 mm diameter x 80 mm; bed 20 cm deep; density of the rod 2700 kg/m^3"], (0.008, 0.08, None, None)),
         (["effective radius 8 mm", "density 2500 kg/m^3, packing density 0.6, void fraction 0.4"], (0.008, None, None, 1500)),
+        (["radius 8000 um, length 8 cm"], (0.008, 0.08, None, None)),
         (["nothing", "mean after 30 mm of travel, 0.1 m/s"], (None, None, None, None)),
     ],
 )  # fmt: skip
@@ -355,23 +350,23 @@ def test_sizes_of_header_lines(lines, sizes):
     assert found == pytest.approx({name: x for name, x in zip(names, sizes) if x is not None})
 
 
-def test_options_overrule_the_header(capsys):
-    found = json.loads(printed(capsys, "dem-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
+def test_options_overrule_the_header():
+    found = json.loads(geomech("calibrate", "dem-rod-drag", "--json", "--depth", "0.06", "--density", "600")[1])
     assert found["rod"] == {"radius": 0.008, "length": 0.08, "depth": 0.06, "density": 600.0}
-    base = json.loads(printed(capsys, "dem-rod-drag", "--json")[1])
+    base = json.loads(geomech("calibrate", "dem-rod-drag", "--json")[1])
     assert found["k"] * 0.06 * 600 == pytest.approx(base["k"] * 0.03 * 0.588 * 1030)
-    text = printed(capsys, "dem-rod-drag", "--law", "viscous")[1]
+    text = geomech("calibrate", "dem-rod-drag", "--law", "viscous")[1]
     assert "ratio" in text and "k is not known" not in text
-    assert printed(capsys, "dem-rod-drag", "--depth", "-1")[0] == 2
-    code, _, err = printed(capsys, "dem-rod-drag", "--density", "0.6")
+    assert geomech("calibrate", "dem-rod-drag", "--depth", "-1")[0] == 2
+    code, _, err = geomech("calibrate", "dem-rod-drag", "--density", "0.6")
     assert code == 2 and "dem_rod_drag.csv: k must be a number from 0.001 to 1000" in err
-    assert "neither left-out, fitted nor a number" in printed(capsys, "dem-rod-drag", "--end-caps", "flat")[2]
+    assert "neither left-out, fitted nor a number" in geomech("calibrate", "dem-rod-drag", "--end-caps", "flat")[2]
 
 
-def test_the_medium_written_is_the_one_fitted(tmp_path, capsys, monkeypatch):
+def test_the_medium_written_is_the_one_fitted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for law, kind in (("granular", Granular), ("viscous", Viscous), ("coulomb", Coulomb)):
-        assert printed(capsys, "dem-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
+        assert geomech("calibrate", "dem-rod-drag", "-o", "M.toml", "--law", law)[0] == 0
         read = scene.parse(
             '[medium]\nfile = "M.toml"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n', str(tmp_path / "s.toml")
         ).system.medium
@@ -381,17 +376,17 @@ def test_the_medium_written_is_the_one_fitted(tmp_path, capsys, monkeypatch):
             np.testing.assert_allclose(*(getattr(m, field.name) for m in (read, want)), rtol=1e-15)
 
 
-def test_outputs_never_replace_the_data(tmp_path, capsys):
+def test_outputs_never_replace_the_data(tmp_path):
     file = tmp_path / "drag.csv"
     file.write_text(GOOD)
     for option in ("-o", "--plot"):
         name = file if option == "-o" else tmp_path / "link.png"
         if option == "--plot":
             name.hardlink_to(file)
-        code, _, err = printed(capsys, file, option, name)
+        code, _, err = geomech("calibrate", file, option, name)
         assert code == 2 and "it is an input" in err
     assert file.read_text() == GOOD
-    code, _, err = printed(capsys, file, "-o", tmp_path / "x.png", "--plot", tmp_path / "x.png")
+    code, _, err = geomech("calibrate", file, "-o", tmp_path / "x.png", "--plot", tmp_path / "x.png")
     assert code == 2 and "cannot write" in err and not (tmp_path / "x.png").exists()
 
 

@@ -4,15 +4,14 @@ import dataclasses
 import json
 import os
 import pathlib
-import signal
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from commands import geomech
 from scipy.special import ellipe
 
-from geomech import cli
 from geomech import scene as scenes
 from geomech.core.errors import Note, UnitWarning
 from geomech.gaits import Centreline, Sine
@@ -391,18 +390,14 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_files_get_one_line(name, tmp_path, monkeypatch, capsys):
+def test_bad_files_get_one_line(name, tmp_path):
     make, more, said = BAD[name]
     toml = scene_in(tmp_path, 12, more)
     make(tmp_path / "data" / "swim.csv")
     with pytest.raises(ValueError, match=said):
         scenes.load(toml)
-    monkeypatch.setattr(sys, "argv", ["geomech", "displacement", str(toml), "--amplitudes", "1"])
-    monkeypatch.setattr(signal, "signal", lambda *_: None)
-    with pytest.raises(SystemExit) as left:
-        cli.main()
-    out, err = capsys.readouterr()
-    assert (left.value.code, out) == (2, "")
+    code, out, err = geomech("displacement", toml, "--amplitudes", "1")
+    assert (code, out) == (2, "")
     assert err.startswith("error: ")
     assert err.count("\n") == 1
 
@@ -448,14 +443,12 @@ def test_a_frequency_that_is_not_that_of_t_is_noted(column, frequency, tmp_path)
         gait(path, frequency=frequency)
 
 
-def test_what_an_estimate_leaves_out_is_told(tmp_path, capsys):
+def test_what_an_estimate_leaves_out_is_told(tmp_path):
     """Of midlines that noise has moved by ten times the estimate and more."""
     toml, said = scene_in(tmp_path, 12), "of the computation alone: what the measured midlines are off by is not in it"
     write(tmp_path / "data", "points", count=12, places=20)
     for more in ([], ["--json"]):
-        with pytest.raises(SystemExit):
-            cli.main(["displacement", str(toml), "--amplitudes", "1", *more])
-        told = capsys.readouterr().out
+        told = geomech("displacement", toml, "--amplitudes", "1", *more)[1]
         assert json.loads(told)["estimate_is"] == said if more else f"\nestimated error: {said}\n" in told
     measured = Study(scenes.load(toml))
     swept = lambda scene: Sweep(scene, {"gait.amplitude": [1.0]}).ask().attributes

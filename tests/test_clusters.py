@@ -8,8 +8,8 @@ import tempfile
 
 import numpy as np
 import pytest
+from commands import geomech
 from tasks import always_dies, dies, fails
-from test_cli import geomech
 from test_workers import OVER, power  # noqa: F401  power is a fixture
 
 from geomech import scene as scenes

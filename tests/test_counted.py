@@ -3,6 +3,7 @@
 import pytest
 
 from geomech import scene as scenes
+from geomech.gaits import Fourier
 from geomech.study import accuracy, cost, effort, motion, sweep
 from geomech.study.bench import Study
 from rft.balance.listening import listening
@@ -32,6 +33,7 @@ def solved():
 
 SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
 SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
+FIFTH = Fourier(cos=((0.6, 0, 0.1, 0, 0.05), (0,) * 5), sin=((0,) * 5, (0.6, 0, -0.1, 0, 0.05)))
 FOUND = {
     "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
     "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
@@ -39,6 +41,7 @@ FOUND = {
     "a family": (GLASS.with_numerics(grid=9, curves=5), ("adapted", "direct")),
     "four joints": (FIVE.with_numerics(grid=4, directions=16), ("path", "direct")),
     "four joints, errors alone": (FIVE.with_numerics(grid=4, directions=16), ("path",)),
+    "few phases of a harmonic": (GLASS.changed(gait=FIFTH).with_numerics(phases=64), ("direct",)),
     "around the gait": (FIVE.with_numerics(grid=15, directions=16, phases=16), ("area", "path", "direct")),
     "linear": (VISCOUS, ("area", "path", "harmonic", "direct")),
     "by a rule": (VISCOUS.with_numerics(loads="midpoint:3"), ("direct",)),

@@ -11,7 +11,6 @@ from test_mjcf import CART
 from test_mjcf import SCENE as WALKER
 
 from geomech import scene as scenes
-from geomech.core import errors
 from geomech.io import files, tables
 from geomech.io.tables.mat import ABOUT
 from geomech.output import display, mat
@@ -20,6 +19,7 @@ from geomech.scene import Numerics, Scene
 from geomech.study import fields, sweep
 from geomech.study.bench import Study
 from geomech.text.explain import explain
+from rft import refusal as errors
 
 ESC = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e\r"  # sets a title, rings, clears, in red, backwards, over what stood there
 TOML = "\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202e\\r"  # in a string of TOML, which holds none as it is
@@ -42,9 +42,10 @@ def test_plain_text_stays_what_it_is():
         "no\N{NO-BREAK SPACE}break",
         "\\x1b",
     ):
-        assert errors.plain(text) == text
-    assert errors.plain("a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r") == r"a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r"
+        assert errors.printable(text) == text
+    assert errors.printable("a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r") == r"a\x1b[1mb\x07\x00\x7f\x9b\u202e\udce9\r"
     assert errors.line(" a\n\x1bb  c\n") == r"a \x1bb c"
+    assert errors.line("x" * 400) == "x" * 400
     assert len(errors.line(LONG)) < 400 and errors.line(LONG).startswith(r"\x1b]0;owned\x07")
 
 
@@ -199,8 +200,8 @@ def test_bars(monkeypatch):
     with progress._on_terminal(progress.Course(f"{ESC} [red]a[/b].toml")):
         (task,) = bars[0].tasks
         (row,) = (bars[0].columns[0].render(task),)
-    assert row.plain == errors.plain(ESC) + " [red]a[/b].toml"
-    assert str(progress.Course(ESC)).startswith(errors.plain(ESC))
+    assert row.plain == errors.printable(ESC) + " [red]a[/b].toml"
+    assert str(progress.Course(ESC)).startswith(errors.printable(ESC))
 
 
 def test_messages_are_no_longer_than_may_be_read(geomech, tmp_path, monkeypatch):

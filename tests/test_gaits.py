@@ -72,7 +72,7 @@ def test_points_are_reached_as_their_chords_are_run():
         (lambda: Circle().cycle(3), "phases must"),
         (lambda: Butterfly().cycle(10), "at least 11 for this gait"),
         (lambda: Points(points=((1e20, 0), (0, 1), (1, 1))), "points must be"),
-        (lambda: Circle(centre=None), "must be numbers"),
+        (lambda: Circle(centre=None), "must be real numbers"),
     ],
 )
 def test_bad_gaits_are_refused(make, said):

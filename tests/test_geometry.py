@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 from registry import GAITS, MEDIA
+from scipy.special import ndtri
+from scipy.stats import qmc
 
 from geomech import symbolic
 from geomech.gaits import Circle, Ellipse, Fourier
@@ -84,6 +86,8 @@ def test_scattered_directions_are_always_the_same_and_all_round():
     unit = connection.directions(3, 200)
     np.testing.assert_array_equal(connection.directions(3, 200), unit)
     np.testing.assert_array_equal(connection.directions(3, 50), unit[:50])
+    normal = ndtri(qmc.Halton(3, scramble=False).random(201)[1:])
+    np.testing.assert_array_equal(unit, normal / np.linalg.norm(normal, axis=-1, keepdims=True))
     np.testing.assert_allclose(unit.T @ unit / 200, np.eye(3) / 3, atol=0.02)
     np.testing.assert_allclose(unit.mean(0), 0, atol=0.02)
 

@@ -288,19 +288,19 @@ def test_the_frame_does_not_matter():
 def solutions(medium, body, alpha, alphadot, regularisation, starts, monkeypatch):
     """Body velocities (k, 3), in the mean frame per |alphadot|, that Newton's method finds from random starts."""
     rng, body = np.random.default_rng(6), dataclasses.replace(body, frame="mean")
-    monkeypatch.setattr("rft.balance.solver.QUICK", QUICK._replace(budget=1))
+    monkeypatch.setattr("rft.balance.solver.QUICK", QUICK._replace(budget=1.0))
     monkeypatch.setattr("rft.balance.solver.WALKS", ())
     monkeypatch.setattr("rft.balance.solver.SLOW", ())
     alpha, alphadot = (np.array(x)[:, None] * np.ones(starts) for x in (alpha, alphadot))
     alphadot /= np.linalg.norm(alphadot[:, 0])
     found = np.zeros((0, 3))
     for widest in (0.0, 1e-4, 1e-3, 1e-2):
-        monkeypatch.setattr("rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100))
+        monkeypatch.setattr("rft.balance.solver.WARM", Descent(widest, 0.1, 1e-4, np.inf, 100.0))
         assembly = assemble(medium, body)
         problem = assembly.problem(alpha, alphadot)
         guess = rng.normal(size=(3, starts)) * [[0.3], [0.3], [1.0]] * 10.0 ** rng.uniform(-4, 0, starts)
         accuracy = Accuracy(regularisation, 1e-10)
-        solved = solve(problem.take, np.ones(starts), accuracy, assembly.law, assembly.n_law_points, "numpy", 1, guess)
+        solved = solve(problem.take, np.ones(starts), accuracy, assembly, "numpy", 1, guess)
         for xi in solved.xi[:, solved.residual <= solved.limit].T:
             if (np.abs(found - xi).max(-1, initial=0.0) > 10 * regularisation).all():
                 found = np.concatenate([found, xi[None]])

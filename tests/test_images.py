@@ -1,6 +1,7 @@
 """Shapes whose velocities follow from others by symmetry, and bodies that are alike in no such way."""
 
 import dataclasses
+import time
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from registry import BODIES, GAITS
 
 from geomech.gaits import Butterfly, Circle, Fourier, Sine
 from geomech.geometry import connection, harmonics
-from geomech.geometry.images import around, images, to_solve
+from geomech.geometry.images import around, images, solved_count, to_solve
 from geomech.geometry.traits import NOTHING, Traits
 from geomech.systems.swimmer import Swimmer
 from rft import CATALOGUE, Chain, EndCaps, GrainInertia, SkinFriction
@@ -151,12 +152,69 @@ def cycles():
 def test_gaits_are_those_of_all_phases(name):
     body, effects, gait, amplitudes, phases, count = cycles()[name]
     swimmer, (alpha, alphadot) = Swimmer(GLASS, body, effects), gait.cycle(phases, amplitudes)
-    assert swimmer.solved(alpha, alphadot) == count
+    assert around(alpha, alphadot, swimmer.traits).count == count
     run, xi = swimmer.run(alpha, alphadot, work=True), swimmer.velocity(alpha, alphadot)
     size = np.abs(xi).max((-1, -2), keepdims=True) + 1e-300
     np.testing.assert_allclose(run.xi / size, xi / size, rtol=0, atol=1e-10)
     power = swimmer.work(alpha, alphadot, xi).power
     np.testing.assert_allclose(run.work.power, power, rtol=1e-8, atol=1e-12)
+
+
+SHARES = {  # one over that of the phases that are solved, without traits, mirrored, reversible and both
+    "none 3": [1, 1, 1, 1], "mirrored 3": [1, 2, 1, 2], "backwards 3": [1, 1, 2, 2],
+    "backwards in a mirror 3": [1, 1, 1, 2], "both 3": [1, 2, 2, 4],
+}  # fmt: skip
+
+
+def symmetric_gaits():
+    """Return random gaits, with two rows of cosines and two of sines, by the symmetries that their curves have."""
+    found, rng = {}, np.random.default_rng(5)
+    for n in (1, 3):
+        cos, sin = rng.normal(size=(2, 2, n))
+        odd = np.arange(1, n + 1) % 2
+        found |= {
+            f"none {n}": (cos, sin),
+            f"mirrored {n}": (cos * odd, sin * odd),
+            f"backwards {n}": (cos[[0, 0]] * [[-1], [1]], sin[[0, 0]]),
+            f"backwards in a mirror {n}": (cos[[0, 0]], sin[[0, 0]] * [[1], [-1]]),
+            f"both {n}": (cos[[0, 0]] * odd, sin[[0, 0]] * odd * [[1], [-1]]),
+        }
+    return {name: Fourier(cos=cos.tolist(), sin=sin.tolist()) for name, (cos, sin) in found.items()}
+
+
+class Late(Fourier):
+    """A gait that begins a part of a cycle later."""
+
+    def unit(self, t):
+        return super().unit(np.asarray(t) + self.start)
+
+    def unit_rate(self, t):
+        return super().unit_rate(np.asarray(t) + self.start)
+
+
+@pytest.mark.parametrize("name", symmetric_gaits())
+def test_few_phases_tell_how_many_are_solved(name, monkeypatch):
+    """Of gaits that begin anywhere, at all numbers of phases: images lie on phases of some of these only."""
+    monkeypatch.setattr("geomech.geometry.images.FEW", 32)
+    gait, shares = symmetric_gaits()[name], []
+    for traits in (NOTHING, MIRROR, BACKWARDS, BOTH):
+        share = 0
+        for start in (0.0, 0.1):
+            late = Late(cos=gait.cos, sin=gait.sin)
+            object.__setattr__(late, "start", 2 * np.pi * start)
+            for phases in range(8, 201):
+                solved = around(*late.cycle(phases), traits).count
+                assert solved_count(late, phases, traits) == solved, (start, phases)
+                share = max(share, round(phases / solved))
+        shares.append(share)
+    assert shares == SHARES.get(name, shares)
+
+
+def test_a_million_phases_are_counted_at_once():
+    began = time.process_time()
+    assert solved_count(Circle(), 1_000_000, BOTH) == 250_001
+    assert solved_count(Sine(elements=100), 1_000_000, MIRROR) == 500_000
+    assert time.process_time() - began < 2.0
 
 
 def test_what_is_nearly_an_image_is_none():
@@ -181,7 +239,7 @@ def test_gaits_side_by_side_have_their_own_parameters(monkeypatch):
     effect = GrainInertia(frequency=1.0, length=0.3, depth=0.07)
     both = Swimmer(GLASS, body, (effect.with_parameters(frequency=frequencies),))
     alpha, alphadot = Circle().cycle(32, [0.5, 0.9])
-    assert both.solved(alpha, alphadot) == 16
+    assert around(alpha, alphadot, both.traits).count == 16
     run = both.run(alpha, alphadot)
     for k in range(2):
         own = Swimmer(GLASS, body, (dataclasses.replace(effect, frequency=frequencies[k]),))

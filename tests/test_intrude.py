@@ -299,7 +299,7 @@ REFUSED = [
     ('kind = "polygon"', "", "[intruder] has no 'kind': add kind = one of plate, round-rod"),
     ("[0.03, 0.02]", "[0.03, 0.02], [0.01, -0.02]", "of the outline cross or touch"),
     ("[0.03, 0.02]", "[0.03]", "[intruder]"),
-    ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder]: cannot read"),
+    ("points = [[0, 0], [0.04, 0.0], [0.03, 0.02]]", 'file = "no.csv"', "[intruder] cannot read"),
     ("width = 0.03", "width = 0.03\nfile = 'b.csv'", "give either 'file' or 'points'"),
     ("width = 0.03", "width = 30", "width must be a number from 1e-06 to 10 m, got 30"),
     ("width = 0.03", "", "[intruder] has no `width`: add"),

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from commands import geomech
 from tasks import doubled, who
-from test_cli import geomech
 from test_store import HARD, same
 
 from geomech import scene as scenes

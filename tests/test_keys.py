@@ -8,8 +8,8 @@ import re
 import tomllib
 
 import pytest
+from commands import geomech
 
-from geomech import cli
 from geomech.scene import (
     builtin_names,
     from_tables,
@@ -94,22 +94,16 @@ def test_keys_are_told_as_they_are():
     assert keys["third"].degrees
 
 
-def run(capsys, *argv):
-    with pytest.raises(SystemExit) as left:
-        cli.main(list(argv))
-    return left.value.code, *capsys.readouterr()
-
-
-def test_the_command_prints_them_all_or_a_section(capsys):
-    code, out, err = run(capsys, "keys")
+def test_the_command_prints_them_all_or_a_section():
+    code, out, err = geomech("keys")
     assert (code, err) == (0, "")
     for table, variant in EVERY.values():
         assert variant.implied or (variant.label or f"[{table}]") in out
         for key in keys_in(variant):
             assert re.search(rf"^  {key.name} +{worded(key.schema)} +{re.escape(key.unit)} ", out, re.M), key.name
     assert max(map(len, out.splitlines())) <= 120
-    assert [run(capsys, "keys", table)[0] for table in TABLES] == [0] * len(TABLES)
-    body = run(capsys, "keys", "body")[1]
+    assert [geomech("keys", table)[0] for table in TABLES] == [0] * len(TABLES)
+    body = geomech("keys", "body")[1]
     assert "[body]" in body and "[gait]" not in body
     assert re.search(r'^  frame +text +-  "mean" ', body, re.M)
     by_name = "[medium]\nBy name, with no key beside it.\n  name  text  -  required  a medium of the catalogue: glass-"
@@ -118,21 +112,21 @@ def test_the_command_prints_them_all_or_a_section(capsys):
     granular = text("medium").partition('law = "granular"')[2].partition("\n\n")[0]
     assert re.search(r"\n +C +number +- +required +the extra normal force", granular)
     assert re.search(r"\n +gamma0 +number +rad +required [^:]*as\s+gamma0_deg", granular)
-    code, out, err = run(capsys, "keys", "bdy")
+    code, out, err = geomech("keys", "bdy")
     assert (code, out, err) == (2, "", "error: SECTION: 'bdy' is unknown: did you mean 'body'?\n")
-    assert run(capsys, "keys", "body", "--json-schema")[:2] == (2, "")
+    assert geomech("keys", "body", "--json-schema")[:2] == (2, "")
 
 
-def test_keys_of_ones_own_classes_are_told(tmp_path, capsys, monkeypatch):
+def test_keys_of_ones_own_classes_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(kinds, "_code", {})
     section = (ROOT / "geomech" / "scene" / "README.md").read_text().partition("## Laws, bodies")[2]
     path = tmp_path / "power.py"
     path.write_text(re.search(r"```python\n(.*?)```", section, re.S)[1])
     try:
-        code, out, _ = run(capsys, "keys", "medium", "--plugin", str(path))
+        code, out, _ = geomech("keys", "medium", "--plugin", str(path))
         assert code == 0
         assert re.search(r'law = "power"\n  power +number +- +required +of the speed.*\n.*ratio +number +- +3.0', out)
-        made = json.loads(run(capsys, "keys", "--json-schema", "--plugin", str(path))[1])
+        made = json.loads(geomech("keys", "--json-schema", "--plugin", str(path))[1])
         assert {"const": "power"} in [x["properties"].get("law") for x in made["$defs"]["gaits"]["medium"]["oneOf"]]
     finally:
         LAWS.restore({name: law for name, law in LAWS.items() if name != "power"})
@@ -312,11 +306,11 @@ def test_the_schema_agrees_with_the_reader_of_meshes(medium, intruder, motion, m
     test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion, more, good, valid)
 
 
-def test_keys_of_all_scenes_are_told(capsys):
+def test_keys_of_all_scenes_are_told():
     """Each with a type, a unit and a meaning, in the section that it has in a scene file."""
-    whole = run(capsys, "keys")[1]
+    whole = geomech("keys")[1]
     for section, parts in sections().items():
-        code, out, err = run(capsys, "keys", section)
+        code, out, err = geomech("keys", section)
         assert (code, err) == (0, "")
         for part in parts:
             assert part.title in out and part.title in whole
@@ -330,12 +324,12 @@ def test_keys_of_all_scenes_are_told(capsys):
                 )
     assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
     assert re.search(r"\n  B-11 +number +N/cm\^3 +none +coefficient of a sine of alpha_z", whole)
-    assert re.search(r"\n  elements +whole number +- +100 ", run(capsys, "keys", "numerics")[1])
-    assert re.search(r"\n  triangles +whole number +- +5000 ", run(capsys, "keys", "numerics")[1])
-    of_mesh = run(capsys, "keys", "motion")[1].partition('[motion] kind = "drag" of a mesh\n')[2]
+    assert re.search(r"\n  elements +whole number +- +100 ", geomech("keys", "numerics")[1])
+    assert re.search(r"\n  triangles +whole number +- +5000 ", geomech("keys", "numerics")[1])
+    of_mesh = geomech("keys", "motion")[1].partition('[motion] kind = "drag" of a mesh\n')[2]
     assert re.search(r"^  heading +number +rad +0.0 ", of_mesh.partition("\n\n")[0], re.M)
     assert re.search(r"\n  internal_friction +number +- +none +mu, tan of the angle of repose", whole)
-    assert '[[effects]] kind = "aeration" of an intruder scene\n' in run(capsys, "keys", "effects")[1]
+    assert '[[effects]] kind = "aeration" of an intruder scene\n' in geomech("keys", "effects")[1]
 
 
 LEG, BOX = 'kind = "flat-leg"\nradius = 0.02\nwidth = 0.01', "length = 0.1\nheight = 0.03\nwidth = 0.05\nhips = [0.0]"
@@ -409,15 +403,15 @@ def test_the_schema_agrees_with_the_reader_of_mjcf_robots(old, new, good, valid,
             parse(scene)
 
 
-def test_keys_of_robots_are_told(capsys):
-    robots = run(capsys, "keys", "robot")[1]
+def test_keys_of_robots_are_told():
+    robots = geomech("keys", "robot")[1]
     assert "[robot.screw]" in robots
     assert (
         re.search(r"\n  mass +number +kg +required +mass of all that the wheel carries", robots)
         and "[robot.legs]" in robots
     )
     assert re.search(r"\n  hips +list of numbers +m +required +x of each", robots)
-    assert re.search(r"\n  sweep +number +rad +3.14\d* +angle by which.*sweep_deg", run(capsys, "keys", "gait")[1])
+    assert re.search(r"\n  sweep +number +rad +3.14\d* +angle by which.*sweep_deg", geomech("keys", "gait")[1])
 
 
 def test_systems_and_sizes_given_once_are_valid(valid):
@@ -444,19 +438,19 @@ def test_systems_and_sizes_given_once_are_valid(valid):
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
-def test_named_media_are_shown_as_a_table_that_makes_them(name, capsys):
-    code, out, err = run(capsys, "scenes", "--show", name)
+def test_named_media_are_shown_as_a_table_that_makes_them(name):
+    code, out, err = geomech("scenes", "--show", name)
     assert (code, err) == (0, "")
     scene = parse(out + '[body]\nkind = "chain"\n[gait]\nkind = "circle"\n')
     assert scene.system.medium == CATALOGUE[name].medium
     said = " ".join(line.lstrip("# ") for line in out.splitlines() if line.startswith("#"))
     assert CATALOGUE[name].source in said
-    assert run(capsys, "scenes", "--show", name + "x")[0] == 2
+    assert geomech("scenes", "--show", name + "x")[0] == 2
 
 
 @pytest.mark.parametrize("name", VERTICAL)
-def test_media_of_intruders_are_shown_as_a_table_that_makes_them(name, capsys, valid):
-    code, out, err = run(capsys, "scenes", "--show", name)
+def test_media_of_intruders_are_shown_as_a_table_that_makes_them(name, valid):
+    code, out, err = geomech("scenes", "--show", name)
     assert (code, err) == (0, "")
     scene = f"{out}[intruder]\n{PLATE}\n[motion]\n{STEP}\n"
     assert parse(scene).medium == VERTICAL[name].stress

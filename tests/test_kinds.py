@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from commands import geomech
 from registry import EFFECTS
 
 from geomech import cli
@@ -39,12 +40,6 @@ SMALL = Numerics(grid=7, phases=32)
 pytestmark = pytest.mark.usefixtures("own_parts")
 
 
-def told(capsys, *argv):
-    with pytest.raises(SystemExit) as left:
-        cli.main(list(argv))
-    return left.value.code, *capsys.readouterr()
-
-
 class Bare:
     """A law that supplies its traction and nothing else."""
 
@@ -69,7 +64,7 @@ SCENE = """[medium]\nlaw = "thick"\nthickness = 3.0\n[body]\nkind = "chain"\nlen
 [gait]\nkind = "circle"\ncentre = [0.2, -0.1]\n[numerics]\ngrid = 7\nphases = 32\n"""
 
 
-def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, capsys, monkeypatch):
+def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
     section = PAGE.partition("## Laws, bodies")[2].partition("\n## ")[0]
     (law,), scene = re.findall(r"```python\n(.*?)```", section, re.S), re.search(r"```toml\n(.*?)```", section, re.S)[1]
     assert len(law.splitlines()) == 15
@@ -77,17 +72,15 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, capsys, monkeypat
     (tmp_path / "power.py").write_text(law)
     (tmp_path / "power.toml").write_text(scene)
     command = re.search(r"`geomech (displacement power\.toml .*?)`", section)[1]
-    code, out, err = told(capsys, *command.split(), "--json", "--methods", "direct")
+    code, out, err = geomech(*command.split(), "--json", "--methods", "direct")
     assert code == 0
     assert err.count("\n") == 1
     assert "power has no closed form" in err and "gauss:24" in err and "five times" in err
     for amplitudes, wanted in (("0.5", 0), ("2.6", 2)):  # said once by a search that asks often, and beside an error
         args = "displacement", "power.toml", "--plugin", "power.py", "--amplitudes", amplitudes
-        code, out, err = (
-            told(capsys, *args, "--tol", "1e-2") if wanted == 0 else told(capsys, *args, "--methods", "path")
-        )
+        code, out, err = geomech(*args, "--tol", "1e-2") if wanted == 0 else geomech(*args, "--methods", "path")
         assert (code, err.count("\n"), err.count("no closed form")) == (wanted, 1, int(wanted == 0))
-    code, out, err = told(capsys, *command.split(), "--json", "--methods", "direct")
+    code, out, err = geomech(*command.split(), "--json", "--methods", "direct")
     module = {}
     exec(law, module)
     shear = Swimmer(module["Power"](0.4), Chain())
@@ -269,23 +262,23 @@ def test_one_of_each_family_runs_everywhere_and_round_trips(name):
         register(type("Other", (PARTS[name],), {"__module__": "elsewhere"}))  # two of one name
 
 
-def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, capsys, monkeypatch):
+def test_a_file_registers_what_is_in_it_and_a_scene_alone_does_not(tmp_path, monkeypatch):
     (tmp_path / "thick.py").write_text(LAW)
     (tmp_path / "thick.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
     velocity = ["velocity", "thick.toml", "--alpha", "0.3,0.2", "--alphadot", "1,0", "--json"]
-    code, out, err = told(capsys, *velocity)
+    code, out, err = geomech(*velocity)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1 and "'thick' is unknown" in err and "--plugin" in err
-    code, out, err = told(capsys, *velocity, "--plugin", "thick.py")
+    code, out, err = geomech(*velocity, "--plugin", "thick.py")
     assert code == 0
     xi = body_velocity(Viscous(2.5), Chain((1, 1.4, 0.8)), [0.3, 0.2], [1, 0]).xi
     np.testing.assert_allclose(json.loads(out)["xi"], xi, atol=1e-9)
-    assert told(capsys, "--plugin", "thick.py", *velocity)[:2] == (0, out)
+    assert geomech("--plugin", "thick.py", *velocity)[:2] == (0, out)
     (tmp_path / "more.py").write_text(LAW.replace("thick", "thin").replace("Thick", "Thin"))
-    assert told(capsys, *velocity, "--plugin", "more.py", "--plugin", "thick.py")[:2] == (0, out)
+    assert geomech(*velocity, "--plugin", "more.py", "--plugin", "thick.py")[:2] == (0, out)
     (tmp_path / "thick.py").write_text(LAW.replace("2.5", "1.0"))  # mended: the new one counts
-    assert told(capsys, *velocity, "--plugin", "thick.py")[1] != out
+    assert geomech(*velocity, "--plugin", "thick.py")[1] != out
 
 
 def test_every_command_that_takes_a_scene_takes_plugins():
@@ -337,9 +330,10 @@ def test_names_of_no_python_file_are_refused(tmp_path):
     for name, said in (("own.toml", "ends in .py"), ("missing.py", "No such file"), ("", "ends in .py")):
         with pytest.raises(Refusal, match=said):
             load_file(tmp_path / name if name else "")
-    (tmp_path / "own.py").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(Refusal, match="--plugin"):
-        load_file(tmp_path / "own.py")
+    for raw, said in ((b"\xff\xfe\x00", "it is not text"), (b"#" * 1_000_001, "it is larger than 1 MB")):
+        (tmp_path / "own.py").write_bytes(raw)
+        with pytest.raises(Refusal, match=f"--plugin .*: {said}"):
+            load_file(tmp_path / "own.py")
 
 
 def test_digests_of_own_code_cover_its_sources(tmp_path, monkeypatch):

@@ -1,6 +1,7 @@
 """Stated limits of parameters, taken at the limit, refused next to it; and stated defaults."""
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -10,6 +11,9 @@ from registry import GAITS
 
 from geomech.gaits import Butterfly, Circle, Ellipse, Points, Sine
 from geomech.geometry import connection, family, harmonics
+from geomech.systems import Swimmer
+from geomech.tiers import fitted
+from geomech.tiers.base import Numerics
 from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import (
@@ -29,6 +33,10 @@ from rft import (
     Viscous,
     body_velocity,
 )
+from rft.meshes import Spatial
+from rft.plates import CLeg
+from rft.walking import Rhex
+from rft.walking.facets import Grains
 
 pytestmark = pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")
 
@@ -48,6 +56,7 @@ def solved(name):
 FAMILY = family.fit(still, Circle(), 2.0, 4, 8)
 GRAINS = {"frequency": 1.0, "length": 1.0, "depth": 1.0}
 MASS = {"mass": 1e-9, "frequency": 1e-3, "length": 1e-3, "drag": 1e3}
+ROBOT = functools.partial(Rhex, 0.15, 0.13, 0.03, 0.05, CLeg(0.02, 0.01))
 LEAST, NEXT_TO_RIGHT = math.ulp(0.0), math.nextafter(math.pi / 2, 0)
 NUMBERS = [
     # what, made of the number, the least and the largest that is taken; None: tested elsewhere
@@ -55,7 +64,7 @@ NUMBERS = [
     ("waves", having(Serpenoid, "waves", elements=24), LEAST, 6.0),
     ("C", having(Granular, "C", gamma0=0.2), 0.0, 1e6),
     ("gamma0", having(Granular, "gamma0", C=1.0), LEAST, NEXT_TO_RIGHT),
-    ("ratio", having(Viscous, "ratio"), 1e-8, 1e8),
+    ("ratio", lambda x: body_velocity(Viscous(x), Chain(), [1.0, 0.2], [1.0, 0.3]), 1e-8, 1e8),
     *((name, having(SkinFriction, name), 1e-3, 100.0) for name in ("forward", "backward", "reference")),
     ("cap radius", having(EndCaps, "radius"), 0.0, 1.0),
     *((name, having(EndCaps, name, radius=0.1), 0.0, 100.0) for name in ("head", "tail")),
@@ -85,6 +94,10 @@ NUMBERS = [
     ("extent", lambda x: connection.grid(2, 4, x), 1e-9, 1e6),
     ("family's amplitude", lambda x: family.fit(still, Circle(), x, 4, 8), 1e-300, None),
     ("off the family", FAMILY.area, 0.0, None),
+    ("hip", lambda x: ROBOT(hips=(0.0, x)), -0.13, 0.13),
+    ("leg's distance", lambda x: ROBOT(hips=(0.0, 0.1), aside=(0.03, x)), 0.0, 10.0),
+    *((f"grains' {name}", having(Grains, name, law=Spatial(3e5)), 0.0, 1e9) for name in ("strength", "flux")),
+    ("grains' rounding", having(Grains, "rounding", law=Spatial(3e5)), 1e-7, 10.0),
 ]
 COUNTS = [
     # what, made of the number, its least and its largest; None: no limit of its own
@@ -104,6 +117,7 @@ COUNTS = [
     ("curves", lambda n: family.fit(still, Circle(), 1.0, n, 8), 4, None),
     ("phases", lambda n: Circle().cycle(n), 4, None),
     ("phases of the butterfly", lambda n: Butterfly().cycle(n), 11, None),
+    ("hips", lambda n: ROBOT(hips=(0.05,) * n), 1, 20),
     ("points of a gait", lambda n: Points(points=tuple((k, k * k) for k in range(n))), 3, None),
 ]
 
@@ -180,6 +194,9 @@ def test_what_is_left_out_is_what_the_documentation_says():
     assert EndCaps(0.1) == EndCaps(0.1, head=1.0, tail=1.0)
     assert GrainInertia(**GRAINS) == GrainInertia(**GRAINS, strength=1.0)
     assert DepthProfile() == DepthProfile((1.0, 1.0), 0.0, 0.0)
+    for medium, counts in ((Viscous(), [8, 12, 16]), (Granular(1.8, 0.2), [8, 48, 64])):
+        systems = [Swimmer(medium, Chain((1.0,) * links)) for links in (3, 4, 5)]
+        assert [fitted.directions(system, Numerics()) for system in systems] == counts
     axes = connection.grid(2)
     assert len(axes) == 2 and [(len(a), a[0], a[-1]) for a in axes] == [(31, -2.5, 2.5)] * 2
 

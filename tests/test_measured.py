@@ -10,13 +10,14 @@ import re
 import numpy as np
 import pytest
 import xarray
+from commands import geomech as command
 from scipy.interpolate import CubicSpline
 from scipy.io import loadmat
 
 import geomech
 import rft
 from figures import measured_gait
-from geomech import cli, gaits, measured
+from geomech import gaits, measured
 from geomech.core.errors import UnitWarning
 from geomech.geometry import connection
 from geomech.geometry.connection import Connection
@@ -683,6 +684,28 @@ def test_damaged_fields_are_refused(field, tmp_path):
             Table(tmp_path / "bad.nc").run(*gaits.Circle().cycle(16))
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.drop_vars("gait_slope"), "no gait_slope that fits it"),
+        (lambda d: d.assign(gait_beyond=d.gait_beyond.expand_dims("more")), "no gait_beyond that fits it"),
+        (lambda d: d.assign(gait_spread=d.gait_spread * (2 * d.joint - 3)), "parts do not fit"),
+        (lambda d: d.isel(normal=[0, 0]), "parts do not fit"),
+        (lambda d: d.isel(along_and_across=[0, 1, 1]), "parts do not fit"),
+        (lambda d: d.assign_attrs(level=1.0), "parts do not fit"),
+        (lambda d: d.assign_attrs(level=b"most"), "parts do not fit"),
+        (lambda d: d.assign_attrs(error_factor=0.0), "parts do not fit"),
+        (lambda d: d.assign_attrs(error_factor=[2.0, 2.0]), "parts do not fit"),
+        (lambda d: d.assign(gait=0 * d.gait), "a gait that does not move"),
+    ],
+)
+def test_parts_of_a_gait_that_do_not_fit_are_refused(change, said, field, tmp_path):
+    with xarray.open_dataset(field / "field.nc", engine="scipy") as data:
+        change(data).to_netcdf(tmp_path / "bad.nc", engine="scipy")
+    with pytest.raises(Refusal, match=said):
+        tables.load(tmp_path / "bad.nc")
+
+
 def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_path):
     f = fitted(viscous, seed=1, spread=0.0, cycles=14)
     assert not f.across
@@ -691,6 +714,8 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     t = np.arange(6.0)
     n = f.known.loop.normals(t)[..., 0]
     assert np.linalg.norm(np.einsum("tij,tj->ti", f.along(t)[1], np.abs(n)), axis=1).min() > 0.05  # not known
+    slopes = np.abs(f.known.errors[:, :, :, 1]).max((1, 2, 3))
+    assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
     assert told.told(f)["status"].startswith("fitted along the gait alone")
@@ -794,6 +819,7 @@ BAD = {
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
     "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
+    "eight": (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
     "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
     "thin": (lambda r: r[::4], "7.6 rows a cycle are too few: give at least 12"),
@@ -931,24 +957,22 @@ def test_rows_at_uneven_times_tell_the_same(viscous):
     assert (np.abs(f.displacement[0] - true_net(f, viscous)) <= f.displacement[1]).all()
 
 
-def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch, capsys):
+def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit):
-        cli.main(["trajectory", str(field / "mine.toml"), "--cycles", "10", "-o", "tr.csv"])
+    assert command("trajectory", field / "mine.toml", "--cycles", "10", "-o", "tr.csv")[0] == 0
     f = measured.fit_log("tr.csv")
     net = Study(load(field / "mine.toml")).displacement("direct")
     np.testing.assert_allclose(f.mean[0], net, atol=1e-4)
     np.testing.assert_allclose(f.displacement[0], net, atol=1e-4)
 
 
-def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch, capsys):
+def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log = usual.log
     synthetic.save("log.csv", synthetic.Made(log.t, log.alpha, log.pose, log.t))
-    with pytest.raises(SystemExit) as left:
-        cli.main(["fit", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json"])
-    assert left.value.code == 0
-    found = json.loads(capsys.readouterr().out)
+    code, out, _ = command("fit", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json")
+    assert code == 0
+    found = json.loads(out)
     np.testing.assert_allclose(found["displacement_predicted"], usual.displacement[0], atol=1e-7)
     assert all(a < x < b for x, (a, b) in zip(found["displacement_predicted"], found["interval"]))
     np.testing.assert_allclose(found["displacement_measured"], np.mean(found["per_cycle"]["measured"], 0), atol=1e-12)

@@ -12,7 +12,7 @@ from geomech.gaits import Circle
 from geomech.study.undulation import endless_efficiency
 from rft import CATALOGUE, Chain, Coulomb, Granular, Serpenoid, Surface, Viscous, body_velocity, time_steps
 from rft.balance.arrays import solve
-from rft.balance.newton import Limits
+from rft.balance.newton import RESIDUAL, Limits
 from rft.balance.solver import QUICK
 from rft.contact import assemble
 from rft.laws.base import TermLaw, require_drag
@@ -211,7 +211,7 @@ def test_residuals_are_magnitudes():
     alpha, alphadot = np.array([[0.4], [-0.7]]), np.array([[1.0], [0.2]])
     problem = assemble(Law((1.0, 1.0, 3.0)), Chain()).problem(alpha, alphadot)
     problem = problem._replace(law=record(Law((1.0, -1.0, -3.0))))
-    _, residual, _, _ = solve(problem, QUICK, Limits(1e-6, 1e-10), None)
+    residual = solve(problem, QUICK, Limits(1e-6, 1e-10), None)[RESIDUAL]
     assert (residual >= 0).all()
     assert problem.axial_drag == 1.0
 

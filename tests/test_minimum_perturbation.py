@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_cli import geomech
+from commands import geomech
 
 from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse

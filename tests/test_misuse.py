@@ -10,8 +10,8 @@ import warnings
 
 import numpy as np
 import pytest
+from commands import geomech
 from registry import MEDIA
-from test_cli import geomech
 
 import geomech as geomech_package
 from geomech import scene as scenes
@@ -106,7 +106,7 @@ def test_degrees_where_gamma0_is_in_rad_are_told_of_the_other_key(given, hinted,
     code, _, err = geomech("explain", scene(tmp_path, PLAIN.replace("gamma0_deg = 13.8", given)), cwd=tmp_path)
     assert (code, err.count("\n")) == (2, 1)
     assert "gamma0 must lie between 0 and 90 degrees, got " in err
-    assert err.endswith("; gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
+    assert err.endswith(": gamma0 is in rad, write gamma0_deg for degrees\n") == hinted
 
 
 def test_a_refusal_stays_one_line_and_keeps_the_note():
@@ -308,7 +308,7 @@ def test_what_lacks_batch_axes_is_broadcast():
         ValueError, match=r"must return shape \(25, 8, 3\) for these alpha and alphadot, got \(25, 8, 1\)"
     ):
         connection.fit(lambda a, r: turning(a, r)[..., :1], AXES)
-    with pytest.raises(ValueError, match="what velocity returns must be numbers"):
+    with pytest.raises(ValueError, match="what velocity returns must be real numbers"):
         connection.fit(lambda a, r: None, AXES)
     with pytest.raises(KeyError, match="own"):
         connection.fit(lambda a, r: {}["own"], AXES)

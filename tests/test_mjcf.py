@@ -145,7 +145,7 @@ WRONG = {
     "frequency = 1.0": ("frequency = 0", "frequency must be"),
     "\n[gait]": ("phases = [0.5]\n[gait]", "phases must be 4 numbers"),
     "geoms": ("goems", "'goems' is unknown: did you mean 'geoms'"),
-    "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file: drop one"),
+    "mjcf =": ('kind = "rhex"\nmjcf =', "mjcf a file; drop one"),
     "mjcf": ("legs = 3\nmjcf", "key: 'legs' is unknown"),
     "steps = 8": ('engine = "planar"', "use --engine mujoco"),
 }

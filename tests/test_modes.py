@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from commands import geomech
 from scipy.io import netcdf_file
-from test_cli import geomech
 
 import rft
 from geomech import scene as scenes

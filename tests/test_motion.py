@@ -421,7 +421,7 @@ def test_an_mp4_hands_its_pictures_to_ffmpeg(chain, tmp_path, monkeypatch):
 
 def test_an_mp4_says_what_it_lacks(chain, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(Refusal, match="takes ffmpeg, which is not installed: end the name in .gif"):
+    with pytest.raises(Refusal, match="takes ffmpeg, which is not installed; end the name in .gif"):
         animate.check_format(tmp_path / "out.mp4")
 
 

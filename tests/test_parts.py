@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from test_cli import geomech
+from commands import geomech
 
 import geomech as library
 from geomech.core.errors import VelocityWarning

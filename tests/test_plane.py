@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from test_cli import geomech
+from commands import geomech
 
 from geomech import Numerics, Scene, Study
 from geomech.gaits import Circle, Fourier, Wave

@@ -72,12 +72,12 @@ def test_after_a_part_the_whole_goes_on(monkeypatch):
 
 def test_an_error_ends_it(capsys, monkeypatch):
     monkeypatch.setattr(progress, "EVERY", 0.02)
-    with pytest.raises(terminal.Stopped), terminal.progress("field"):
+    with pytest.raises(terminal.Stopped), terminal.progress("field") as failed:
         raise terminal.Stopped(2)
     time.sleep(0.06)
     assert capsys.readouterr().err == ""
     with terminal.progress("next") as reached:  # is nobody's part
-        assert reached.__self__.title == "next"
+        assert reached.__self__.title == "next" and reached.__self__ is not failed.__self__
 
 
 @pytest.fixture

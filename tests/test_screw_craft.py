@@ -142,7 +142,7 @@ def test_sizes_of_screws_are_swept():
 def test_a_craft_without_screws_is_told_so():
     bare = SMALL[: SMALL.index("[robot.screw]")] + SMALL[SMALL.index("[gait]") :]
     asked = {
-        bare: r"\[robot\]: the table \[robot.screw\] is missing: add it",
+        bare: r"\[robot\] the table \[robot.screw\] is missing: add it",
         bare.replace("mass = 1.0", "screw = 3\nmass = 1.0"): r"robot.screw must be a table \[robot.screw\], got int",
     }
     for text, said in asked.items():

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rft.meshes import Screw, Spatial, wrench
 from rft.walking.craft import Screws
-from rft.walking.screws import cruise, free_turning, turning
+from rft.walking.screws import _Steady, cruise, free_turning, turning
 
 SAND = Spatial(3e5, 0.3)
 SCREW = Screw(0.03, 0.018, 0.05, 0.13, 0.006, 0.02)
@@ -204,6 +204,10 @@ def test_craft_of_other_sizes_and_gravity_go_alike():
         assert other.slip == pytest.approx(one.slip, abs=1e-4)
         assert other.advance / size == pytest.approx(one.advance, rel=1e-4)
         assert other.height / size == pytest.approx(one.height, rel=1e-3)
+
+
+def test_a_craft_of_no_weight_floats_on_its_screws():
+    assert 1.9 < _Steady(SAND, dataclasses.replace(CRAFT, mass=1e-3), 1.0, **COARSE).floating() < 2.0  # radii
 
 
 def test_a_craft_that_nothing_bears_is_told_so():

@@ -90,6 +90,7 @@ def test_reprs_are_short_and_say_shapes_ranges_and_units(study, table, swept):
         text = repr(value)
         assert len(text) < 600 and "\n" not in text
         assert [x for x in said if x not in text] == [], text
+    assert re.search(r"; residual up to \d\.\de-\d\d; with work\)$", repr(cycle))
     assert repr(table).splitlines()[0].startswith("scene: displacement per cycle (m)")
     snake = Study(Scene(NoSlipSnake(), GAIT, Numerics(grid=7)))
     assert "rad; 7 singular; A x" in repr(snake.fitted) and " singular; values" in repr(snake.curvature)

@@ -277,6 +277,8 @@ def test_shapes_have_their_volume(mesh, volume):
 
 def test_legs_bend_the_way_they_say():
     forward, back = shapes.leg(0.019, -1.0, 0.003, 0.01), shapes.leg(0.019, 1.0, 0.003, 0.01)
+    heights = shapes.leg(0.019, 0.0, 0.003, 0.01, 7, 8, 2).vertices[:, 2]
+    assert (heights == 0.0).sum() == 4 * 20 + 1  # rings as far apart as the strip is divided, and the middle
     assert back.vertices[:, 0].max() == pytest.approx(0.019 + 0.0015)
     assert forward.vertices[:, 0].min() == pytest.approx(-0.019 - 0.0015)
     for mesh in (forward, back):

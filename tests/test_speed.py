@@ -7,8 +7,8 @@ from unittest import mock
 import numpy as np
 import pytest
 import xarray
+from commands import geomech
 from registry import GAITS
-from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech.gaits import Circle

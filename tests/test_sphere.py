@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from test_cli import geomech
+from commands import geomech
 
 from geomech.gaits import Fourier
 from geomech.geometry import connection, harmonics

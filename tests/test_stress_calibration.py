@@ -6,8 +6,9 @@ import json
 import mpmath
 import numpy as np
 import pytest
+from commands import geomech
 
-from geomech import cli, scene
+from geomech import scene
 from geomech.io import rows
 from geomech.scene import penetration
 from geomech.study import stress_calibration
@@ -35,12 +36,6 @@ def design(beta, gamma):
     upwards = [one, np.cos(2 * beta), np.sin(2 * beta + gamma), np.sin(gamma), np.sin(gamma - 2 * beta)]
     along = [np.cos(2 * beta + gamma), np.cos(gamma), np.cos(gamma - 2 * beta), np.sin(2 * beta)]
     return np.concatenate([np.concatenate([np.zeros((5, len(beta))), along]), np.concatenate([upwards, zero])], 1).T
-
-
-def printed(capsys, *args):
-    with pytest.raises(SystemExit) as left:
-        cli.main(["calibrate", *map(str, args)])
-    return left.value.code, *capsys.readouterr()
 
 
 def plates(
@@ -260,9 +255,9 @@ def test_what_makes_no_sense_is_refused_with_one_line(said):
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_plate_drags_become_a_medium_that_commands_read(tmp_path, capsys):
+def test_plate_drags_become_a_medium_that_commands_read(tmp_path):
     file, out = plates(tmp_path), tmp_path / "m.toml"
-    code, text, err = printed(capsys, file, "-o", out, "--plot", tmp_path / "map.svg", "--json")
+    code, text, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "map.svg", "--json")
     found = json.loads(text)
     assert (code, err, found["law"], found["status"]) == (0, "", "stress-map", "converged")
     close = VERTICAL["poppy-seeds-close"].stress
@@ -275,9 +270,7 @@ def test_plate_drags_become_a_medium_that_commands_read(tmp_path, capsys):
     assert found["rms"] == pytest.approx(0.003, rel=0.3)
     assert len(found["residuals"]["alpha_x"]) == len(found["residuals"]["beta_deg"]) == 42
     assert (tmp_path / "map.svg").stat().st_size > 20_000
-    with pytest.raises(SystemExit):
-        cli.main(["stress", str(out), "--beta", "30", "--gamma", "50", "--json"])
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(geomech("stress", out, "--beta", "30", "--gamma", "50", "--json")[1])
     medium = StressMap(*(found[name.replace("m", "-")] for name in COEFFICIENTS))
     np.testing.assert_allclose([told["alpha_x"], told["alpha_z"]], medium(30 * RAD, 50 * RAD), atol=1e-9)
     text = (
@@ -289,15 +282,15 @@ def test_plate_drags_become_a_medium_that_commands_read(tmp_path, capsys):
     assert str(out) in map(str, scene.inputs(loaded))
 
 
-def test_what_is_not_determined_is_noted(tmp_path, capsys):
+def test_what_is_not_determined_is_noted(tmp_path):
     level = np.stack([np.arange(-75, 91, 15) * RAD, np.zeros(12)])
     file, out = plates(tmp_path, angles=level), tmp_path / "m.toml"
-    code, text, err = printed(capsys, file, "-o", out, "--plot", tmp_path / "map.svg")
+    code, text, err = geomech("calibrate", file, "-o", out, "--plot", tmp_path / "map.svg")
     assert code == 0 and err.count("\n") == 1
     assert err.startswith("note: plates.csv: these drags do not determine ") and "B01" in err
     assert "A00" not in err and "D10" not in err and "A10" not in err  # at gamma = 0 they stand alone
     assert "generic shape" in out.read_text() and "B01" in text
-    assert json.loads(printed(capsys, file, "--json")[1])["undetermined"][:2] == ["B11", "B01"]
+    assert json.loads(geomech("calibrate", file, "--json")[1])["undetermined"][:2] == ["B11", "B01"]
     assert "not determined" in (tmp_path / "map.svg").read_text()
 
 
@@ -355,14 +348,12 @@ def test_a_map_that_drives_motion_on_is_noted(tmp_path):
     assert any("drives motion on" in line for line in found.notes())
 
 
-def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path, capsys):
+def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path):
     """The table of `geomech intrude` is a penetration test: columns z and force_z."""
     plate = '[intruder]\nkind = "plate"\nlength = 0.038\nwidth = 0.025\n[motion]\nkind = "penetrate"\ndepth = 0.05\n'
     written(tmp_path / "s.toml", '[medium]\nname = "glass-3mm"\n' + plate)
-    with pytest.raises(SystemExit):
-        cli.main(["intrude", str(tmp_path / "s.toml"), "-o", str(tmp_path / "down.csv")])
-    capsys.readouterr()
-    code, text, err = printed(capsys, tmp_path / "down.csv", "--area", 9.5e-4, "-o", tmp_path / "m.toml", "--json")
+    assert geomech("intrude", tmp_path / "s.toml", "-o", tmp_path / "down.csv")[0] == 0
+    code, text, err = geomech("calibrate", tmp_path / "down.csv", "--area", 9.5e-4, "-o", tmp_path / "m.toml", "--json")
     found = json.loads(text)
     assert (code, err, found["law"], found["area"]) == (0, "", "zeta", 9.5e-4)
     assert found["zeta"] == pytest.approx(0.224, rel=1e-9)
@@ -373,11 +364,11 @@ def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path, capsys):
     np.testing.assert_allclose(again.run().force, scene.load(tmp_path / "s.toml").run().force, rtol=1e-9)
 
 
-def test_zeta_as_text_and_picture(tmp_path, capsys):
+def test_zeta_as_text_and_picture(tmp_path):
     depth, force = penetrated(np.random.default_rng(2))
     rows_ = [f"{1e3 * d:.6g},{f:.6g}" for d, f in zip(depth, force)]
     file = written(tmp_path / "p.csv", "# plate 38 x 25 mm", "depth_mm,force_N", *rows_)
-    code, text, err = printed(capsys, file, "-o", tmp_path / "m.toml", "--plot", tmp_path / "p.png")
+    code, text, err = geomech("calibrate", file, "-o", tmp_path / "m.toml", "--plot", tmp_path / "p.png")
     assert (code, err) == (0, "")
     assert text.startswith("zeta fitted to p.csv: 40 depths to 6 cm\nzeta        0.3")
     assert (tmp_path / "p.png").stat().st_size > 10_000
@@ -385,7 +376,7 @@ def test_zeta_as_text_and_picture(tmp_path, capsys):
     assert "zeta = 0.3" in (tmp_path / "m.toml").read_text()
 
 
-def test_a_surface_that_is_elsewhere_is_noted(tmp_path, capsys):
+def test_a_surface_that_is_elsewhere_is_noted(tmp_path):
     depth, force = penetrated(np.random.default_rng(3))
     loud = force + np.random.default_rng(10).normal(0, 2.0, 40)  # zero at some other depth, by chance
     assert abs(fit_zeta(depth, loud, 9.5e-4).zero) > 0.02 * 0.06
@@ -393,7 +384,7 @@ def test_a_surface_that_is_elsewhere_is_noted(tmp_path, capsys):
         file = written(
             tmp_path / "p.csv", "depth,force", *(f"{d + shift:.8f},{f:.6g}" for d, f in zip(depth, measured))
         )
-        code, _, err = printed(capsys, file, "--area", "9.5e-4")
+        code, _, err = geomech("calibrate", file, "--area", "9.5e-4")
         assert (code, err.count("\n")) == (0, notes)
         assert not notes or f"is zero at a depth of {1e3 * shift:.1f}"[:-1] in err
 
@@ -462,15 +453,15 @@ BAD = {
 
 
 @pytest.mark.parametrize("kind", BAD)
-def test_bad_files_get_one_line(kind, tmp_path, capsys):
+def test_bad_files_get_one_line(kind, tmp_path):
     lines, said = BAD[kind]
-    code, out, err = printed(capsys, written(tmp_path / "p.csv", *lines), "-o", tmp_path / "m.toml")
+    code, out, err = geomech("calibrate", written(tmp_path / "p.csv", *lines), "-o", tmp_path / "m.toml")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said.replace("plates: ", "") in err
     assert not (tmp_path / "m.toml").exists()
 
 
-def test_slips_of_units_get_one_line(tmp_path, capsys):
+def test_slips_of_units_get_one_line(tmp_path):
     radians = plates(tmp_path, angles=GRID, name="rad.csv")
     rows_ = np.loadtxt(radians, delimiter=",", skiprows=1)
     rows_[:, :2] *= RAD
@@ -483,12 +474,12 @@ def test_slips_of_units_get_one_line(tmp_path, capsys):
         file = written(tmp_path / name, f"# area = {area:g}", "depth,force", *lines)
         refused.append((file, "check the units, depth in m, force in N, area in m^2"))
     for file, said in refused:
-        code, out, err = printed(capsys, file)
+        code, out, err = geomech("calibrate", file)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert said in err and file.name in err
 
 
-def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path, capsys):
+def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path):
     file = plates(tmp_path)
     assert stress_calibration.law_of(str(file)) == "stress-map"
     assert stress_calibration.law_of(str(written(tmp_path / "p.csv", "depth_m,force_N", "1,2"))) == "zeta"
@@ -502,15 +493,15 @@ def test_the_law_is_that_of_the_columns_or_the_one_asked_for(tmp_path, capsys):
         ("granular", "the header has no column psi_deg"), ("zeta", "the header has no column depth"),
         ("stres-map", "--law: 'stres-map' is unknown: did you mean 'stress-map'?"),
     ):  # fmt: skip
-        code, _, err = printed(capsys, file, "--law", law)
+        code, _, err = geomech("calibrate", file, "--law", law)
         assert code == 2 and said in err and err.count("\n") == 1
     for option in (("--area", "1e-3"), ("--radius", "0.01"), ("--end-caps", "fitted")):
-        code, _, err = printed(capsys, file, *option)
+        code, _, err = geomech("calibrate", file, *option)
         assert code == 2 and f"{option[0]} belongs to another measurement: leave it out for --law stress-map" in err
     for option in ("--radius", "--length", "--depth", "--density"):
-        code, _, err = printed(capsys, tmp_path / "p.csv", "--area", "1e-3", option, "0.01")
+        code, _, err = geomech("calibrate", tmp_path / "p.csv", "--area", "1e-3", option, "0.01")
         assert code == 2 and f"{option} belongs to another measurement: leave it out for --law zeta" in err
-    code, _, err = printed(capsys, "dem-rod-drag", "--area", "1e-3")
+    code, _, err = geomech("calibrate", "dem-rod-drag", "--area", "1e-3")
     assert code == 2 and "--area belongs to another measurement" in err
 
 

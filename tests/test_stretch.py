@@ -6,7 +6,7 @@ import pytest
 from geomech.gaits import Circle
 from geomech.geometry import connection, curvature, metric
 from geomech.geometry.field import Field
-from geomech.geometry.stretch import stretch
+from geomech.geometry.stretch import _first, stretch
 from geomech.output import plots
 
 
@@ -33,6 +33,12 @@ def test_a_constant_metric_becomes_its_root():
     root = (vectors * np.sqrt(values)) @ vectors.T
     assert found.field.values == pytest.approx(np.einsum("ij,jkl->ikl", root, shapes(found.field.axes)), abs=1e-10)
     assert found.area.values == pytest.approx(np.full((9, 9), np.sqrt(np.linalg.det(M))), rel=1e-9)
+
+
+def test_what_costs_next_to_nothing_is_drawn_at_first_with_a_width():
+    line = np.array([1.0, -0.3])
+    first = _first(constant(np.outer(line, line)), np.moveaxis(shapes(connection.grid(2, 9, 1.5)), 0, -1))
+    assert np.linalg.cond(first.reshape(-1, 2)) == pytest.approx(1e3)
 
 
 def bent(alpha):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray
-from test_cli import geomech
+from commands import geomech
 
 from geomech import scene as scenes
 from geomech.study import cycles, estimate, sweep

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 import sympy as sp
+from commands import geomech
 from registry import SYSTEMS
 
-from geomech import cli, symbolic
 from geomech import scene as scenes
+from geomech import symbolic
 from geomech.gaits import Circle
 from geomech.scene import Scene
 from geomech.study.bench import Study
@@ -158,14 +159,8 @@ def test_what_has_no_formula_says_so(name):
         formula(NONE[name])
 
 
-def run(capsys, *argv):
-    with pytest.raises(SystemExit) as left:
-        cli.main(list(argv))
-    return left.value.code, *capsys.readouterr()
-
-
-def test_the_command_prints_formulas_that_sympy_reads(capsys):
-    code, out, err = run(capsys, "symbolic", "three-link-floating")
+def test_the_command_prints_formulas_that_sympy_reads():
+    code, out, err = geomech("symbolic", "three-link-floating")
     assert (code, err) == (0, "")
     told = dict(line.split(" = ") for line in out.splitlines())
     assert list(told) == [f"A_{x}_{k}" for x in ("x", "y", "theta") for k in (1, 2)] + [
@@ -173,16 +168,16 @@ def test_the_command_prints_formulas_that_sympy_reads(capsys):
     ]
     read = sp.lambdify(sp.symbols("alpha_1 alpha_2"), sp.sympify(told["A_theta_2"]))
     assert read(0.3, -0.8) == pytest.approx(scenes.load("three-link-floating").system.velocity([0.3, -0.8], [0, 1])[2])
-    code, out, err = run(capsys, "symbolic", "differential-drive", "--latex")
+    code, out, err = geomech("symbolic", "differential-drive", "--latex")
     assert (code, err) == (0, "")
     assert [line[:4] for line in out.splitlines()] == ["A = ", "F_{1"]
-    assert "CCF" not in run(capsys, "symbolic", "differential-drive", "--no-ccf")[1]
-    code, out, err = run(capsys, "symbolic", "three-link-glass")
+    assert "CCF" not in geomech("symbolic", "differential-drive", "--no-ccf")[1]
+    code, out, err = geomech("symbolic", "three-link-glass")
     assert (code, out) == (2, "") and "three-link-glass: a formula is that of a chain" in err
 
 
-def test_a_frame_of_numbers_has_no_formula(tmp_path, capsys):
+def test_a_frame_of_numbers_has_no_formula(tmp_path):
     file = tmp_path / "s.toml"
     file.write_text('frame = "minimum-perturbation"\n[system]\nkind = "floating-chain"\n[gait]\nkind = "circle"\n')
-    code, out, err = run(capsys, "symbolic", str(file))
+    code, out, err = geomech("symbolic", str(file))
     assert (code, out) == (2, "") and "no formula in the minimum-perturbation frame, which is a field of numbers" in err

@@ -11,6 +11,7 @@ from test_loads import CubicDrag
 from rft import Granular
 from rft.balance.arrays import loads, row
 from rft.balance.newton import Net, plus, to_element, with_momentum
+from rft.balance.solver import Accuracy, _limits
 from rft.contact import assemble
 from rft.effects.base import Site, stepwise_effects
 from rft.momentum import element_momentum_rates, frame_inertia
@@ -108,6 +109,8 @@ def test_mass(name):
     e = problem.sides.elements
     borne = element_momentum_rates(e, problem.momentum_rate, plus((e.v_t, e.v_n, e.v_w), to_element(e, *xi)))
     np.testing.assert_allclose(borne.sum(1), term(problem, xi)[:, 0], rtol=1e-12, atol=1e-13)
+    exact = Accuracy(1e-9, 0.0)  # but for roundoff of the largest forces of all samples
+    assert _limits(problem, exact).residual == max(_limits(problem.take([k]), exact).residual for k in range(samples))
 
 
 def test_every_dry_law_is_homogeneous():

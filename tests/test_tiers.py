@@ -21,6 +21,7 @@ from rft import BodyInertia, Chain, Granular, se2
 from rft.balance.listening import listening
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = scenes.load("three-link-glass")
 BENCH = Study(GLASS)
 RADII = np.linspace(0.5, 2.0, 13)

@@ -591,9 +591,9 @@ def test_time_stepping_that_fails_says_so(monkeypatch):
     import rft.balance.solver
 
     monkeypatch.setattr(
-        rft.balance.solver, "QUICK", rft.balance.solver.Descent(0.03, 0.03, 2e-2, 5.0, 5)
+        rft.balance.solver, "QUICK", rft.balance.solver.Descent(0.03, 0.03, 2e-2, 5.0, 5.0)
     )  # enough at rest
-    monkeypatch.setattr(rft.balance.solver, "WARM", rft.balance.solver.WARM._replace(budget=1))
+    monkeypatch.setattr(rft.balance.solver, "WARM", rft.balance.solver.WARM._replace(budget=1.0))
     for name in ("WALKS", "SLOW"):
         monkeypatch.setattr(rft.balance.solver, name, ())
     alpha, alphadot = Circle().cycle(8, np.array([0.0, 1.0]))

@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from geomech.tiers.direct import direct
 from geomech.tiers.path import path
 from rft import Chain, Coulomb, Granular, Viscous, body_velocity, ground, meshes, se2
 from rft.plates import SHAPES, Drag, Path, Penetrate, Rotate
-from rft.refusal import Refusal
+from rft.refusal import Refusal, located
 from rft.walking import Fineness, Rhex, Roller, Screws, Tripod, Walker
 
 WRONG = {
@@ -94,7 +95,7 @@ def test_no_constructor_takes_a_wrong_type(kind, field):
 
 def test_every_public_class_is_in_the_table():
     public = [getattr(rft, name) for name in rft.__all__] + list(KINDS.values())
-    outputs = {rft.Solution, rft.TimeSteps, rft.Work}
+    outputs = {rft.Refusal, rft.Solution, rft.TimeSteps, rft.Work}
     made = {c for c in public if isinstance(c, type) and not getattr(c, "_is_protocol", False)} - outputs
     assert made - {type(part) for part in PARTS.values()} == {Coulomb, Centreline}  # without parameters; with a file
 
@@ -102,7 +103,10 @@ def test_every_public_class_is_in_the_table():
 @pytest.mark.parametrize("value", [0.5, 1, np.float32(0.5), np.float64(0.5), np.int64(1)])
 def test_numbers_of_every_make_are_taken(value):
     assert Granular(C=value, gamma0=0.24).C == value
-    assert Chain(length=value).length == Circle(amplitude=value).amplitude == value
+    assert Chain(length=value).length == value
+    assert repr(Circle(amplitude=value, frequency=value)) == repr(
+        Circle(amplitude=float(value), frequency=float(value))
+    )
     assert rft.Backbone(np.int32(5)).joints == rft.Backbone(5.0).joints == Sine(elements=5.0, waves=1).joints == 4
     assert Chain(np.array([1, 2])) == Chain([1, 2]) == Chain((1.0, 2.0))
     assert Numerics(grid=np.int64(9)).grid == 9
@@ -255,3 +259,12 @@ def test_the_place_is_named():
             call()
         assert said in str(caught.value)
     assert issubclass(Refusal, ValueError)
+
+
+def test_refusals_carry_facts_and_go_to_other_processes():
+    with pytest.raises(Refusal) as caught, located("own.toml"), located("own.toml: [medium]"):
+        raise Refusal("C must be > 0", value=-3, because="it is a stress", instead="give a positive one")
+    refusal = pickle.loads(pickle.dumps(caught.value))
+    assert (refusal.what, refusal.value, refusal.where) == ("C must be > 0", -3, ("own.toml: [medium]",))
+    assert (refusal.because, refusal.instead) == ("it is a stress", "give a positive one")
+    assert str(refusal) == "own.toml: [medium] C must be > 0, got -3: it is a stress; give a positive one"

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 import xarray
-from test_cli import geomech
+from commands import geomech
 
 from geomech import scene as scenes
 from geomech.gaits import Butterfly, Ellipse

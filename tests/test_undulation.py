@@ -30,6 +30,7 @@ from rft import (
     work_done,
 )
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
 SANDFISH = scenes.load("sandfish-loose")
 

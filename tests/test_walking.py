@@ -181,6 +181,10 @@ def test_what_a_limit_tells_is_of_a_stride_and_a_walk_of_a_second():
     search._step(both, search.start.copy(), residual, np.array([1e-3, 1e-3]))
     np.testing.assert_allclose(search.drift, (0.2 * 1e-3 / 0.5 + 0.05 * 4e-3 / 0.2) / np.array([1, 2]))
     np.testing.assert_allclose(search.unsolved_error, 1e-3 * 0.05 / 0.2 / strides.leg_speed / [1, 2])
+    for computed, unknown in ((2, [False, False]), (3, [True, False]), (6, [False, True]), (7, [True, True])):
+        search.computed[:], search.last[:] = computed, np.inf  # a slope serves three strides of its map
+        search._step(both, search.start.copy(), residual / 10, np.zeros(2))
+        assert search.unknown.tolist() == unknown
     one = np.ones(1)
     for progress, status in ((4.0e-4, "stuck"), (4.2e-4, "walking")):
         found = LimitCycles(progress * one, 2e-3 * one, 1e-3 * one, [True], 5 * one, [""], search.limits)
@@ -314,6 +318,7 @@ def test_every_end_has_its_status_and_no_nan():
     for status, walker in cases.items():
         found = walk([walker], QUICK, 2)[0]
         assert found.status == status and np.isnan(found.settling_time) == (status != "walking")
+        assert (found.t[-1] < 2 / walker.gait.frequency) == (status in ("sunk", "flipped"))
         for values in found[:8]:
             if not isinstance(values, str):
                 assert np.isfinite(values).all(), status

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import geomech
 from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
-from test_cli import geomech
 
 from geomech import scene as scenes
 from geomech import terminal

@@ -150,7 +150,11 @@ class Sine(Gait):
         return np.diff(self._headings(t, amplitudes)[0], axis=-1)
 
     def rate(self, t, amplitudes=None) -> np.ndarray:
-        return np.diff(self._headings(t, amplitudes)[1], axis=-1) * (-1.0 if self.reverse else 1.0)
+        return self._shape_and_rate(t, amplitudes)[1]
+
+    def _shape_and_rate(self, t, amplitudes) -> tuple[np.ndarray, np.ndarray]:
+        headings, rates = self._headings(t, amplitudes)  # which takes as long as to solve for the body's motion
+        return np.diff(headings, axis=-1), np.diff(rates, axis=-1) * (-1.0 if self.reverse else 1.0)
 
     def largest(self, amplitudes=None) -> float:
         """At most: headings stay between -pi/2 and pi/2."""

@@ -6,6 +6,7 @@ table from an experiment. It should be odd and homogeneous in alphadot, so that 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
@@ -102,10 +103,30 @@ def directions(joints: int, count: int) -> np.ndarray:
         angle = np.pi * np.arange(count) / count
         return np.stack([np.cos(angle), np.sin(angle)], -1)
     from scipy.special import ndtri
-    from scipy.stats import qmc
 
-    normal = ndtri(qmc.Halton(joints, scramble=False).random(count + 1)[1:])
+    normal = ndtri(np.stack([_van_der_corput(count, base) for base in _primes(joints)], -1))
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def _van_der_corput(count: int, base: int) -> np.ndarray:
+    """Return 1, 2 ... ``count`` with their digits in a base mirrored at the point; for prime numbers the sequence of Halton,
+    as scipy.stats has it, which takes half a second to load."""
+    found, left, unit = np.zeros(count), np.arange(1, count + 1), 1.0 / base
+    while left.any():
+        found += left % base * unit
+        left, unit = left // base, unit / base
+    return found
+
+
+def _primes(count: int) -> list[int]:
+    """Return the first prime numbers."""
+    found: list[int] = []
+    number = 2
+    while len(found) < count:
+        if all(number % prime for prime in itertools.takewhile(lambda prime: prime**2 <= number, found)):
+            found.append(number)
+        number += 1
+    return found
 
 
 def sampled(

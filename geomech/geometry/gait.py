@@ -107,6 +107,9 @@ class Gait:
         if not (is_whole(phases) and phases >= least):
             raise Refusal(f"phases must be a whole number of at least {least} for this gait", value=phases)
         t = 2 * np.pi * np.arange(phases) / phases
+        return self._shape_and_rate(t, amplitudes)
+
+    def _shape_and_rate(self, t, amplitudes) -> tuple[np.ndarray, np.ndarray]:
         return self.shape(t, amplitudes), self.rate(t, amplitudes)
 
 

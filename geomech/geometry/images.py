@@ -10,16 +10,18 @@ one that, head for tail, is itself run backwards, as a circle or a travelling wa
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from geomech.geometry.gait import Gait
 from geomech.geometry.traits import Traits
 
 SAME = (
     1e-12  # difference of two directions that are one, and, over the largest of a gait, of two of its shapes or rates
 )
+FEW = 1024  # phases, at least, from which `solved_count` tells the symmetries of a gait
 
 
 class Image(NamedTuple):
@@ -98,24 +100,55 @@ class Around(NamedTuple):
 def around(alpha: np.ndarray, alphadot: np.ndarray, traits: Traits) -> Around:
     """Of cycles (..., N, d) together, as far as all are images of themselves in one way, of a body whose left and right
     (``traits.halved``), head and tail (``traits.reversible``) are alike."""
-    mirror, reversible = traits.halved, traits.reversible
     phases, joints = alpha.shape[-2:]
-    if not (mirror or reversible):
+    if not (traits.halved or traits.reversible):
         return _around(phases, False, ())
     sizes = [np.abs(x).max((-2, -1), keepdims=True) for x in (alpha, alphadot)]
     scaled = [x / np.where(size > 0, size, 1.0) for x, size in zip((alpha, alphadot), sizes)]
     path = np.concatenate(scaled, -1).reshape(-1, phases, 2 * joints)
-    half, moving, turned = phases // 2, sizes[1].argmax() if len(path) else 0, ()
+    moving = sizes[1].argmax() if len(path) else 0
+    return _around(phases, *_symmetries(lambda k: path[:, k % phases], phases, 1, moving, traits))
+
+
+def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
+    """Return the count of `around` for a gait of so many phases, where they are many from the symmetries of a few."""
+    if not (traits.halved or traits.reversible):
+        return phases
+    a, step = gait.amplitude or 1.0, phases // FEW
+    if step < 2:
+        return around(*gait.cycle(phases, a), traits).count
+    t = lambda k: 2 * np.pi * (k % phases) / phases
+    sizes = [np.abs(curve(t(np.arange(0, phases, step)), a)).max() or 1.0 for curve in (gait.shape, gait.rate)]
+    path = lambda k: np.concatenate([gait.shape(t(k), a) / sizes[0], gait.rate(t(k), a) / sizes[1]], -1)[None]
+    return _orbits(phases, *_symmetries(path, phases, step, 0, traits))
+
+
+def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Traits) -> tuple[bool, tuple]:
+    """Return (shifted, turned), as `_around` has them, of cycles path(k) (B, n, 2 d), shapes and rates at phases k (n,), from
+    every ``step``-th of N phases. moving: a cycle that is not at rest."""
+    mirror, some = traits.halved, np.arange(0, phases, step)
+    here = path(some)
+    joints = here.shape[-1] // 2
     same = lambda x, y: bool(np.abs(x - y).max(initial=0.0) <= SAME)
-    shifted = mirror and phases % 2 == 0 and same(path[:, half:], -path[:, :half])
+    nearest = lambda k, x: k[np.abs(path(k)[moving] - x).max(-1).argmin()]
+    shifted = mirror and phases % 2 == 0 and same(path(some + phases // 2), -here)
     ways = (-1.0, 1.0) if mirror and not shifted else (-1.0,)  # where the halves are images each follows from the other
-    for sign in ways if reversible and len(path) else ():
-        seen = sign * np.concatenate([path[..., joints - 1 :: -1], -path[..., : joints - 1 : -1]], -1)
-        first = int(np.abs(path[moving] - seen[moving, 0]).max(-1).argmin())
-        if same(path[:, (first - np.arange(phases)) % phases], seen):
-            turned = first, sign
-            break
-    return _around(phases, shifted, turned)
+    for sign in ways if traits.reversible and len(here) else ():
+        seen = sign * np.concatenate([here[..., joints - 1 :: -1], -here[..., : joints - 1 : -1]], -1)
+        near = nearest(some, seen[moving, 0])
+        first = int(nearest(near + np.arange(1 - step, step), seen[moving, 0])) % phases
+        if same(path(first - some), seen):
+            return shifted, (first, sign)
+    return shifted, ()
+
+
+def _orbits(phases: int, shifted: bool, turned: tuple) -> int:
+    """Return the count of `_around`, the number of orbits: the mean over the symmetries of how many phases each leaves."""
+    fixed = [phases] + [0] * shifted
+    if turned:  # which leaves the phases k with 2 k = first (mod N)
+        firsts = (turned[0], turned[0] + phases // 2)[: 1 + shifted]
+        fixed += [1 if phases % 2 else 2 * (first % 2 == 0) for first in firsts]
+    return sum(fixed) // len(fixed)
 
 
 @functools.lru_cache(maxsize=64)

@@ -62,6 +62,9 @@ def _feed_items(update: Callable[[bytes], None], x: Any) -> None:
     elif isinstance(x, set | frozenset):
         items = sorted(map(digest, x))
     update(f"{_name(type(x))} {len(items)}(".encode())
+    if set(map(type, items)) == {float}:  # 100,000 amplitudes take 0.6 s one by one
+        update(b"floats" + np.array(items).tobytes())
+        items = ()
     for item in items:
         _feed(update, item)
     update(b")")

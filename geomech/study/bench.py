@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -37,6 +38,8 @@ from geomech.tiers.harmonic import HARMONIC
 from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
+
+LOOKED_AT = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
 
 
 class Study(Faced):
@@ -238,16 +241,17 @@ class Study(Faced):
         plan = self.plan(method, gait, amplitudes)
         return plan.spread(self._looked_up(plan), amplitudes)
 
-    def refuse_outside(self, gait: Gait | None = None, amplitudes=None) -> None:
-        """ValueError if the gait, or the scene's own, leaves the field that is looked up."""
+    def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+        """ValueError if the gait, or the scene's own, leaves the field that is looked up. phases: those of the scene."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
         field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        shapes = lambda some: inside(field, gait.cycle(n.phases, some)[0], [x for x, _ in shape_labels(system)])[:, 0]
-        in_groups(shapes, every, gaits_per_batch(system, n.phases))
+        names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+        shapes = lambda some: inside(field, gait.cycle(phases, some)[0], names)[:, 0]
+        in_groups(shapes, every, gaits_per_batch(system, phases))
 
-    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes) -> None:
+    def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
         """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
-        system, phases = self.scene.system, self.scene.numerics.phases
+        system, phases = self.scene.system, phases or self.scene.numerics.phases
         if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
             if plan.table and plan.table.amplitudes is not None:
@@ -309,12 +313,13 @@ class Study(Faced):
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
         """What `study` would take, and ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.study.cost`."""
-        gait, amplitudes, plans = self._asked(gait, amplitudes, methods)
+        gait, amplitudes, plans = self._asked(gait, amplitudes, methods, *LOOKED_AT)
         with located(self.scene.name):
             return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
-    def _asked(self, gait, amplitudes, methods):
-        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; Refusal for what makes none."""
+    def _asked(self, gait, amplitudes, methods, looked_at: int = sys.maxsize, phases: int = sys.maxsize):
+        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; Refusal for what makes none, such as a
+        gait that leaves the field at one of so many amplitudes and phases."""
         scene = self.scene
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
@@ -324,13 +329,14 @@ class Study(Faced):
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
-            chosen = {}
+            some = np.sort(amplitudes)[np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), looked_at)).astype(int)]
+            phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
             for tier in [_tier(m) for m in methods]:
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
-                self._refuse_singular(plan, gait, amplitudes)
-                if plan.table and plan.table.axes:
-                    self.refuse_outside(gait, amplitudes)
+                self._refuse_singular(plan, gait, some, phases)
+            if any(plan.table and plan.table.axes for plan in chosen.values()):
+                self.refuse_outside(gait, some, phases)
         return gait, amplitudes, chosen
 
 

@@ -107,7 +107,7 @@ def _looked_up(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
     """What a tier takes beside its table."""
     if plan.table:
         return [Job(scene, 0, 0, besides=(LOOK + READ * plan.read) * count * phases)]
-    return _spread_out(scene, plan.balances(count, phases), BASE + 8 * COPIES * SAMPLES_TOGETHER)
+    return _spread_out(scene, plan.balances(count, phases), BASE)
 
 
 def _spread_out(scene: Scene, count: float, memory: float) -> list[Job]:

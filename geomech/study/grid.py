@@ -16,6 +16,7 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 LARGEST = 100_000_000  # points
+MOST = 200  # values of a parameter, each of which is seen to make a scene, which takes some 0.5 ms
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,13 @@ class Grid:
         return At(self.tables, self.scene, tuple(self.names))
 
     def corners(self) -> Iterator[tuple[float, ...]]:
-        """Yield the corners, and every value of each parameter with the others at their first."""
+        """Yield the corners, and the values of each parameter with the others at their first: all, or of more than `MOST`
+        some, with the least and the largest."""
         outer = [self.over[name] for name in self.names if name != self.inner]
         yield from itertools.product(*([v[0], v[-1]] for v in outer))
         for k, values in enumerate(outer):
-            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in values)
+            some = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
+            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in some)
 
     def arranged(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (`total`, width) as an array (N_1, ..., width) over the parameters in the order given."""

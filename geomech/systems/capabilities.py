@@ -118,8 +118,8 @@ class Costed(Protocol):
     memory: int  # numbers that time stepping remembers for each sample
     batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
 
-    def solved_phases(self, alpha, alphadot) -> int:
-        """Return at how many phases of cycles (..., N, d) a balance is solved; the others are images of these."""
+    def solved_phases(self, gait, phases: int) -> int:
+        """Return at how many phases of a gait a balance is solved; the others are images of these."""
 
 
 @runtime_checkable
@@ -261,8 +261,8 @@ class ClosedForm:
     memory = 0
     batched = False
 
-    def solved_phases(self, alpha, alphadot) -> int:
-        return np.shape(alpha)[-2]
+    def solved_phases(self, gait, phases: int) -> int:
+        return phases
 
 
 def costed(system: System) -> Costed:

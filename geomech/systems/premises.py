@@ -34,7 +34,8 @@ def listed(system: System, premises: Premise) -> str:
 
 def refuse(system: System, what: str, premises: Premise, instead: str) -> None:
     """Raise Refusal if there is no such result because a premise of it does not hold."""
-    if parts := broken(system, premises):
+    if system.traits.lacks & premises:
+        parts = broken(system, premises)
         raise Refusal(f"no {what} with {because(system, premises)}", instead=f"{instead}{CURES.get(parts[0].role, '')}")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import rft
 from geomech.core.work import iterate
-from geomech.geometry.images import around
+from geomech.geometry.images import around, solved_count
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
 from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
@@ -261,8 +261,8 @@ class Swimmer:
         to_come = steps.drift if self.settling else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
-    def solved_phases(self, alpha, alphadot) -> int:
-        return around(alpha, alphadot, self.traits).count
+    def solved_phases(self, gait, phases: int) -> int:
+        return solved_count(gait, phases, self.traits)
 
     def _for_gaits(self, count: int, phases: int) -> Swimmer:
         """Return the swimmer for ``count`` gaits of ``phases`` phases each, where effects have a parameter for each

@@ -171,7 +171,7 @@ def solved(system: System, gait: Gait, phases: int) -> int:
     """Of a gait's phases, those at which a system that runs it is asked for its velocity: the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return costed(system).solved_phases(*gait.cycle(phases, gait.amplitude or 1.0))
+    return costed(system).solved_phases(gait, phases)
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from rft.balance.newton import (
+    RESULT_ROWS,
     Descent,
-    Iterate,
     Limits,
     Net,
     element_net,
     first_iterate,
     newton_step,
     plus,
+    result,
     times,
     to_element,
     with_momentum,
@@ -91,17 +92,15 @@ def row(record) -> Any:
     return mapped(lambda x: x[0], record)
 
 
-def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> tuple:
-    """Solve all samples by one descent: (xi (3, B) over the scale of speed, residual, evaluations, speed of the slowest
-    element).
+def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> np.ndarray:
+    """Return the results of all samples after one descent, the rows (6, B) of `rft.balance.newton.result`.
 
-    guess: (3, B), over the scale of speed, or None. The residual is infinite where the last level was not reached.
-    """
+    guess: (3, B) or None. Velocities are over the scale of speed."""
     size, fresh = problem.n_samples, guess is None
     iterate = first_iterate(*(np.zeros((3, size)) if fresh else guess), descent.first, np.full(size, float(fresh)))
     mass = None if problem.momentum_rate is None else frame_inertia(problem.sides.elements, problem.momentum_rate)
     active, index, v = np.ones(size, bool), np.arange(size), velocities(problem)
-    xi, measures = np.zeros((3, size)), np.full((3, size), np.inf)
+    out = np.empty((RESULT_ROWS, size))
     while index.size:
         step = iterate.dx, iterate.dy, iterate.dtheta
         v_next = with_frame_velocity(problem, v, *step)
@@ -111,9 +110,7 @@ def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray 
         v = v_next if accepted.all() else mapped(lambda a, b: np.where(accepted, a, b), v_next, v)
         ended = finished & active
         if ended.any():
-            i = index[ended]
-            xi[:, i] = np.stack([iterate.x, iterate.y, iterate.theta])[:, ended]
-            measures[:, i] = np.stack([residual_at(iterate, limits), iterate.evaluations, iterate.slowest])[:, ended]
+            out[:, index[ended]] = np.stack(result(take(iterate, ended), limits))
             active &= ~ended
             count = np.count_nonzero(active)
             if count == 0:
@@ -122,9 +119,4 @@ def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray 
                 rest = np.flatnonzero(active)
                 problem, index, active = problem.take(rest), index[rest], active[rest]
                 iterate, v, mass = take(iterate, rest), take(v, rest), take(mass, rest)
-    return xi, measures[0], measures[1].astype(int), measures[2]
-
-
-def residual_at(iterate: Iterate, limits: Limits) -> np.ndarray:
-    """Return the residuals; infinite where the rounding is still wider than required."""
-    return np.where(iterate.rounding <= limits.rounding, iterate.residual, np.inf)
+    return out

@@ -1,8 +1,8 @@
-"""The compiled driver: eight samples at once, each in a lane of a vector; a lane whose sample has ended takes the next.
+"""The compiled driver: a vector holds one element of eight samples, or, where samples are few, eight elements of one.
 
-So the digits of a sample do not depend on the others, and no sample waits for the slowest. A kernel is compiled once for
-each class of law records, from the formulas of `rft.link`, `rft.balance.newton` and the law. Importing this module loads
-numba.
+A sample that has ended gives its place to the next, so that no sample waits for the slowest. Elements are summed in their
+order either way, so that the digits of a sample do not depend on the others. A kernel is compiled once for each class of
+law records, from the formulas of `rft.link`, `rft.balance.newton` and the law. Importing this module loads numba.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numba.extending import register_jitable
 
 from rft.balance.cache import cached
 from rft.balance.newton import (
+    RESULT_ROWS,
     Descent,
     Frame,
     Inertia,
@@ -25,22 +26,25 @@ from rft.balance.newton import (
     first_iterate,
     newton_step,
     plus,
+    result,
     to_element,
     with_momentum,
 )
 from rft.bodies.base import Elements
-from rft.contact import Problem, mapped
+from rft.contact import NO_FACTOR, Problem, mapped
 from rft.link import Factor, Incline, Memory, point_load, side_load
 from rft.momentum import frame_inertia
-from rft.simd import WIDTH, load, record_access, register_formulas, store
+from rft.simd import WIDTH, add_lanes, add_vector, any_of, load, record_access, register_formulas, store
 from rft.vectors import absolute, minimum, where
 
 # First rows of the records of an element: `Elements`, `Factor`, quadratic drag, `Memory`, `Incline`; of the records of a
-# sample: `Iterate`, `Frame`, scale of speed, `Inertia`.
+# sample: `Iterate`, `Frame`, scale of speed, `Inertia`. Rows of sums: `Net`, then the square of the slowest speed.
 ELEMENTS, FACTOR, QUADRATIC, MEMORY, INCLINE, ROWS = 0, 9, 12, 13, 20, 25
 ITERATE, FRAME, SPEED, MASS, SAMPLE_ROWS = 0, 13, 17, 18, 31
-V_T, SPEED_SCALE = 6, 3  # places of v_t in `Elements`, of speed_scale in `Frame`
-ROUNDING, ROUNDING_NEXT, RESIDUAL, SLOWEST, EVALUATIONS = 6, 7, 9, 10, 11  # places in `Iterate`
+SLOWEST2, SUM_ROWS = 15, 16
+WEIGHT, V_T = 5, 6  # places in `Elements`
+SPEED_SCALE = 3  # place in `Frame`
+ROUNDING_NEXT = 7  # place in `Iterate`
 (read_elements, _), (read_factor, _), (read_memory, _), (read_incline, _) = map(
     record_access, (Elements, Factor, Memory, Incline)
 )
@@ -48,40 +52,61 @@ ROUNDING, ROUNDING_NEXT, RESIDUAL, SLOWEST, EVALUATIONS = 6, 7, 9, 10, 11  # pla
 DOUBLE = np.dtype(float)
 NO_GUESS = np.zeros((3, 0))
 NO_ROWS = np.zeros((0, 1, 1))
+NO_POINTS = np.zeros((9, 0, 1))
 NO_TERMS = np.zeros((0, 0, 3))
 
 
 @register_jitable(forceinline=True)
 def fill(rows, first, record, e, lane, i):
-    """Write element e and sample i of a record's arrays to a lane; a single row or column stands for all."""
+    """Write element e and sample i of a record's arrays to a lane; a single row or column stands for all, and the last
+    element for those after it."""
     for j in range(len(record)):
         x = record[j]
         rows[first + j, lane] = x[min(e, x.shape[0] - 1), min(i, x.shape[1] - 1)]
 
 
+@register_jitable
+def ceil_divide(a, b):
+    """Return a / b, rounded up."""
+    return -(-a // b)
+
+
+@register_jitable
+def fill_contact(rows, contact, count, first, last, i):
+    """Write the elements of sample i in one contact to the lanes from first to last of the rows of vectors, ``count``
+    elements to a vector; elements in excess have no weight."""
+    elements, factors, ground, incline = contact
+    for k in range(len(rows)):
+        for lane in range(first, last):
+            e = k * count + (lane - first) % count
+            fill(rows[k], ELEMENTS, elements, e, lane, i)
+            fill(rows[k], FACTOR, factors, e, lane, i)
+            fill(rows[k], QUADRATIC, ground, e, lane, i)
+            fill(rows[k], INCLINE, incline, e, lane, i)
+            if e >= len(elements[0]) or lane - first >= count:
+                rows[k, ELEMENTS + WEIGHT, lane] = 0.0
+
+
 @register_jitable(forceinline=True)
-def sum_nets(a, b):
-    """Return the sum of two `Net`."""
+def add_triple(sums, first, triple, by_elements):
+    """Add a triple of vectors to three rows of sums: lane by lane, or, by elements, all lanes in turn to the first."""
+    for j in range(3):
+        if by_elements:
+            add_lanes(sums, first + j, triple[j])
+        else:
+            add_vector(sums, first + j, triple[j])
+
+
+@register_jitable(forceinline=True)
+def net_of(sums):
+    """Return the `Net` in the rows of sums."""
     return Net(
-        plus(a.force, b.force),
-        plus(a.by_x, b.by_x),
-        plus(a.by_y, b.by_y),
-        plus(a.by_theta, b.by_theta),
-        plus(a.by_speed, b.by_speed),
+        (load(sums, 0), load(sums, 1), load(sums, 2)),
+        (load(sums, 3), load(sums, 4), load(sums, 5)),
+        (load(sums, 6), load(sums, 7), load(sums, 8)),
+        (load(sums, 9), load(sums, 10), load(sums, 11)),
+        (load(sums, 12), load(sums, 13), load(sums, 14)),
     )
-
-
-@register_jitable(forceinline=True)
-def fill_elements(rows, sides, points, ground, inclines, lane, i):
-    """Write all elements of sample i to a lane."""
-    n = len(sides[0])
-    for e in range(n):
-        fill(rows[e], ELEMENTS, sides, e, lane, i)
-        fill(rows[e], QUADRATIC, ground, e, lane, i)
-        fill(rows[e], INCLINE, inclines[0], e, lane, i)
-    for e in range(n, len(rows)):
-        fill(rows[e], ELEMENTS, points, e - n, lane, i)
-        fill(rows[e], INCLINE, inclines[1], e - n, lane, i)
 
 
 @functools.cache
@@ -90,30 +115,40 @@ def evaluator(Law: type):
     register_formulas()
 
     @njit(nogil=True, error_model="numpy", forceinline=True)
-    def evaluate(law, point_terms, n_sides, rows, v, v_next, iterate, speed, additions):
-        """Return the `Net` on the frame after the next step, and the square of the slowest element's speed; write the
-        velocities of elements after that step to v_next."""
-        rounding, zero = iterate.rounding_next * speed, 0.0 * speed
-        zeros = (zero, zero, zero)
-        net, slowest2 = Net(zeros, zeros, zeros, zeros, zeros), zero + np.inf
-        for e in range(len(v)):
-            element = read_elements(rows[e], ELEMENTS)
+    def evaluate(law, point_terms, n_sides, rows, v, v_next, iterate, speed, additions, by_elements, sums):
+        """Compute the `Net` on the frame after the next step, and the square of the slowest element's speed, as the rows
+        of ``sums``; write the velocities of elements after that step to v_next.
+
+        n_sides: number of vectors of elements of the sides; those of the points follow."""
+        rounding, slowest2 = iterate.rounding_next * speed, 0.0 * speed + np.inf
+        sums[:] = 0.0
+        for k in range(len(v)):
+            element = read_elements(rows[k], ELEMENTS)
             due_to_frame = to_element(element, iterate.dx, iterate.dy, iterate.dtheta)
-            u = plus((load(v[e], 0), load(v[e], 1), load(v[e], 2)), due_to_frame)
-            store(v_next[e], 0, u[0])
-            store(v_next[e], 1, u[1])
-            store(v_next[e], 2, u[2])
-            across = absolute(u[1]) + absolute(u[2])
-            slowest2 = minimum(slowest2, u[0] * u[0] + across * across)
+            u = plus((load(v[k], 0), load(v[k], 1), load(v[k], 2)), due_to_frame)
+            store(v_next[k], 0, u[0])
+            store(v_next[k], 1, u[1])
+            store(v_next[k], 2, u[2])
             scaled = speed * u[0], speed * u[1], speed * u[2]
-            factor, incline = read_factor(rows[e], FACTOR), read_incline(rows[e], INCLINE)
-            if e < n_sides:
-                quadratic, memory = load(rows[e], QUADRATIC), read_memory(rows[e], MEMORY)
+            factor, incline = read_factor(rows[k], FACTOR), read_incline(rows[k], INCLINE)
+            if k < n_sides:
+                quadratic, memory = load(rows[k], QUADRATIC), read_memory(rows[k], MEMORY)
                 f = side_load(law, scaled, rounding, factor, incline, quadratic, memory, additions)
             else:
-                f = point_load(point_terms[e - n_sides], scaled, rounding, factor, incline, additions)
-            net = sum_nets(net, element_net(element, f, u, speed))
-        return net, slowest2
+                f = point_load(point_terms[k - n_sides], scaled, rounding, factor, incline, additions)
+            net = element_net(element, f, u, speed)
+            across = absolute(u[1]) + absolute(u[2])
+            slowest2 = minimum(slowest2, u[0] * u[0] + across * across)
+            add_triple(sums, 0, net.force, by_elements)
+            add_triple(sums, 3, net.by_x, by_elements)
+            add_triple(sums, 6, net.by_y, by_elements)
+            add_triple(sums, 9, net.by_theta, by_elements)
+            add_triple(sums, 12, net.by_speed, by_elements)
+        store(sums, SLOWEST2, slowest2)
+        if by_elements:
+            for j in range(SLOWEST2):
+                sums[j] = sums[j, 0]
+            sums[SLOWEST2] = sums[SLOWEST2].min()
 
     return evaluate
 
@@ -124,50 +159,62 @@ def kernel(Law: type):
     evaluate = evaluator(Law)
 
     @njit(nogil=True, error_model="numpy")
-    def solve(
-        numbers, sides, points, point_terms, ground, inclines, frame, mass, guess, descent, limits, additions, out
-    ):
-        law = Law(*numbers)
-        n, m, size = len(sides[0]), len(points[0]), frame[0].shape[1]
-        rows, v, v_next = np.ones((n + m, ROWS, WIDTH)), np.zeros((n + m, 3, WIDTH)), np.zeros((n + m, 3, WIDTH))
-        samples, ended = np.ones((SAMPLE_ROWS, WIDTH)), np.zeros((1, WIDTH))
-        sample_of_lane, fresh = np.full(WIDTH, -1), guess.shape[1] == 0
+    def solve(loads, mass, guess, descent, limits, out):
+        numbers, sides, points, point_terms, frame, additions = loads
+        law, size = Law(*numbers), out.shape[1]
+        n, m = len(sides[0][0]), points[0].shape[1]
+        by_elements = size * (ceil_divide(n, WIDTH) + m) < ceil_divide(size, WIDTH) * (n + m)
+        slots, count = (1, WIDTH) if by_elements else (WIDTH, 1)  # samples at once, elements of one in a vector
+        n_sides = ceil_divide(n, count)
+        rows = np.ones((n_sides + m, ROWS, WIDTH))
+        v, v_next = np.zeros((len(rows), 3, WIDTH)), np.zeros((len(rows), 3, WIDTH))
+        samples, sums, results = (
+            np.ones((SAMPLE_ROWS, WIDTH)),
+            np.zeros((SUM_ROWS, WIDTH)),
+            np.zeros((RESULT_ROWS + 1, WIDTH)),
+        )
+        sample_of_slot, fresh = np.full(slots, -1), guess.shape[1] == 0
         next_sample, n_ended = 0, 0
         while n_ended < size:
-            for lane in range(WIDTH):
-                if sample_of_lane[lane] < 0 and next_sample < size:
-                    i = next_sample
-                    fill_elements(rows, sides, points, ground, inclines, lane, i)
-                    for e in range(n + m):
-                        for j in range(3):
-                            v[e, j, lane] = rows[e, ELEMENTS + V_T + j, lane] / frame[SPEED_SCALE][0, i]
-                    fill(samples, FRAME, frame, 0, lane, i)
-                    fill(samples, MASS, mass, 0, lane, i)
+            for slot in range(slots):
+                if sample_of_slot[slot] < 0 and next_sample < size:
+                    i, end = next_sample, WIDTH if by_elements else slot + 1
+                    fill_contact(rows[:n_sides], sides, count, slot, end, i)
+                    fill_contact(rows[n_sides:], points, 1, slot, end, i)
                     dx, dy, dtheta = (0.0, 0.0, 0.0) if fresh else (guess[0, i], guess[1, i], guess[2, i])
                     first = first_iterate(dx, dy, dtheta, descent.first, 1.0 if fresh else 0.0)
-                    for j in range(len(first)):
-                        samples[ITERATE + j, lane] = first[j]
-                    sample_of_lane[lane], next_sample = i, next_sample + 1
+                    for lane in range(slot, end):
+                        for k in range(len(rows)):
+                            for j in range(3):
+                                v[k, j, lane] = rows[k, ELEMENTS + V_T + j, lane] / frame[SPEED_SCALE][0, i]
+                        fill(samples, FRAME, frame, 0, lane, i)
+                        fill(samples, MASS, mass, 0, lane, i)
+                        for j in range(len(first)):
+                            samples[ITERATE + j, lane] = first[j]
+                    sample_of_slot[slot], next_sample = i, next_sample + 1
             iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
-            net, slowest2 = evaluate(law, point_terms, n, rows, v, v_next, iterate, speed, additions)
+            evaluate(law, point_terms, n_sides, rows, v, v_next, iterate, speed, additions, by_elements, sums)
+            net = net_of(sums)
             if additions.momentum:
                 x, y, theta = iterate.x + iterate.dx, iterate.y + iterate.dy, iterate.theta + iterate.dtheta
                 net = with_momentum(net, x, y, theta, read_mass(samples, MASS), speed)
-            after, accepted, finished = newton_step(iterate, net, slowest2, read_frame(samples, FRAME), descent, limits)
-            write_iterate(samples, ITERATE, after)
-            for e in range(n + m):
+            slowest2, scales = load(sums, SLOWEST2), read_frame(samples, FRAME)
+            iterate, accepted, finished = newton_step(iterate, net, slowest2, scales, descent, limits)
+            write_iterate(samples, ITERATE, iterate)
+            for k in range(len(rows)):
                 for j in range(3):
-                    store(v[e], j, where(accepted, load(v_next[e], j), load(v[e], j)))
-            store(ended, 0, where(finished, 1.0, 0.0))
-            for lane in range(WIDTH):
-                i = sample_of_lane[lane]
-                if i >= 0 and ended[0, lane] > 0.0:
-                    for j in range(3):
-                        out[j, i] = samples[ITERATE + j, lane]
-                    rounding, residual = samples[ITERATE + ROUNDING, lane], samples[ITERATE + RESIDUAL, lane]
-                    out[3, i] = residual if rounding <= limits.rounding else np.inf
-                    out[4, i], out[5, i] = samples[ITERATE + EVALUATIONS, lane], samples[ITERATE + SLOWEST, lane]
-                    sample_of_lane[lane], n_ended = -1, n_ended + 1
+                    store(v[k], j, where(accepted, load(v_next[k], j), load(v[k], j)))
+            if any_of(finished):
+                ended = result(iterate, limits)
+                for j in range(RESULT_ROWS):
+                    store(results, j, ended[j])
+                store(results, RESULT_ROWS, where(finished, 1.0, 0.0))
+                for slot in range(slots):
+                    i = sample_of_slot[slot]
+                    if i >= 0 and results[RESULT_ROWS, slot] > 0.0:
+                        for j in range(RESULT_ROWS):
+                            out[j, i] = results[j, slot]
+                        sample_of_slot[slot], n_ended = -1, n_ended + 1
 
     return cached(solve, f"the force balance for laws of the form {Law.__name__}")
 
@@ -178,70 +225,73 @@ def net_kernel(Law: type):
     evaluate = evaluator(Law)
 
     @njit(nogil=True, error_model="numpy")
-    def net_at(numbers, sides, points, point_terms, ground, inclines, frame, v, rounding, additions, out):
-        law, n, size = Law(*numbers), len(sides[0]), v.shape[2]
+    def net_at(loads, v, rounding, out):
+        numbers, sides, points, point_terms, frame, additions = loads
+        law, n, size = Law(*numbers), len(sides[0][0]), v.shape[2]
         rows, v_lanes = np.ones((v.shape[1], ROWS, WIDTH)), np.zeros((v.shape[1], 3, WIDTH))
-        v_next, samples, nets = np.zeros_like(v_lanes), np.zeros((SAMPLE_ROWS, WIDTH)), np.zeros((15, WIDTH))
+        v_next, samples, sums = np.zeros_like(v_lanes), np.zeros((SAMPLE_ROWS, WIDTH)), np.zeros((SUM_ROWS, WIDTH))
         samples[SPEED] = 1.0
         for first in range(0, size, WIDTH):
             count = min(WIDTH, size - first)
             for lane in range(count):
                 i = first + lane
-                fill_elements(rows, sides, points, ground, inclines, lane, i)
+                fill_contact(rows[:n], sides, 1, lane, lane + 1, i)
+                fill_contact(rows[n:], points, 1, lane, lane + 1, i)
                 fill(samples, FRAME, frame, 0, lane, i)
                 samples[ITERATE + ROUNDING_NEXT, lane] = rounding[i]
                 v_lanes[:, :, lane] = v[:, :, i].T
-            iterate = read_iterate(samples, ITERATE)
-            net, _ = evaluate(law, point_terms, n, rows, v_lanes, v_next, iterate, load(samples, SPEED), additions)
-            for j in range(5):
-                for k in range(3):
-                    store(nets, 3 * j + k, net[j][k])
-            out[:, first : first + count] = nets[:, :count]
+            iterate, speed = read_iterate(samples, ITERATE), load(samples, SPEED)
+            evaluate(law, point_terms, n, rows, v_lanes, v_next, iterate, speed, additions, False, sums)
+            out[:, first : first + count] = sums[:SLOWEST2, :count]
 
     return cached(net_at, f"walks along solutions for laws of the form {Law.__name__}")
 
 
 def plain(x) -> np.ndarray:
-    """Return an array (n, B) of doubles in C order, the only form that kernels are compiled for."""
-    if isinstance(x, np.ndarray) and x.ndim == 2 and x.dtype is DOUBLE and x.flags.carray:
-        return x
-    return np.array(x, float, order="C", ndmin=2)
+    """Return an array as doubles in C order that may be written to, the only form that kernels are compiled for."""
+    return x if x.dtype is DOUBLE and x.flags.carray else np.array(x, float, order="C")
 
 
-def plain_arrays(*arrays) -> tuple[np.ndarray, ...]:
-    """Return each array as `plain` does."""
-    return tuple([plain(x) for x in arrays])
+def plain_arrays(record) -> tuple[np.ndarray, ...]:
+    """Return each array of a record as `plain` does."""
+    return tuple([plain(x) for x in record])
 
 
-def stacked(applies: bool, record) -> np.ndarray:
-    """Return the arrays of a record as one array (rows, n, B); without rows, for speed, where the record does not
-    apply."""
-    return np.array(np.broadcast_arrays(*record), float) if applies else NO_ROWS
+def stacked(record) -> np.ndarray:
+    """Return the arrays of a record as one array (rows, n, B)."""
+    out = np.empty((len(record), *np.broadcast(*record).shape))
+    for row, x in zip(out, record):
+        row[:] = x
+    return out
 
 
 def kernel_number(x) -> np.ndarray | float:
     """Return a number of a law as a float, an array as two-dimensional, the nodes of a rule as a column."""
-    if np.ndim(x) == 0:
+    if not isinstance(x, np.ndarray) or x.ndim == 0:
         return float(x)
-    return plain(np.reshape(x, (-1, 1)) if np.ndim(x) > 2 else x)
+    return plain(x.reshape(-1, 1) if x.ndim > 2 else x)
 
 
 def load_arguments(problem: Problem) -> tuple:
-    """Return the arguments of kernels that describe the loads of a problem: numbers of the law, sides, points, dry terms
-    of the points, memory and quadratic drag of the ground, inclines, and the frame with the scale of speed."""
+    """Return the arguments of kernels that describe the loads of a problem: numbers of the law; elements, factors,
+    quadratic drag and memory of the ground, and incline of sides and of points; dry terms of the points; the frame with
+    the scale of speed; additions. Records that do not apply have no rows, for speed."""
     p, additions = problem, problem.additions
-    sides, points = [plain_arrays(*c.elements, *c.factor) for c in (p.sides, p.points)]
-    terms = np.ascontiguousarray(np.moveaxis(p.point_terms[..., 0], 2, 0)) if len(p.point_terms) else NO_TERMS
-    ground = stacked(additions.quadratic or additions.memory, (p.quadratic_drag, *p.memory))
-    inclines = tuple(stacked(additions.incline, c.incline) for c in (p.sides, p.points))
-    frame = plain_arrays(*p.frame, p.law_speed_scale)
-    return tuple(map(kernel_number, p.law)), sides, points, terms, ground, inclines, frame
+    has_points = len(p.points.station) > 0
+    ground = stacked((p.quadratic_drag, *p.memory)) if additions.quadratic or additions.memory else NO_ROWS
+    factors = [NO_ROWS if c.factor is NO_FACTOR else stacked(c.factor) for c in (p.sides, p.points)]
+    inclines = [stacked(c.incline) if additions.incline else NO_ROWS for c in (p.sides, p.points)]
+    sides = plain_arrays(p.sides.elements), factors[0], ground, inclines[0]
+    points = stacked(p.points.elements) if has_points else NO_POINTS, factors[1], NO_ROWS, inclines[1]
+    terms = plain(p.point_terms[..., 0].transpose(2, 0, 1)) if has_points else NO_TERMS
+    frame = (*plain_arrays(p.frame), plain(p.law_speed_scale))
+    return tuple(map(kernel_number, p.law)), sides, points, terms, frame, additions
 
 
 def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) -> np.ndarray:
     """Return the entries of `Net` as `rft.balance.arrays.nets` does."""
-    p, out = problem, np.empty((15, problem.n_samples))
-    net_kernel(type(p.law))(*load_arguments(p), np.ascontiguousarray(v), rounding, p.additions, out)
+    p, out = problem, np.empty((SLOWEST2, problem.n_samples))
+    net_kernel(type(p.law))(load_arguments(p), plain(v), rounding, out)
     out = out.reshape(5, 3, -1)
     if p.momentum_rate is None:
         return out
@@ -249,18 +299,10 @@ def nets(problem: Problem, v: np.ndarray, rounding: np.ndarray, xi: np.ndarray) 
     return np.array(with_momentum(Net(*map(tuple, out)), *xi, mass, p.law_speed_scale[0]))
 
 
-def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> tuple:
+def solve(problem: Problem, descent: Descent, limits: Limits, guess: np.ndarray | None) -> np.ndarray:
     """Solve all samples by one descent as `rft.balance.arrays.solve` does."""
-    p, out = problem, np.empty((6, problem.n_samples))
-    has_mass = p.momentum_rate is not None
-    mass = stacked(has_mass, frame_inertia(p.sides.elements, p.momentum_rate) if has_mass else ())
-    kernel(type(p.law))(
-        *load_arguments(p),
-        mass,
-        NO_GUESS if guess is None else plain(guess),
-        Descent(*map(float, descent)),
-        Limits(*map(float, limits)),
-        p.additions,
-        out,
-    )
-    return out[:3], out[3], out[4].astype(int), out[5]
+    p, out = problem, np.empty((RESULT_ROWS, problem.n_samples))
+    mass = NO_ROWS if p.momentum_rate is None else stacked(frame_inertia(p.sides.elements, p.momentum_rate))
+    guess = NO_GUESS if guess is None else plain(guess)
+    kernel(type(p.law))(load_arguments(p), mass, guess, descent, limits, out)
+    return out

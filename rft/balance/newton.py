@@ -18,6 +18,11 @@ import numpy as np
 from rft.vectors import absolute, formula, maximum, minimum, sqrt, where
 
 VISCOUS = 1e8  # rounding at which every law is viscous to the last digit
+FASTEST = 1e30  # velocity, larger than any solution: squares of larger ones overflow, and drag becomes 0
+
+# Rows of the result of a driver: the velocity (x, y, theta), the residual, the number of evaluations, and the speed of the
+# slowest element.
+RESIDUAL, EVALUATIONS, SLOWEST, RESULT_ROWS = 3, 4, 5, 6
 
 
 class Frame(NamedTuple):
@@ -252,6 +257,21 @@ def newton_step(iterate, net, slowest2, frame, descent, limits):
         0.0 * evaluations,
     )
     return after, accepted, solved | (evaluations >= descent.budget)
+
+
+@formula
+def result(iterate, limits):
+    """Return the rows of a sample's result; the residual is infinite unless the rounding is the required one and the
+    velocity is possible."""
+    valid = (iterate.rounding <= limits.rounding) & is_possible(iterate.x, iterate.y, iterate.theta)
+    residual = where(valid, iterate.residual, np.inf)
+    return iterate.x, iterate.y, iterate.theta, residual, iterate.evaluations, iterate.slowest
+
+
+@formula
+def is_possible(x, y, theta):
+    """Return whether a velocity is finite and below FASTEST."""
+    return (absolute(x) < FASTEST) & (absolute(y) < FASTEST) & (absolute(theta) < FASTEST)
 
 
 @formula

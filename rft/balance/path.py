@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rft.balance.arrays import row, velocities
-from rft.balance.newton import VISCOUS, Limits, residual_norm, solve3, to_element, to_frame
+from rft.balance.newton import VISCOUS, Limits, is_possible, residual_norm, solve3, to_element, to_frame
 from rft.contact import Problem
 
 WIDEST = 10.0  # rounding to start from, over the scale of speed: no element is that fast
@@ -139,8 +139,8 @@ class _Walk:
 
 
 def follow(problem: Problem, limits: Limits, nets: Callable, correction: float, budget: int) -> Iterator[tuple]:
-    """Solve all samples of a problem. Yields (their indices, xi (3, b) over the scale of speed, residual (b,), evaluations
-    (b,), speed of the slowest element (b,)) as they end, with an infinite residual where the budget is spent.
+    """Solve all samples of a problem. Yields their indices and their results, rows (6, b) as those of
+    `rft.balance.newton.result`, as they end, with an infinite residual where the budget is spent.
 
     nets: `rft.balance.arrays.nets` or that of `rft.balance.compiled`. correction: intended size of the first correction
     of a step, by which the length of steps is chosen. budget: most evaluations."""
@@ -156,9 +156,9 @@ def follow(problem: Problem, limits: Limits, nets: Callable, correction: float, 
         ended = solved | (walk.evaluations >= budget)
         if ended.any():
             i = np.flatnonzero(ended)
-            residual = np.where(solved, residual, np.inf)[i]
-            slowest = np.sqrt(new.squared_speed().min(0))[i]
-            yield walk.index[i], new.xi[:, i], residual, walk.evaluations[i], slowest
+            residual = np.where(solved & is_possible(*new.xi), residual, np.inf)
+            slowest = np.sqrt(new.squared_speed().min(0))
+            yield walk.index[i], np.stack([*new.xi, residual, walk.evaluations, slowest])[:, i]
             walk = walk.take(np.flatnonzero(~ended))
 
 

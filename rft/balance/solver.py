@@ -5,8 +5,10 @@ Samples that a descent (`rft.balance.newton`) leaves unsolved are followed along
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,15 +16,14 @@ import numpy as np
 from rft.balance import arrays
 from rft.balance.backend import compiles
 from rft.balance.listening import listener
-from rft.balance.newton import Descent, Limits
+from rft.balance.newton import EVALUATIONS, RESIDUAL, RESULT_ROWS, Descent, Limits, is_possible
 from rft.balance.path import follow
-from rft.contact import Problem
+from rft.contact import Assembly, Problem
 from rft.threads import keep_freed_memory, run_shares, split, thread_count
 
 STUCK_BELOW = 10.0  # an element whose ends are slower than this many times the rounding is at rest
 ELEMENTS_TOGETHER = 24576  # elements x nodes x samples in one batch of NumPy
 COMPILED_WORTH = 4096  # samples a thread, below which another thread does not pay
-FASTEST = 1e30  # velocity over the scale, larger than any solution: squares of larger ones overflow, and drag becomes 0
 
 QUICK = Descent(0.011, 0.32, 0.08, 4.0, 48.0)
 WARM = Descent(0.0, 0.0, 0.0, np.inf, 12.0)  # from a guess, on the last level alone
@@ -61,33 +62,26 @@ def solve(
     problem_at: Callable[[np.ndarray], Problem],
     scale: np.ndarray,
     accuracy: Accuracy,
-    law,
-    n_law_points: int,
+    assembly: Assembly,
     backend: str = "auto",
     threads: int | None = None,
     guess: np.ndarray | None = None,
 ) -> Solved:
     """Return the body velocities of B samples, in body lengths.
 
-    problem_at(index): the `Problem` of the samples ``index``. scale: (B,), sizes of their velocities. law: its record.
-    n_law_points: `Assembly.n_law_points`, by which the sizes of batches are chosen. backend: as in
+    problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of speed. backend: as in
     `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
-    size, tell = scale.size, listener()
-    batch = max(1, ELEMENTS_TOGETHER // n_law_points)
+    size, tell, linear = scale.size, listener(), assembly.linear
+    batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
     driver, worth = arrays, 2 * batch  # samples that pay for a thread
-    if compiles(backend, law):
-        from rft.balance import compiled
+    if compiles(backend, assembly.law):
+        driver, worth, batch = compiled_driver(), COMPILED_WORTH, 4 * batch
+    results, limit = np.zeros((RESULT_ROWS, size)), np.zeros(size)
+    results[RESIDUAL] = np.inf
 
-        driver, worth, batch = compiled, COMPILED_WORTH, 4 * batch
-    xi, stuck = np.zeros((3, size)), np.zeros(size, bool)
-    residual, iterations, limit = np.full(size, np.inf), np.zeros(size, int), np.zeros(size)
-
-    def store(index, solutions, limits: Limits, linear: bool) -> None:
-        new_xi, new_residual, evaluations, slowest = solutions
-        xi[:, index], residual[index] = new_xi, np.where(is_possible(new_xi), new_residual, np.inf)
-        stuck[index] = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
-        iterations[index] += evaluations
-        limit[index] = limits.residual
+    def store(index, new, limits: Limits) -> None:
+        new[EVALUATIONS] += results[EVALUATIONS, index]
+        results[:, index], limit[index] = new, limits.residual
 
     def descend(share, stop) -> None:
         for index in split(share, math.ceil(share.size / batch)):
@@ -95,48 +89,52 @@ def solve(
                 return
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            new = int(np.count_nonzero(iterations[index] == 0))
             index = slice(None) if index.size == size else index  # a slice is quicker
             first = guess[:, index] if method is WARM else None
-            store(index, driver.solve(problem, _begin(method, problem, limits), limits, first), limits, problem.linear)
-            if new:
-                tell(new, n_law_points, problem.linear)
+            n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
+            store(index, driver.solve(problem, _begin(method, linear, limits), limits, first), limits)
+            if n_new:
+                tell(n_new, assembly.n_law_points, linear)
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / batch)):
             problem = problem_at(index)
             limits = _limits(problem, accuracy)
-            for i, *ended in follow(problem, limits, driver.nets, *method):
-                solved = (ended[1] <= limits.residual) & is_possible(ended[0])
-                store(index[i[solved]], [x[..., solved] for x in ended], limits, problem.linear)
-                iterations[index[i[~solved]]] += ended[2][~solved]
+            for i, ended in follow(problem, limits, driver.nets, *method):
+                solved = ended[RESIDUAL] <= limits.residual
+                store(index[i[solved]], ended[:, solved], limits)
+                results[EVALUATIONS, index[i[~solved]]] += ended[EVALUATIONS, ~solved]
 
     unsolved = np.arange(size)
     if guess is not None:
         with np.errstate(over="ignore"):
             guess = guess / scale
     for method in (WARM,) * (guess is not None) + (QUICK, *WALKS, *SLOW):
-        active = unsolved[is_possible(guess[:, unsolved])] if method is WARM else unsolved
+        active = unsolved[is_possible(*guess[:, unsolved])] if method is WARM else unsolved
         if active.size and isinstance(method, Descent):
             run_shares(descend, split(active, thread_count(threads, active.size // worth)))
         elif active.size:
             walk(active)
-        solved = residual <= limit
+        solved = results[RESIDUAL] <= limit
         if solved.all():
             break
         unsolved = np.flatnonzero(~solved)
-    return Solved(xi * scale, residual, iterations, stuck, float(limit.max(initial=0.0)))
+    residual, evaluations, slowest = results[RESIDUAL:]
+    stuck = (slowest < STUCK_BELOW * accuracy.rounding) & (not linear)
+    return Solved(results[:3] * scale, residual, evaluations.astype(int), stuck, float(limit.max(initial=0.0)))
 
 
-def is_possible(xi: np.ndarray) -> np.ndarray:
-    """Return whether velocities (3, B) over the scale of speed are finite and below FASTEST, (B,)."""
-    return (np.abs(xi) < FASTEST).all(0)
+@functools.cache
+def compiled_driver() -> ModuleType:
+    """Return the module of the compiled driver, whose import loads numba."""
+    from rft.balance import compiled
+
+    return compiled
 
 
-def _begin(descent: Descent, problem: Problem, limits: Limits) -> Descent:
+def _begin(descent: Descent, linear: bool, limits: Limits) -> Descent:
     """Return the descent with the rounding of its first level, which is also the last level in a linear medium."""
-    first = limits.rounding if problem.linear else max(descent.first, limits.rounding)
-    return descent._replace(first=first)
+    return descent._replace(first=limits.rounding if linear else max(descent.first, limits.rounding))
 
 
 def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
@@ -145,4 +143,4 @@ def _limits(problem: Problem, accuracy: Accuracy) -> Limits:
     if problem.momentum_rate is not None:
         frame, m = problem.frame, problem.momentum_rate
         residual += 1e-14 * np.max(m.rate * m.strength * frame.speed_scale / frame.force_scale)
-    return Limits(accuracy.rounding, residual)
+    return Limits(float(accuracy.rounding), float(residual))

@@ -94,7 +94,7 @@ def body_velocity(
     ValueError
         For arguments of another shape or out of bounds, for a medium that pushes, and for effects of another engine.
     """
-    if engine(effects) != "algebraic":
+    if effects != () and engine(effects) != "algebraic":
         broken = negated(broken_premises(effects))
         raise Refusal(
             f"no body velocity follows from shape alone where effects are {broken}", instead="use rft.time_steps"
@@ -111,25 +111,26 @@ def body_velocity(
     moving = speed > 0
     if not moving.all():  # a body whose joints are at rest is at rest
         index = np.flatnonzero(moving)
-        assembly, alpha, alphadot = assembly.take(index), alpha[:, index], alphadot[:, index]
+        assembly, alpha, alphadot, speed = assembly.take(index), alpha[:, index], alphadot[:, index], speed[index]
         guess = None if guess is None else guess[:, index]
 
     def problem_at(index):
-        if index.size == alpha.shape[1]:
-            return assembly.problem(alpha, alphadot)
-        return assembly.take(index).problem(alpha[:, index], alphadot[:, index])
+        if index.size == speed.size:
+            return assembly.problem(alpha, alphadot, speed)
+        return assembly.take(index).problem(alpha[:, index], alphadot[:, index], speed[index])
 
-    accuracy = Accuracy(regularisation, tolerance)
-    solved = solve(problem_at, speed[moving], accuracy, assembly.law, assembly.n_law_points, backend, threads, guess)
-    xi, residual, iterations, stuck, limit = solved if moving.all() else _with_samples_at_rest(solved, moving)
+    solved = solve(problem_at, speed, Accuracy(regularisation, tolerance), assembly, backend, threads, guess)
+    xi, residual, iterations, stuck, limit = _with_samples_at_rest(solved, moving)
     xi = (xi.T if body.length == 1.0 else xi.T * [body.length, body.length, 1.0]).reshape(*batch, 3)
-    status = STATUSES[np.where(residual <= limit, stuck.astype(int), UNCONVERGED)]
+    status = STATUSES[np.where(residual <= limit, stuck, UNCONVERGED)]
     return Solution(xi, *(x.reshape(batch) for x in (residual, status, iterations)))
 
 
 def _with_samples_at_rest(solved: Solved, moving: np.ndarray) -> Solved:
     """Return the solution of all samples from that of those which are ``moving`` (B,)."""
     size = moving.size
+    if solved.stuck.size == size:
+        return solved
     full = Solved(np.zeros((3, size)), np.zeros(size), np.zeros(size, int), np.ones(size, bool), solved.limit)
     for array, values in zip(full[:4], solved[:4]):
         array[..., moving] = values

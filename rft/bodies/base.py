@@ -61,7 +61,8 @@ class Elements(NamedTuple):
     def attached_points(self, owner: list[int], ahead: np.ndarray, weight: np.ndarray) -> Elements:
         """Return k points attached to the elements ``owner``, each a distance ``ahead`` (k, 1) before the centre; weight:
         (k, 1), factors of their drag."""
-        c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[owner] for x in self)
+        indices = np.array(owner)
+        c, s, r_t, r_n, half, _, v_t, v_n, v_w = (x[indices] for x in self)
         return Elements(c, s, r_t, r_n + ahead, 0.0 * ahead, weight, v_t, v_n + v_w * ahead / half, 0.0 * v_w)
 
 

@@ -105,7 +105,7 @@ class Chain:
     def _in_frame(self, differences: np.ndarray, link: int | None) -> np.ndarray:
         """Return values of all links (n, B), less the frame's, from the differences (n - 1, B) between neighbours."""
         x = np.zeros((len(self.lengths), differences.shape[1]), differences.dtype)
-        np.cumsum(differences, 0, out=x[1:])
+        np.add.accumulate(differences, 0, out=x[1:])
         x -= self._frame_value(x, link)
         return x
 

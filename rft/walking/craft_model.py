@@ -50,7 +50,7 @@ def mjcf(robot: Screws) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def surfaces(robot: Screws, elements: int = 12) -> list[Surface]:
+def surfaces(robot: Screws, elements: int) -> list[Surface]:
     """Return the surfaces that touch the ground: the hull, body 1 of the model, and its screws."""
     screws = [Surface.from_mesh(2 + k, mesh) for k, mesh in enumerate(robot.meshes(elements))]
     return [Surface.from_mesh(1, robot.hull(elements)), *screws]

@@ -106,7 +106,7 @@ def phases(robot: Robot) -> np.ndarray:
     return np.array([(k // count + k % count) % count / count for k in range(count * len(robot.hips))])
 
 
-def surfaces(robot: Robot, elements: int = 12) -> list[Surface]:
+def surfaces(robot: Robot, elements: int) -> list[Surface]:
     """Return the surfaces that touch the ground: the hull, body 1 of the model, and its legs."""
     leg, belly, sides = robot.leg(elements), robot.belly(elements), _sides(robot)
     hull = [Surface.from_outline(1, belly)] if belly else []

@@ -18,7 +18,6 @@ import numpy as np
 from rft.balance.newton import plus, solve3, times
 from rft.vectors import absolute, floor, formula, maximum, where
 
-ORDER = 2  # of the error in 1 / steps
 GAMMA = 1.0 - 0.5**0.5
 TOLERANCE = 1e-3  # largest residual of a solved stage, over the rounding
 HALVINGS = 3  # of a step

@@ -1,0 +1,59 @@
+"""Commands as a user gives them: by `cli.main` in this process, or by a Python of their own."""
+
+import contextlib
+import functools
+import io
+import signal
+import subprocess
+import sys
+from unittest import mock
+
+import pytest
+import typer.main
+
+from geomech import cli
+from geomech.scene import kinds
+from rft.registry import REGISTRIES
+
+PARSER = functools.cache(typer.main.get_command)  # it takes 20 ms, and is the same each time
+
+
+def geomech(*args, cwd="."):
+    """(exit code, standard output, standard error) of a command, run by `cli.main` in this process."""
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2)]
+    handlers = {s: signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        with (
+            mock.patch.object(sys, "argv", ["geomech", *map(str, args)]),
+            mock.patch.object(typer.main, "get_command", PARSER),
+            contextlib.redirect_stdout(streams[0]),
+            contextlib.redirect_stderr(streams[1]),
+            contextlib.chdir(cwd),
+            pytest.raises(SystemExit) as done,
+        ):
+            cli.main()
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    for stream in streams:
+        stream.flush()
+    return done.value.code, *(stream.buffer.getvalue().decode() for stream in streams)
+
+
+@contextlib.contextmanager
+def own_parts():
+    """Parts of one's own, and the modules they came in, are forgotten at the end."""
+    before, modules = {group: dict(registry) for group, registry in REGISTRIES.items()}, set(sys.modules)
+    with mock.patch.multiple(kinds, _code={}, _files={}):
+        yield
+    for group, registry in REGISTRIES.items():
+        registry.restore(before.get(group, registry))
+    for name in set(sys.modules) - modules:
+        if name.startswith(kinds.PLUGIN):
+            del sys.modules[name]
+
+
+def as_process(*args, cwd=None):
+    """As `geomech`, by a Python of its own."""
+    done = subprocess.run([sys.executable, "-m", "geomech", *map(str, args)], capture_output=True, text=True, cwd=cwd)
+    return done.returncode, done.stdout, done.stderr
