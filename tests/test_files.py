@@ -73,7 +73,7 @@ def test_what_is_not_ours_stays(tmp_path):
         if words is not None:
             (tmp_path / (prefix + name) / files.MARK).write_bytes(words)
     (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "elsewhere" / files.MARK).write_bytes(files._words(target))
+    (tmp_path / "elsewhere" / files.MARK).write_bytes(files._mark_text(target))
     (tmp_path / (prefix + "link")).symlink_to(tmp_path / "elsewhere")
     (tmp_path / (prefix + "file")).write_text("precious")
     (tmp_path / (prefix + "young")).mkdir()
@@ -145,7 +145,7 @@ def test_a_folder_replaces_files_alone(kind, tmp_path):
 def test_a_folder_does_not_replace_an_input(tmp_path):
     file, source = write("whole_folder", tmp_path / "out", "input"), tmp_path / "input"
     source.hardlink_to(file)
-    with pytest.raises(Refusal, match="it is an input"), files.whole_folder(tmp_path / "out", [source]) as new:
+    with pytest.raises(Refusal, match="it is an input"), files.atomic_folder(tmp_path / "out", [source]) as new:
         (new / "a.txt").write_text("new")
     assert file.read_text() == "input"
 

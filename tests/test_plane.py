@@ -19,7 +19,7 @@ from geomech.study.choose import cheapest
 from geomech.study.shape_space import through as _held
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS
-from geomech.tiers.fitted import fits, is_too_large
+from geomech.tiers.fitted import finest_grid, is_too_large
 from rft import CATALOGUE, Chain, Viscous, se2
 
 GLASS = CATALOGUE["glass-0.3mm-loose"].medium
@@ -298,7 +298,7 @@ def test_what_hangs_on_the_surface_is_part_of_every_estimate(monkeypatch):
     assert table["estimate"]["area"][0] == 0.3 and 1e-6 < table["estimate"]["area"][1] < 0.3
     assert table["estimate_heading"]["area"] == [0.2, 0.4] == table["surface_spread_heading"]["area"]
     monkeypatch.setitem(TIERS._parts, "adapted", planned(TIERS["adapted"], balances=lambda *asked: 10**8))
-    monkeypatch.setattr("geomech.study.choose.solved", lambda *asked: 10**9)
+    monkeypatch.setattr("geomech.study.choose.solved_phases", lambda *asked: 10**9)
     assert cheapest(scene, [0.4, 0.5], 0.02)["tier"] != "area"
     monkeypatch.setitem(TIERS._parts, "area", planned(TIERS["area"], spread=lambda *asked: np.full((2, 2), 0.01)))
     found = cheapest(scene, [0.4, 0.5], 0.02)
@@ -313,7 +313,11 @@ def planned(tier, **changes):
 def test_three_joints_keep_their_field_and_more_have_one_that_fits():
     three, four = Cubic(), Sandy()
     assert not any(is_too_large(three, Numerics(grid=n)) for n in (31, 61))
-    assert [is_too_large(four, Numerics(grid=n)) for n in (13, 15)] == [False, True] and fits(4) == 13 and fits(5) == 7
+    assert (
+        [is_too_large(four, Numerics(grid=n)) for n in (13, 15)] == [False, True]
+        and finest_grid(4) == 13
+        and finest_grid(5) == 7
+    )
     chain = Swimmer(Viscous(2.0), Chain((1,) * 5))
     with pytest.raises(ValueError, match=r"a frame on a grid of 15\^4 shapes is too large: lower \[numerics\] grid"):
         framed(chain, Numerics(grid=15))

@@ -25,22 +25,22 @@ class VelocityWarning(Note):
 FULL_TURN = 2 * math.pi * (1 + 1e-9)
 
 
-def check_angle(what: str, largest: float) -> None:
+def check_angle(name: str, largest: float) -> None:
     """UnitWarning if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
         warnings.warn(
-            f"{what} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
+            f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
             f"the command line, a key that ends in _deg in a scene, or {math.radians(largest):.4g} rad",
             UnitWarning,
             stacklevel=3,
         )
 
 
-def choose(place: str, word: object, known: Iterable[str]) -> str:
+def choose(place: str, word: object, choices: Iterable[str]) -> str:
     """Return word if it is one of the known; Refusal with the nearest if not."""
-    known = list(known)
-    if isinstance(word, str) and word in known:
+    choices = list(choices)
+    if isinstance(word, str) and word in choices:
         return word
-    near = difflib.get_close_matches(str(word), known, 1, 0.5)
-    instead = f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
+    nearest = difflib.get_close_matches(str(word), choices, 1, 0.5)
+    instead = f"did you mean {nearest[0]!r}?" if nearest else f"use one of {', '.join(choices)}"
     raise Refusal(f"{formatted(word)} is unknown", where=place, instead=instead)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 METHODS: dict[str, dict[str, Any]] = {}  # by the name of a class
 
 
-class Faced:
+class Extensible:
     """Base of a value whose class takes the methods that are registered under its name."""
 
     def __init_subclass__(cls, **options: Any) -> None:

@@ -23,11 +23,11 @@ def part(kind: str, thing) -> str:
 def grid(axes: Sequence[np.ndarray]) -> str:
     """Its shapes and their ranges."""
     ranges = [f"{a[0]:.4g} to {a[-1]:.4g}" for a in axes]
-    alike = len(set(ranges)) == 1 and len(ranges) > 1
+    equal = len(set(ranges)) == 1 and len(ranges) > 1
     names = [f"alpha_{k + 1}" for k in range(len(axes))]
-    told = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if alike else ""
-    told = told or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
-    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {told} rad"
+    described = f"{names[0]}{' and ' if len(names) == 2 else ' to '}{names[-1]} from {ranges[0]}" if equal else ""
+    described = described or ", ".join(f"{name} from {r}" for name, r in zip(names, ranges))
+    return f"{' x '.join(str(len(a)) for a in axes)} shapes, {described} rad"
 
 
 def span(values) -> str:
@@ -51,7 +51,7 @@ def masked(values) -> str:
     return f"; {count} singular" if count else ""
 
 
-def left(residual, speed) -> str:
+def fit_residual(residual, speed) -> str:
     """What a fit left of each component, rms over all shapes, over the rms of xi."""
     if np.isnan(residual).all():
         return "fit residual unknown"

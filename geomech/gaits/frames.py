@@ -71,10 +71,10 @@ def _header(rows: Rows) -> tuple[str, ...]:
     line, columns = rows.header
     columns = ("t", *columns[1:]) if columns[0] in UNTIMED else columns
     if columns not in HEADERS:
-        known = " or ".join(",".join(h) for h in HEADERS)
+        headers = " or ".join(",".join(h) for h in HEADERS)
         quoted = rows.filled[0][1][:40] if rows.filled else ""
-        found = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
-        raise Refusal(f"the header must be {known}{found}", where=f"{rows.name}, line {line}")
+        received = f", got {quoted!r}" if len(set(itertools.chain(*HEADERS)) & set(columns)) > 1 else ""
+        raise Refusal(f"the header must be {headers}{received}", where=f"{rows.name}, line {line}")
     return columns
 
 
@@ -83,9 +83,9 @@ def _check_counts(frames: Frames) -> None:
         raise frames.wrong(f"one period must have {FEWEST} to {MOST_FRAMES} frames (values of t)", value=len(frames.t))
     if (frames.counts < FEWEST).any():
         k = int(frames.counts.argmin())
-        what = "values of s" if frames.columns[1] == "s" else "points"
-        told = f"the frame at t = {frames.t[k]:g} has {frames.counts[k]} {what}: give at least {FEWEST}"
-        raise frames.wrong(told, frames.starts[k])
+        items = "values of s" if frames.columns[1] == "s" else "points"
+        message = f"the frame at t = {frames.t[k]:g} has {frames.counts[k]} {items}: give at least {FEWEST}"
+        raise frames.wrong(message, frames.starts[k])
 
 
 def _check_grid(frames: Frames) -> None:
@@ -97,9 +97,11 @@ def _check_grid(frames: Frames) -> None:
         raise frames.wrong(
             f"t = {frames.rows[row, 0]:g}, {key} = {keys[row]:g} is given twice", row, instead="keep one"
         )
-    known = np.unique(keys)
-    if (frames.counts != len(known)).any():
+    places = np.unique(keys)
+    if (frames.counts != len(places)).any():
         k = int(frames.counts.argmin())
-        lacking = np.setdiff1d(known, keys[frames.starts[k] :][: frames.counts[k]])[0]
-        told = f"the frame at t = {frames.t[k]:g} has no {key} = {lacking:g}: give every {key} at every t, or at none"
-        raise frames.wrong(told, frames.starts[k])
+        missing = np.setdiff1d(places, keys[frames.starts[k] :][: frames.counts[k]])[0]
+        message = (
+            f"the frame at t = {frames.t[k]:g} has no {key} = {missing:g}: give every {key} at every t, or at none"
+        )
+        raise frames.wrong(message, frames.starts[k])

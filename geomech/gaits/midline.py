@@ -18,15 +18,15 @@ def bends(frames: Frames, elements: int, modes: int) -> np.ndarray:
     _check_modes(frames, modes)
     centres = (np.arange(elements) + 0.5) / elements
     heading = (_from_curvature if "curvature" in frames.columns else _from_points)(frames, centres, modes)
-    found = np.diff(heading)
-    worst = np.unravel_index(np.abs(found).argmax(), found.shape)
-    if not abs(found[worst]) <= LARGEST_BEND:
+    angles = np.diff(heading)
+    worst = np.unravel_index(np.abs(angles).argmax(), angles.shape)
+    if not abs(angles[worst]) <= LARGEST_BEND:
         raise frames.wrong(
             f"at t = {frames.t[worst[0]]:g} and s = {(worst[1] + 1) / elements:.3g} neighbouring "
-            f"elements bend by {abs(found[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
+            f"elements bend by {abs(angles[worst]):.3g} rad, more than {LARGEST_BEND:.3g}",
             instead="mend that frame, or take more elements",
         )
-    return found
+    return angles
 
 
 def _check_modes(frames: Frames, modes: int) -> None:

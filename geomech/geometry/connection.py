@@ -14,7 +14,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from geomech.core.work import Map, each
 from geomech.geometry.field import UNKNOWN_UNIT, Field, as_axes, half_grid
 from geomech.geometry.images import Image, images, to_solve
@@ -29,7 +29,7 @@ SAMPLES_TOGETHER = 25_000  # velocities asked for in one call: enough to fill th
 
 
 @dataclass(frozen=True, eq=False)
-class Connection(Faced):
+class Connection(Extensible):
     """A connection on a grid: xi = + A alphadot, in the velocity's frame. A: (3, d, N_1, ..., N_d). residual: (3, N_1,
     ..., N_d), rms over the fitted directions of xi - A alphadot for |alphadot| = 1; speed: (3, N_1, ..., N_d), rms of
     xi itself. degree: of the interpolating spline. All are nan at grid points that are singular, or have a neighbour
@@ -47,7 +47,7 @@ class Connection(Faced):
 
     def __repr__(self) -> str:
         singular = summary.masked(self.A.reshape(-1, *self.A.shape[2:]))
-        size = f"A {summary.spans(self.A)}; {summary.left(self.residual, self.speed)}{summary.lengths(**self.size)}"
+        size = f"A {summary.spans(self.A)}; {summary.fit_residual(self.residual, self.speed)}{summary.lengths(**self.size)}"
         return f"Connection({summary.grid(self.axes)}{singular}; {size})"
 
     @property
@@ -198,7 +198,7 @@ def sampled_at(
         for image in symmetries:
             distinct = ~solved[image.index[indices]]
             places.append(image.index[indices[distinct]])
-            velocities.append(image.of(xi[distinct]))
+            velocities.append(image.velocities(xi[distinct]))
         # Reduced batch by batch: all velocities of 2,000,000 shapes and 1,000 directions would take 48 GB.
         reduced = reduce(np.concatenate(velocities))
         fields = fields or [np.empty((*x.shape[:-1], len(alpha))) for x in reduced]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core import summary
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from rft.checks import in_range, real_array
 from rft.refusal import Refusal
 
@@ -18,7 +18,7 @@ UNKNOWN_UNIT = "length"  # stands for the unit of lengths where nothing says it
 
 
 @dataclass(frozen=True, eq=False)
-class Field(Faced):
+class Field(Extensible):
     """Values (..., N_1, ..., N_d) on the grid spanned by d axes of shape angles (rad), all ascending. nan in all
     components masks a grid point: derivatives come from the points between masks, and nothing is looked up.
 

@@ -47,7 +47,7 @@ class Harmonics:
 
     def __repr__(self) -> str:
         speed = np.sqrt((self.coefficients**2).sum(1) / 2)
-        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.left(self.residual, speed)})"
+        return f"Harmonics({summary.grid(self.axes)}; odd, up to {self.highest}; {summary.fit_residual(self.residual, speed)})"
 
     @cached_property
     def field(self) -> Field:

@@ -23,8 +23,8 @@ except ImportError:  # no such locks on Windows: what a kill leaves there is lef
 MARK = "owner"  # in a folder of ours, locked while its owner lives
 NEW = "new"  # beside the mark: what is being written
 ABANDONED = 60.0  # seconds after which a folder of ours without a mark has no owner who is about to set one
-ROOM = 24  # bytes of a name left for what is added to it
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+NAME_MARGIN = 24  # bytes of a name left for what is added to it
+DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 def note(text: str) -> None:
@@ -58,7 +58,7 @@ def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
     return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
-def why(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """What an error of the file system says."""
     return getattr(error, "strerror", None) or str(error)
 
@@ -66,7 +66,7 @@ def why(error: Exception) -> str:
 def hidden(path: Path, ending: str) -> Path:
     """A hidden name beside ``path`` that is its own; short where the file system would not take the long one."""
     name = f".{path.name}{ending}"
-    if len(os.fsencode(name)) + ROOM > _longest_name(path.parent):
+    if len(os.fsencode(name)) + NAME_MARGIN > _longest_name(path.parent):
         name = f".geomech-{_key(Path(path.name))}{ending}"
     return path.with_name(name)
 
@@ -91,46 +91,46 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def atomic_file(path: str | Path) -> Iterator[Path]:
     """A path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing can
     be written there."""
-    refused = lambda error: Refusal(f"cannot write {path}", because=why(error), instead="choose another output")
+    refused = lambda error: Refusal(f"cannot write {path}", because=reason_of(error), instead="choose another output")
     try:
         target = Path(path).resolve()
         if target.exists() and not target.is_file():
             raise OSError("it is no ordinary file")
-        shown = target.name if target.parent.name == NEW else path
+        displayed = target.name if target.parent.name == NEW else path
     except (OSError, RuntimeError, ValueError) as error:
         raise refused(error) from None
-    with _Workshop(target, target.parent, refused) as new:
+    with _StagingFolder(target, target.parent, refused) as new:
         try:
             yield new / target.name
             os.replace(new / target.name, target)
         except OSError as error:
-            raise _unwritten(shown, error) from None
+            raise _unwritten(displayed, error) from None
 
 
 def write_text(path: str | Path, text: str) -> None:
     """Write text in UTF-8, what is none of it escaped; the file appears whole or not at all."""
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 @contextlib.contextmanager
-def whole_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
+def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
     Refusal if that cannot be, or if one would replace an input."""
     refused = lambda error: Refusal(
-        f"cannot write the folder {path}", because=why(error), instead="choose another with -o"
+        f"cannot write the folder {path}", because=reason_of(error), instead="choose another with -o"
     )
     try:
         target = Path(path).resolve()
         if os.path.lexists(target) and not target.is_dir():
             raise OSError("it is not a folder")
-        there = next(p for p in (target, *target.parents) if p.exists())
+        existing = next(p for p in (target, *target.parents) if p.exists())
     except (OSError, RuntimeError, ValueError) as error:
         raise refused(error) from None
-    with _Workshop(target, there, refused) as new:
+    with _StagingFolder(target, existing, refused) as new:
         try:
             yield new
             _move(sorted(new.iterdir()), target, Path(path), inputs)
@@ -154,12 +154,12 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
 
 def _unwritten(what: object, error: OSError) -> Exception:
     """A full disk, with the name of what does not fit; other errors as they are."""
-    if error.errno not in FULL:
+    if error.errno not in DISK_FULL:
         return error
     return Refusal(f"cannot write {what}", because=error.strerror, instead="make room, or choose another output")
 
 
-class _Workshop:
+class _StagingFolder:
     """A hidden folder in ``there`` in which what is meant for ``target`` is made; gone at the end.
 
     Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to the
@@ -167,18 +167,18 @@ class _Workshop:
     any moment: then the folder goes all the same. refused: what to raise for an error of the file system at the start.
     """
 
-    def __init__(self, target: Path, there: Path, refused: Callable[[Exception], Exception]):
-        self.target, self.there, self.refused = target, there, refused
-        self.folder = there / f"{_prefix(target)}{secrets.token_hex(8)}"
+    def __init__(self, target: Path, parent: Path, refused: Callable[[Exception], Exception]):
+        self.target, self.parent, self.refused = target, parent, refused
+        self.folder = parent / f"{_prefix(target)}{secrets.token_hex(8)}"
         self.mark = None
 
     def __enter__(self) -> Path:
         try:
-            sweep_strays(self.target, self.there)
+            sweep_strays(self.target, self.parent)
             self.folder.mkdir(0o700)
             self.mark = (self.folder / MARK).open("wb", buffering=0)
             if _locked(self.mark):
-                self.mark.write(_words(self.target))
+                self.mark.write(_mark_text(self.target))
             (self.folder / NEW).mkdir()
         except BaseException as error:
             self.__exit__()
@@ -208,7 +208,7 @@ def _prefix(target: Path) -> str:
     return f".geomech-{_key(target)}-"
 
 
-def _words(target: Path) -> bytes:
+def _mark_text(target: Path) -> bytes:
     return b"geomech is writing " + os.fsencode(target)
 
 
@@ -232,8 +232,8 @@ def _discard(folder: Path) -> None:
 def _discard_plainly(folder: Path) -> None:
     """Remove a folder of ours, with one open file at a time."""
     for place, folders, names in os.walk(folder, topdown=False):
-        for remove, found in ((os.unlink, names), (os.rmdir, folders)):
-            for name in found:
+        for remove, entries in ((os.unlink, names), (os.rmdir, folders)):
+            for name in entries:
                 with contextlib.suppress(OSError):
                     remove(os.path.join(place, name))
     with contextlib.suppress(OSError):
@@ -257,5 +257,5 @@ def _sweep(path: Path, target: Path) -> None:
                 path.rmdir()
             return
         with (path / MARK).open("r+b") as mark:
-            if _locked(mark) and mark.read() == _words(target):
+            if _locked(mark) and mark.read() == _mark_text(target):
                 _discard(path)

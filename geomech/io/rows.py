@@ -31,12 +31,12 @@ class Rows:
         line, text = self.filled[0] if self.filled else (1, "")
         return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
 
-    def numbers(self, columns: tuple[str, ...], wanted: tuple[str, ...] | None = None) -> np.ndarray:
+    def numbers(self, columns: tuple[str, ...], selected: tuple[str, ...] | None = None) -> np.ndarray:
         """(N, columns), or those wanted: the numbers under the header; ValueError naming the line of a row that has others."""
-        wanted = columns if wanted is None else wanted
-        picks = [columns.index(name) for name in wanted]
+        selected = columns if selected is None else selected
+        picks = [columns.index(name) for name in selected]
         rows = [_row(self.name, k, line, columns, picks) for k, line in self.filled[1:]]
-        return np.array(rows).reshape(-1, len(wanted))
+        return np.array(rows).reshape(-1, len(selected))
 
     @property
     def lines(self) -> np.ndarray:
@@ -66,11 +66,13 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
         row = [_cell(cells[k]) for k in picks]
         if all(abs(x) <= LARGEST_NUMBER for x in row):
             return row
-    said = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
-    at = next(
+    expected = f"{len(columns)} finite numbers ({','.join(columns)}), at most {LARGEST_NUMBER:g}"
+    column = next(
         (columns[k] for k in picks if len(cells) == len(columns) and not abs(_cell(cells[k])) <= LARGEST_NUMBER), ""
     )
-    raise Refusal(f"a row must be {said}" + f", column {at}" * bool(at), value=text[:40], where=f"{name}, line {line}")
+    raise Refusal(
+        f"a row must be {expected}" + f", column {column}" * bool(column), value=text[:40], where=f"{name}, line {line}"
+    )
 
 
 def _cell(text: str) -> float:

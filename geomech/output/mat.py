@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.io.files import whole_file
+from geomech.io.files import atomic_file
 from geomech.io.tables.mat import ABOUT, ENTRIES, ERROR, RESIDUAL
 from geomech.study.bench import Study
 from geomech.study.fields import recorded
@@ -46,5 +46,5 @@ def save_connection(path: str | Path, study: Study, sign: str = "+", order: str 
         **{key: value for key, value in recorded(s).items() if key in ("singular_shapes", "level")},
     }  # fmt: skip
     arrays = {name: np.array(run(x)) for name, x in {**shapes, **entries, **rest}.items()}
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         savemat(part, {**arrays, ABOUT: json.dumps(about)}, appendmat=False)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.errors import choose
-from geomech.core.face import Faced
+from geomech.core.face import Extensible
 from geomech.gaits import Gait
 from geomech.geometry.connection import Connection, even_part
 from geomech.geometry.curvature import ccf
@@ -42,7 +42,7 @@ from rft.refusal import Refusal, located
 LOOKED_AT = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
 
 
-class Study(Faced):
+class Study(Extensible):
     """A scene and the tables computed for it so far, each stored under its name, the system and all else that it depends
     on. `turned` gives a study with other numerics that shares them."""
 

@@ -15,7 +15,7 @@ from geomech.study.bench import Study
 from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
 from geomech.study.results import Displacements
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
-from geomech.tiers.base import solved
+from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
 from rft.checks import is_number, real_array
 from rft.refusal import Refusal
@@ -60,7 +60,7 @@ def cheapest(
         phases = settings["phases"]
     plans = {m: study.plan(m, gait, amplitudes) for m in study.lookups}
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
-    enough = len(amplitudes) * solved(system, gait, phases)  # of the system itself
+    enough = len(amplitudes) * solved_phases(system, gait, phases)  # of the system itself
     for method in sorted(plans, key=balances.get):
         if balances[method] >= enough:
             break

@@ -32,7 +32,7 @@ from geomech.systems.capabilities import (
 )
 from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
-from geomech.tiers.base import Plan, Table, solved
+from geomech.tiers.base import Plan, Table, solved_phases
 
 CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, measured for those that ship, assumed for others
 LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number of it that this sums; measured
@@ -140,7 +140,7 @@ def direct(
     group = min(max(1, count), together, gaits_per_batch(system, phases))
     held = group * (60 * costed(system).elements + costed(system).memory) if stepping else 0
     memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
-    solves = (lambda n: n) if every else (lambda n: solved(system, gait, n))
+    solves = (lambda n: n) if every else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)
     jobs = [
@@ -197,7 +197,7 @@ def of_even_part(scene: Scene) -> list[Job]:
 
 def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> list[Job]:
     """Planes of pairs of joints through shapes (`Study.plane`)."""
-    balances = [fitted.balances_of_plane(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
+    balances = [fitted.plane_balances(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
     return [job for count in balances for job in _spread_out(scene, count, BASE)]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from geomech.core.summary import poses
 from geomech.core.variables import Result, Variable
-from geomech.io.results import units_of
+from geomech.io.results import unit_name
 from geomech.run.cost import Cost
 from geomech.scene import write as written
 from geomech.scene.model import Scene, checked_scene
@@ -91,7 +91,7 @@ class Cycles:
     def as_stored(self, result: Result) -> Result:
         """Return a sweep as its file has it."""
         found = tables.poses_as_stored(result)
-        unit = units_of(result["length"].unit)
+        unit = unit_name(result["length"].unit)
         found.append(Variable("length", result["length"].dims, result["length"].values, unit, result["length"].label))
         found += [result["frequency"]] if "frequency" in result else []
         return Result(result.kind, tuple(found), result.attributes, result.subject)

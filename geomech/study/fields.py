@@ -15,7 +15,7 @@ from geomech.geometry.harmonics import Harmonics
 from geomech.geometry.metric import Finsler, Metric
 from geomech.geometry.tube import TaylorSeries, Tube
 from geomech.geometry.two_form import TwoForm
-from geomech.io.results import units_of, write_netcdf
+from geomech.io.results import unit_name, write_netcdf
 from geomech.io.tables.netcdf import SHAPE
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
@@ -85,7 +85,7 @@ def variables(study: Study) -> list[Variable]:
     if (harmonics := study.harmonics) is not None:
         found += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:
-        units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
+        units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
         found.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
     return found
@@ -94,7 +94,7 @@ def variables(study: Study) -> list[Variable]:
 def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
     """Return A, what its fit leaves, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
-    units = f"{units_of(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
     left = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
@@ -116,7 +116,7 @@ def of_reach(tube: Tube) -> Variable:
 def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
     """What a connection near one gait is looked up in (`geomech.geometry.tube`)."""
     units, order = (
-        f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)",
+        f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
     )
     lead, row = ("component", "joint"), "harmonic_of_A"
@@ -136,7 +136,7 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
             "at equally spaced phases: the data reach deviations d with d . inverse . d up to 1",
         ),
         Variable(
-            "gait_beyond", ("component",), known.beyond, f"{units_of(unit)} (x, y), rad (theta)",
+            "gait_beyond", ("component",), known.beyond, f"{unit_name(unit)} (x, y), rad (theta)",
             "what the variation of the cycles changes in the net pose beyond the first order, part of its error",
         ),
         Variable(
@@ -148,14 +148,14 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
 
 def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
     """Return a CCF as a variable. what: its error is, in words."""
-    units = f"{units_of(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     said, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
     return Variable(name, dims, field.values, units, said, None if error is None else error.values, error_label=what)
 
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
     """The CCF of all pairs of joints, its error, and the pairs."""
-    units = f"{units_of(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
+    units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
     told = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
     said = f"curvature constraint function of joints {told}, in this order"
@@ -175,7 +175,7 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
 
 def of_frame(pose: Field) -> Variable:
     """The pose of a minimum-perturbation frame in the frame that it was made from."""
-    units = f"{units_of(pose.unit)} (x, y), rad (theta)"
+    units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
 
@@ -183,7 +183,7 @@ def of_frame(pose: Field) -> Variable:
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
     """Coefficients of the odd harmonics of xi, and what they leave."""
     angles = angles_of(table.axes)
-    units = f"{units_of(unit)} rad-1 (x, y), rad rad-1 (theta)"
+    units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
     left = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
@@ -233,7 +233,9 @@ def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -
 
 def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
     """Return A, its fit residual and the rms of xi. shapes: names of the shape variables, where these are no joint angles."""
-    sized = {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": units_of(fitted.unit)}
+    sized = (
+        {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": unit_name(fitted.unit)}
+    )
     found = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
     return Result("connection", found, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
 
@@ -268,7 +270,7 @@ def about(scene: Scene) -> dict:
         "frame": scene.frame,
         "frame_meaning": f"body frame: {meaning}",
         "body_length": float(system.length),
-        "length_unit": units_of(length_unit(system)),
+        "length_unit": unit_name(length_unit(system)),
         **recorded(system),
         "components": "x, y, theta of the body velocity xi: forward (tail to head), to the left, counter-clockwise",
         "sign_of_A": "xi = + A alphadot",

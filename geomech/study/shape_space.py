@@ -22,7 +22,7 @@ from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored_table
-from geomech.tiers.fitted import fits
+from geomech.tiers.fitted import finest_grid
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -67,7 +67,7 @@ class ShapeSpace(Question):
     @property
     def less(self) -> str:
         joints = self.scene.system.joints
-        return f"lower --grid, to {fits(joints)} or less" if joints > 2 and self.field else "ask for less"
+        return f"lower --grid, to {finest_grid(joints)} or less" if joints > 2 and self.field else "ask for less"
 
     @cached_property
     def study(self) -> Study:

@@ -10,7 +10,7 @@ import numpy as np
 from geomech.core.variables import Result, Variable
 from geomech.gaits import Gait
 from geomech.geometry.field import UNKNOWN_UNIT
-from geomech.io.results import units_of
+from geomech.io.results import unit_name
 from geomech.scene.model import Scene, frequency_of
 from geomech.systems.base import length_unit
 
@@ -167,7 +167,7 @@ def poses_as_stored(result: Result) -> list[Variable]:
     """Return net poses as files have them: displacement (..., component), its errors as estimate and estimate_heading, what
     the medium does as medium_error and medium_error_heading, and, where there is a frequency, speeds."""
     net, heading = result["net_distance"], result["heading"]
-    unit, dims = units_of(net.unit), net.dims
+    unit, dims = unit_name(net.unit), net.dims
     poses = np.stack([result[name].values for name in ("x", "y", "heading")], -1)
     both = f"{unit} (x, y), rad (theta)"
     found = [
@@ -192,7 +192,7 @@ def poses_as_stored(result: Result) -> list[Variable]:
 
 def as_stored(result: Result) -> Result:
     """Return net displacements by tier and amplitude as a data set has them."""
-    facts, unit = result.attributes, units_of(result["net_distance"].unit)
+    facts, unit = result.attributes, unit_name(result["net_distance"].unit)
     attributes = {"title": f"Net displacement per cycle of the scene {facts['name']}", "frame": facts["frame"]}
     attributes |= {"body_length": facts["body_length"], "length_unit": unit}
     attributes |= {"frequency": float(facts["frequency"]), "frequency_unit": "Hz"} if "frequency" in facts else {}

@@ -137,4 +137,4 @@ class Momentum:
 
         masses, inertia = self.inertia(connections.exact)
         A, alpha = connections.chain_connection(self.lengths, inertia, self.frame, masses)
-        return connections.in_units_of(self.length, A), alpha
+        return connections.in_length(self.length, A), alpha

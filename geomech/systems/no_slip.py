@@ -85,7 +85,7 @@ class NoSlipSnake:
         from geomech.symbolic import connections
 
         A, alpha = connections.no_slip_snake(self.lengths, self.frame)
-        return connections.in_units_of(self.length, A), alpha
+        return connections.in_length(self.length, A), alpha
 
     @classmethod
     def examples(cls) -> dict[str, NoSlipSnake]:

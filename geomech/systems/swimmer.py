@@ -11,7 +11,7 @@ import numpy as np
 
 import rft
 from geomech.core.work import iterate
-from geomech.geometry.images import around, solved_count
+from geomech.geometry.images import cycle_images, solved_count
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
 from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
@@ -223,7 +223,7 @@ class Swimmer:
         if not (self.traits.linear and plain and type(self.medium) is rft.Viscous):
             raise Refusal("a formula is that of a chain of links in a viscous medium without effects")
         A, alpha = connections.viscous_chain(self.body.lengths, self.medium.ratio, self.body.frame)
-        return connections.in_units_of(self.body.length, A), alpha
+        return connections.in_length(self.body.length, A), alpha
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
         return self.work(alpha, alphadot, xi).power / self.length
@@ -250,10 +250,10 @@ class Swimmer:
         rates = alphadot.reshape(-1, self.joints).T
         speed = joint_speed(self.body, rates).reshape(alphadot.shape[:-1]).mean(-1)
         if not self.traits.steps:
-            images = around(alpha, alphadot, self.traits)
-            samples = (images.some(x) for x in (alpha, alphadot, start))
+            images = cycle_images(alpha, alphadot, self.traits)
+            samples = (images.select(x) for x in (alpha, alphadot, start))
             solution = self._for_gaits(speed.size, images.count).solve(*samples).checked()
-            xi = images.whole(solution.xi)
+            xi = images.expand(solution.xi)
             work_done = self._for_gaits(speed.size, alpha.shape[-2]).work(alpha, alphadot, xi) if work else None
             return Cycle(xi, displacement(xi), solution.residual.max(-1), speed, work_done, 1, 0.0 * speed)
         steps = self.time_steps(alpha, alphadot, self.solver.cycles, work).checked()

@@ -84,23 +84,25 @@ class Stored:
         c = self.connection
         if not all(np.allclose(a, -a[::-1], rtol=0, atol=1e-12) for a in c.axes):
             return False
-        there = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(3, 1, *[1] * len(c.axes))
-        return bool(np.abs(there - c.A).max() <= 1e-9 * np.abs(c.A).max())
+        mirrored = np.flip(c.A, tuple(range(2, c.A.ndim))) * np.array([-1.0, 1.0, 1.0]).reshape(
+            3, 1, *[1] * len(c.axes)
+        )
+        return bool(np.abs(mirrored - c.A).max() <= 1e-9 * np.abs(c.A).max())
 
 
-def scaled(held: Stored, factor: float) -> Stored:
+def scaled(stored: Stored, factor: float) -> Stored:
     """The same with all lengths times ``factor``, then in the unit that ``held`` has."""
-    if factor == 1.0 and held.sized:
-        return held
+    if factor == 1.0 and stored.sized:
+        return stored
     by = np.array([factor, factor, 1.0])
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
-    c, h = held.connection, held.harmonics
-    more = {"unit": held.unit, "length": held.length}
-    more |= {"taylor": c.taylor.scaled(by)} if isinstance(c, Tube) else {}
-    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **more)
+    c, h = stored.connection, stored.harmonics
+    size = {"unit": stored.unit, "length": stored.length}
+    size |= {"taylor": c.taylor.scaled(by)} if isinstance(c, Tube) else {}
+    c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
-    even, error = (x if x is None else times(x) for x in (held.even, held.A_error))
-    return replace(held, connection=c, harmonics=h, even=even, A_error=error)
+    even, error = (x if x is None else times(x) for x in (stored.even, stored.A_error))
+    return replace(stored, connection=c, harmonics=h, even=even, A_error=error)
 
 
 def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) -> np.ndarray:
@@ -116,11 +118,11 @@ def checked_axis(name: str, values: np.ndarray, largest: float = LARGEST_ANGLE) 
     return axis
 
 
-def checked_names(told, plain: list[str]) -> tuple[str, ...]:
+def checked_names(names, defaults: list[str]) -> tuple[str, ...]:
     """Names of shape variables as a file tells them, or ``plain`` ones where that makes no sense."""
-    words = isinstance(told, list) and all(isinstance(x, str) for x in told) and len({*told}) == len(plain)
-    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in told)
-    return tuple(told if good else plain)
+    words = isinstance(names, list) and all(isinstance(x, str) for x in names) and len({*names}) == len(defaults)
+    good = words and all(x.isprintable() and 0 < len(x) <= LONGEST_NAME and "$" not in x for x in names)
+    return tuple(names if good else defaults)
 
 
 def numbers(name: str, values) -> np.ndarray:
@@ -138,29 +140,29 @@ def numbers(name: str, values) -> np.ndarray:
     return array
 
 
-def masks(name: str, values: np.ndarray, masked: np.ndarray, told: Mapping) -> None:
+def masks(name: str, values: np.ndarray, masked: np.ndarray, attributes: Mapping) -> None:
     """ValueError where values (..., N_1, ...) are nan elsewhere than at ``masked`` shapes (N_1, ...), of which the file must
     speak in what it has ``told``, or not all there."""
-    if masked.any() and "singular_shapes" not in told:
+    if masked.any() and "singular_shapes" not in attributes:
         numbers(name, values)
     if not np.isnan(values[..., masked]).all():
         raise Refusal(f"has {name} at singular shapes, where A is nan", instead="write it anew")
     numbers(name, np.where(masked, 0.0, values))
 
 
-def checked_error(name: str, error: np.ndarray, A: np.ndarray, told: Mapping) -> np.ndarray:
+def checked_error(name: str, error: np.ndarray, A: np.ndarray, attributes: Mapping) -> np.ndarray:
     """Half widths of intervals of A, both (3, d, N_1, ...) and nan at the same shapes; or ValueError."""
     if error.shape != A.shape:
         raise Refusal(f"has {name} of shape {error.shape} where A has {A.shape}")
-    masks(name, error, np.isnan(A).any((0, 1)), told)
+    masks(name, error, np.isnan(A).any((0, 1)), attributes)
     if (error < 0).any():
         raise Refusal(f"has {name} below 0 where it is half of an interval of A")
     return error.astype(float)
 
 
-def checked_level(told: Mapping) -> float | None:
+def checked_level(attributes: Mapping) -> float | None:
     """The share of cases that intervals cover, as a file has told it; None where that makes no sense."""
-    level = told.get("level")
+    level = attributes.get("level")
     good = np.ndim(level) == 0 and np.asarray(level).dtype.kind in "iuf" and 0 < level < 1
     return float(level) if good else None
 

@@ -29,22 +29,22 @@ def arrays(raw: bytes) -> dict[str, np.ndarray | str | None]:
     marks = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
     if (order := marks.get(raw[124:HEADER])) is None:
         raise Refusal("no MATLAB file of version 5 to 7")
-    found, left = {}, LARGEST
+    variables, bytes_left = {}, LARGEST
     for kind, data in _elements(raw[HEADER:], order):
         if kind == COMPRESSED:
             stream = zlib.decompressobj()
             try:
-                data = stream.decompress(data, left)
+                data = stream.decompress(data, bytes_left)
             except zlib.error:
                 raise Refusal("damaged") from None
-            left -= len(data)
-            if not stream.eof or left <= 0:
+            bytes_left -= len(data)
+            if not stream.eof or bytes_left <= 0:
                 raise Refusal("cut short, or too large")
             ((kind, data),) = _elements(data, order)
         if kind == MATRIX and data:
             name, values = _matrix(data, order)
-            found[name] = values
-    return found
+            variables[name] = values
+    return variables
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:

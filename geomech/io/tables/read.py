@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from geomech.core.errors import choose
-from geomech.io.files import read, why
+from geomech.io.files import read, reason_of
 from geomech.io.tables.base import FORMATS, ORDERS, SIGNS, Stored
 from rft.refusal import Refusal
 
@@ -23,13 +23,13 @@ def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
         raise Refusal(f"cannot read the table {path}", instead=f"end the name in {' or '.join(FORMATS)}")
-    for what, word, known in (("sign", sign, SIGNS), ("order", order, ORDERS)):
-        if word != "":
-            choose(what, word, known)
+    for key, value, choices in (("sign", sign, SIGNS), ("order", order, ORDERS)):
+        if value != "":
+            choose(key, value, choices)
     try:
         raw = read(path, LARGEST)
     except (OSError, ValueError) as error:
-        raise Refusal(f"cannot read the table {path}", because=why(error)) from None
+        raise Refusal(f"cannot read the table {path}", because=reason_of(error)) from None
     try:
         return FORMATS[path.suffix.lower()](raw, sign, order, hashlib.sha256(raw).hexdigest())
     except Refusal as refusal:
