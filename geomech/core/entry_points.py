@@ -11,7 +11,7 @@ from rft.registry import Registry
 
 
 def installed_entries(registry: Registry) -> dict[str, list[EntryPoint]]:
-    """Return what installed packages offer, by name, not loaded."""
+    """Return the entry points that installed packages declare for a registry, by name, not loaded."""
     entries: dict[str, list] = {}
     for entry in importlib.metadata.entry_points(group=registry.group):
         entries.setdefault(entry.name, []).append(entry)
@@ -19,15 +19,15 @@ def installed_entries(registry: Registry) -> dict[str, list[EntryPoint]]:
 
 
 def unloaded(registry: Registry) -> tuple[dict[str, str], dict[str, str]]:
-    """Return names that installed packages offer and nobody has asked for yet, with their packages: new ones, and those
-    that are refused because one of that name is built in."""
+    """Return parts of installed packages that are not loaded yet, by name, with their packages: new ones, and those
+    that are refused because a built-in part has their name."""
     packages = {name: " and ".join(map(_package, entries)) for name, entries in installed_entries(registry).items()}
     new = {name: package for name, package in packages.items() if name not in registry}
     return new, {name: package for name, package in packages.items() if name in registry.built_in}
 
 
 def choose_part(registry: Registry, where: str, word: object) -> str:
-    """Return word if it names a part, or one that an installed package offers, which is then loaded; else Refusal."""
+    """Return word if it names a part, or one of an installed package, which is then loaded; else raise Refusal."""
     if isinstance(word, str) and word in registry:
         return word
     packages = installed_entries(registry)

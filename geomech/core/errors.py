@@ -11,7 +11,7 @@ from rft.refusal import Refusal, formatted
 
 
 class Note(UserWarning):
-    """Something that is done as asked and is likely not meant; on the command line a line on standard error."""
+    """A warning that something is likely not meant, though it is done; on the command line a line on standard error."""
 
 
 class UnitWarning(Note):
@@ -19,14 +19,14 @@ class UnitWarning(Note):
 
 
 class VelocityWarning(Note):
-    """A velocity that lacks what a local connection rests on."""
+    """A velocity lacks a premise of a local connection."""
 
 
 FULL_TURN = 2 * math.pi * (1 + 1e-9)
 
 
 def check_angle(name: str, largest: float) -> None:
-    """UnitWarning if an angle in rad is beyond a full turn."""
+    """Warn (`UnitWarning`) if an angle in rad is beyond a full turn."""
     if largest > FULL_TURN:
         warnings.warn(
             f"{name} of {largest:.4g} rad is beyond a full turn, 2 pi: if that is in degrees, give {largest:.4g}deg on "
@@ -37,7 +37,7 @@ def check_angle(name: str, largest: float) -> None:
 
 
 def choose(place: str, word: object, choices: Iterable[str]) -> str:
-    """Return word if it is one of the known; Refusal with the nearest if not."""
+    """Return word if it is one of the choices; else raise Refusal with the nearest."""
     choices = list(choices)
     if isinstance(word, str) and word in choices:
         return word

@@ -1,5 +1,5 @@
-"""Who computes: this process, or the runner of a request, which is set from above (`geomech.run.jobs`) and may store and
-share out what it is given."""
+"""Where tasks are computed: in this process, or by the runner of a request, which is set from above
+(`geomech.run.jobs`) and may store and distribute them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]  # as the b
 
 
 class Worker(Protocol):
-    """Who computes."""
+    """An object that computes tasks."""
 
     def each(self, function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterable[Outcome]: ...
 
@@ -44,6 +44,9 @@ def each(function: Callable[[Item], Outcome], items: Sequence[Item]) -> Iterable
 
 def iterate(step: Callable, state: Any, count: int, context: tuple, row: Any = Any) -> tuple[Any, list]:
     """Return the state after ``count`` times step(state) -> (state, row), and the rows.
+
+    context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
+    of a row.
 
     of: all that steps follow from besides the state, which consists of arrays and numbers. row: the type of a row."""
     return _worker.get().iterate(step, state, count, context, row)

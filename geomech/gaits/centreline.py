@@ -110,11 +110,11 @@ class Centreline(Gait):
 
     @property
     def harmonics(self) -> int:
-        """The highest kept; 1 for a spline, which has no highest."""
+        """The highest harmonic of the series; 1 for a spline, which has no highest."""
         return max(1, self.keep_harmonics)
 
     def _through(self, data: frames.Frames, phase: np.ndarray, bends: np.ndarray):
-        """Function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
+        """Return a function of phases (T...) and the order of derivative that gives the bends (T..., joints)."""
         from scipy.interpolate import CubicSpline
 
         _check_order(data, bends)
@@ -165,7 +165,7 @@ def _series(fitted: np.ndarray, t: np.ndarray, order: int) -> np.ndarray:
 
 
 def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
-    """1, cos t, cos 2t, ..., sin t, sin 2t, ... or, order 1, their derivatives: (..., 2 harmonics + 1)."""
+    """Return 1, cos t, cos 2t, ..., sin t, sin 2t, ... or, order 1, their derivatives: (..., 2 harmonics + 1)."""
     k = np.arange(1, harmonics + 1)
     kt = t[..., None] * k
     one = np.full((*t.shape, 1), 1.0 - order)
@@ -174,7 +174,7 @@ def _waves(t: np.ndarray, harmonics: int, order: int) -> np.ndarray:
 
 
 def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; ValueError if the frames do not
+    """Return phases (N + 1,) from 0 to 2 pi and the bends (N, joints) at all but the last; Refusal if the frames do not
     make up one period. A frame that repeats the first is left out."""
     t, moves = data.t - data.t[0], np.abs(np.diff(bends, axis=0)).max(1)
     closing_gap = np.abs(bends[-1] - bends[0]).max()
@@ -203,13 +203,14 @@ def one_period(data: frames.Frames, bends: np.ndarray, period: float | None) -> 
 
 
 def _headings(bends: np.ndarray) -> np.ndarray:
-    """(N, joints + 1): headings of the elements from bends (N, joints), less their mean, in which noise is far less."""
+    """Return (N, joints + 1): headings of the elements from bends (N, joints), less their mean, in which noise is far
+    less."""
     heading = np.cumsum(np.pad(bends, ((0, 0), (1, 0))), 1)
     return heading - heading.mean(1, keepdims=True)
 
 
 def _check_once(data: frames.Frames, period: float, phase: np.ndarray, bends: np.ndarray) -> None:
-    """ValueError if the body does the same again within the period."""
+    """Raise Refusal if the body repeats its motion within the period."""
     from scipy.interpolate import CubicSpline
 
     heading = _headings(bends)
@@ -242,7 +243,7 @@ def _size(heading: np.ndarray) -> np.ndarray:
 
 
 def _inferred(data: frames.Frames, t, moves, closing_gap) -> float:
-    """The period of equally spaced frames of which the last is one spacing before the first comes again."""
+    """Return the period of equally spaced frames of which the last is one spacing before the first repeats."""
     if np.ptp(np.diff(t)) > UNEQUAL * t[-1] / (len(t) - 1):
         raise data.wrong(
             "the last frame does not repeat the first, and they are not equally spaced in t", instead="give period"
@@ -257,7 +258,8 @@ def _inferred(data: frames.Frames, t, moves, closing_gap) -> float:
 
 
 def _check_order(data: frames.Frames, bends: np.ndarray) -> None:
-    """A frame whose points run from the head to the tail has the bends of its neighbours in reverse, with the other sign."""
+    """Raise Refusal for a frame whose points run from the head to the tail: it has the bends of its neighbours in
+    reverse, with the other sign."""
     between = (np.roll(bends, 1, 0) + np.roll(bends, -1, 0)) / 2
     distance, reversed_distance = (np.abs(x - between).max(1) for x in (bends, -bends[:, ::-1]))
     if (bad := np.flatnonzero(3 * reversed_distance < distance)).size:

@@ -39,17 +39,17 @@ class Frames:
     timed: bool = True
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
-        """Return what to raise if something is wrong in a row, or in the whole file. facts: as `Refusal` has them."""
+        """Return the refusal of a row, or of the whole file. facts: as of `Refusal`."""
         return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
 
     @property
     def counts(self) -> np.ndarray:
-        """Rows of each frame, (F,)."""
+        """Numbers of rows of each frame, (F,)."""
         return np.diff(self.starts, append=len(self.rows))
 
 
 def read(path: str | Path) -> Frames:
-    """The frames of a CSV file; ValueError, one line, if it has none that can be used."""
+    """Return the frames of a CSV file; Refusal if it has none that can be used."""
     source = read_rows(path, LARGEST_FILE, "file must be a CSV file of one period")
     columns = _header(source)
     rows = source.numbers(columns)
@@ -66,8 +66,8 @@ def read(path: str | Path) -> Frames:
 
 
 def _header(rows: Rows) -> tuple[str, ...]:
-    """The columns, with t for what stands there for it. What is found instead is quoted only if it has two of their names:
-    another file's first line may be nobody's business."""
+    """Return the columns, with t for the column in its place. A wrong header is quoted only if it has two of their
+    names: another file's first line may be private."""
     line, columns = rows.header
     columns = ("t", *columns[1:]) if columns[0] in UNTIMED else columns
     if columns not in HEADERS:
@@ -89,7 +89,7 @@ def _check_counts(frames: Frames) -> None:
 
 
 def _check_grid(frames: Frames) -> None:
-    """Every frame has every s or point, once."""
+    """Raise Refusal unless every frame has every s or point, once."""
     key, keys = frames.columns[1], frames.rows[:, 1]
     twice = np.flatnonzero((np.diff(frames.rows[:, :2], axis=0) == 0).all(1))
     if twice.size:

@@ -1,4 +1,4 @@
-"""Files on disk: read within limits, written whole or not at all, never over an input, and nothing left behind."""
+"""Files on disk: read within limits, written whole or not at all, never over an input, and without leftovers."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 def note(text: str) -> None:
-    """A line on standard error that is no failure."""
+    """Print a note on standard error."""
     print("note: " + printable(" ".join(text.split())), file=sys.stderr)
 
 
 def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
-    """The bytes of an ordinary file of at most ``largest``; OSError or ValueError otherwise, before anything is read. pipes:
-    or of a pipe that somebody writes to."""
+    """Return the bytes of an ordinary file of at most ``largest`` bytes; OSError or ValueError otherwise, before
+    anything is read. pipes: take a pipe that somebody writes to, too."""
     path = Path(path)
     if path.stat() and not (path.is_file() or (pipes and path.is_fifo())):
         raise OSError(errno.EINVAL, "it is no ordinary file")
@@ -47,24 +47,25 @@ def read(path: str | Path, largest: int, pipes: bool = False) -> bytes:
 
 
 def _opened(path: str, flags: int) -> int:
-    """A pipe; nobody waits for one that nobody writes to."""
+    """Return a descriptor of a pipe, without waiting for a writer."""
     pipe = os.open(path, flags | os.O_NONBLOCK)
     os.set_blocking(pipe, True)
     return pipe
 
 
 def read_text(path: str | Path, largest: int, pipes: bool = False) -> str:
-    """The text of an ordinary file, or a pipe, in UTF-8, as `read`, line ends made equal."""
+    """Return the text of an ordinary file, or a pipe, in UTF-8, as `read`, with equal line ends."""
     return read(path, largest, pipes).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def reason_of(error: Exception) -> str:
-    """What an error of the file system says."""
+    """Return the message of an error of the file system."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def hidden(path: Path, ending: str) -> Path:
-    """A hidden name beside ``path`` that is its own; short where the file system would not take the long one."""
+    """Return a hidden name beside ``path`` that depends on it alone; short where the file system would refuse the long
+    one."""
     name = f".{path.name}{ending}"
     if len(os.fsencode(name)) + NAME_MARGIN > _longest_name(path.parent):
         name = f".geomech-{_key(Path(path.name))}{ending}"
@@ -79,7 +80,7 @@ def _longest_name(folder: Path) -> int:
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refusal if an output is the same file as an input, by whatever name or link."""
+    """Raise Refusal if an output is the same file as an input, by whatever name or link."""
     inputs = list(inputs)
     for output in outputs:
         for source in inputs:
@@ -92,8 +93,8 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 @contextlib.contextmanager
 def atomic_file(path: str | Path) -> Iterator[Path]:
-    """A path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing can
-    be written there."""
+    """Yield a path to write to, of the same name; moved to ``path`` on success, removed on failure. Refusal if nothing
+    can be written there."""
     refused = lambda error: Refusal(f"cannot write {path}", because=reason_of(error), instead="choose another output")
     try:
         target = Path(path).resolve()
@@ -111,15 +112,15 @@ def atomic_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write text in UTF-8, what is none of it escaped; the file appears whole or not at all."""
+    """Write text in UTF-8, other characters escaped; the file appears whole or not at all."""
     with atomic_file(path) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 @contextlib.contextmanager
 def atomic_folder(path: str | Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """A folder to fill; its files move to ``path`` on success, with a note of what they replace, and vanish on failure.
-    Refusal if that cannot be, or if one would replace an input."""
+    """Yield a folder to fill; its files move to ``path`` on success, with a note of the files they replace, and vanish
+    on failure. Refusal if that is impossible, or if one would replace an input."""
     refused = lambda error: Refusal(
         f"cannot write the folder {path}", because=reason_of(error), instead="choose another with -o"
     )
@@ -153,18 +154,18 @@ def _move(files: list[Path], target: Path, path: Path, inputs: Iterable[Path]) -
 
 
 def _unwritten(what: object, error: OSError) -> Exception:
-    """A full disk, with the name of what does not fit; other errors as they are."""
+    """Return the error to raise: for a full disk a Refusal with the file's name; others unchanged."""
     if error.errno not in DISK_FULL:
         return error
     return Refusal(f"cannot write {what}", because=error.strerror, instead="make room, or choose another output")
 
 
 class _StagingFolder:
-    """A hidden folder in ``there`` in which what is meant for ``target`` is made; gone at the end.
+    """A hidden folder in ``parent`` in which the files for ``target`` are made; removed at the end.
 
-    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to the
-    same target knows it for a stray, and sweeps it. The name is chosen before anything is there, and a signal may come at
-    any moment: then the folder goes all the same. refused: what to raise for an error of the file system at the start.
+    Its owner holds a lock on a mark in it. A kill leaves the folder and frees the lock: that is how the next writer to
+    the same target recognises a stray, and removes it. The name is chosen before the folder exists, so a signal at any
+    moment removes it, too. refused: returns the exception for an error of the file system at the start.
     """
 
     def __init__(self, target: Path, parent: Path, refused: Callable[[Exception], Exception]):
@@ -213,7 +214,7 @@ def _mark_text(target: Path) -> bytes:
 
 
 def _locked(file) -> bool:
-    """Whether the file is now locked by this process; False if another's, or if there are no locks here."""
+    """Return whether the file is now locked by this process; False if by another, or on a system without locks."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except (AttributeError, OSError):
@@ -222,7 +223,7 @@ def _locked(file) -> bool:
 
 
 def _discard(folder: Path) -> None:
-    """Remove a folder of ours, its mark after all that it stands for."""
+    """Remove a folder of ours, its mark last."""
     shutil.rmtree(folder / NEW, ignore_errors=True)
     with contextlib.suppress(OSError):
         (folder / MARK).unlink(missing_ok=True)
@@ -241,7 +242,7 @@ def _discard_plainly(folder: Path) -> None:
 
 
 def sweep_strays(target: Path, *more: Path) -> None:
-    """Remove the folders of killed writers to ``target``, and nobody else's, from its folder and ``more``."""
+    """Remove the folders of killed writers to ``target``, and no others, from its folder and ``more``."""
     for place in {target.parent, *more}:
         with contextlib.suppress(OSError, ValueError):
             for path in [p for p in place.iterdir() if p.name.startswith(_prefix(target))]:

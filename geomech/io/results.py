@@ -19,12 +19,12 @@ ENDINGS = "_error", "_spread"  # of the names under which files have errors and 
 
 
 def unit_name(unit: str) -> str:
-    """Return a unit of lengths as files name it."""
+    """Return a unit of lengths as it is written in files."""
     return UNITS.get(unit, unit)
 
 
 def file_variables(result: Result) -> Iterator[Variable]:
-    """Yield the variables that files have: errors and spreads follow their values as NAME_error and NAME_spread."""
+    """Yield the variables of a file: errors and spreads follow their values as NAME_error and NAME_spread."""
     for v in result.variables:
         yield replace(v, error=None, spread=None)
         labels = v.error_label or f"estimated error of {v.name}", f"standard deviation of {v.name}"
@@ -68,7 +68,7 @@ def _described(v: Variable) -> dict[str, str]:
 
 
 def _encoded(text: str) -> bytes:
-    """Return text in UTF-8; what is none in a file name is escaped."""
+    """Return text in UTF-8; bytes of file names that are no text are escaped."""
     return text.encode("utf-8", "backslashreplace")
 
 
@@ -82,7 +82,7 @@ def write_csv(path: str | Path, result: Result) -> None:
 
 
 def xarray() -> Any:
-    """Return the package; ImportError that says how to get it."""
+    """Return the package; ImportError that says how to install it."""
     try:
         import xarray
     except ImportError:
@@ -91,7 +91,7 @@ def xarray() -> Any:
 
 
 def to_xarray(result: Result) -> Any:
-    """Return a Dataset, whose coordinates are those that some variable has a dimension of."""
+    """Return a Dataset. Its coordinates are those whose dimension some variable has."""
     variables = list(file_variables(result))
     arrays = {v.name: (v.dims, np.array(v.values), _described(v)) for v in variables}
     used = {dim for v in variables if not v.is_coordinate for dim in v.dims}

@@ -17,8 +17,8 @@ LARGEST_NUMBER = 1e12
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What a file holds. name, sha256: of the file. filled: (line number, text) of what is neither comment nor empty, the
-    header first. comments: what stands after #, line by line."""
+    """Contents of a CSV file. name, sha256: of the file. filled: (line number, text) of lines that are neither comment
+    nor empty, the header first. comments: texts after #, line by line."""
 
     name: str
     sha256: str
@@ -27,12 +27,13 @@ class Rows:
 
     @property
     def header(self) -> tuple[int, tuple[str, ...]]:
-        """(its line number, the words of the first line that is no comment), in small letters, without quotes."""
+        """Line number and words of the first line that is no comment, in small letters, without quotes."""
         line, text = self.filled[0] if self.filled else (1, "")
         return line, tuple(word.strip().strip('"').strip().lower() for word in text.split(","))
 
     def numbers(self, columns: tuple[str, ...], selected: tuple[str, ...] | None = None) -> np.ndarray:
-        """(N, columns), or those wanted: the numbers under the header; ValueError naming the line of a row that has others."""
+        """Return the numbers under the header (N, columns), or in ``selected`` columns; Refusal naming the line of a
+        row with anything else."""
         selected = columns if selected is None else selected
         picks = [columns.index(name) for name in selected]
         rows = [_row(self.name, k, line, columns, picks) for k, line in self.filled[1:]]
@@ -40,12 +41,13 @@ class Rows:
 
     @property
     def lines(self) -> np.ndarray:
-        """(N,), the rows' line numbers."""
+        """Line numbers (N,) of the rows."""
         return np.array([k for k, _ in self.filled[1:]], int)
 
 
 def read(path: str | Path, largest: int, what: str) -> Rows:
-    """The rows of a CSV file of at most so many bytes; ValueError saying what it should be (``what``) if it is no text."""
+    """Return the rows of a CSV file of at most ``largest`` bytes; Refusal with what the file should be (``what``) if it
+    is no text."""
     try:
         raw = files.read(path, largest)
         text = raw.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
@@ -76,7 +78,7 @@ def _row(name: str, line: int, text: str, columns: tuple[str, ...], picks: list[
 
 
 def _cell(text: str) -> float:
-    """nan for what is no number."""
+    """Return the number in a cell; nan if it has none."""
     try:
         return float(text.strip(' "'))
     except ValueError:

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from geomech.core.summary import part
 from geomech.scene.intruder import OUTLINES
-from geomech.scene.intruding import of_effects
+from geomech.scene.intruding import describe_effects
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.stress import SpatialKeys, StressKeys
 from rft.ground import GROUND_EFFECTS, GroundEffect
@@ -47,9 +47,9 @@ class WalkerScene:
 
     def __post_init__(self):
         with located(self.name):
-            for what, kind in (("numerics", Fineness), ("name", str), ("text", str)):
-                if not isinstance(getattr(self, what), kind):
-                    raise Refusal(f"{what} must be {kind.__name__}", value=getattr(self, what))
+            for name, kind in (("numerics", Fineness), ("name", str), ("text", str)):
+                if not isinstance(getattr(self, name), kind):
+                    raise Refusal(f"{name} must be {kind.__name__}", value=getattr(self, name))
             if not (isinstance(self.files, tuple) and all(isinstance(x, str) for x in self.files)):
                 raise Refusal("files must be a tuple of names", value=self.files)
             object.__setattr__(self, "effects", self.walker.effects)
@@ -57,7 +57,7 @@ class WalkerScene:
 
     @property
     def engine(self) -> str:
-        """What computes it, where nothing else is asked for."""
+        """The engine that computes it by default."""
         spatial = isinstance(self.robot, Mjcf | Screws) or isinstance(self.medium, Spatial)
         return self.numerics.engine or ("mujoco" if spatial else "planar")
 
@@ -65,16 +65,16 @@ class WalkerScene:
     def walker(self) -> Walker:
         return Walker(self.robot, self.gait, self.medium, self.effects)
 
-    def told(self) -> list[str]:
-        """Lines about the robot, its clock, the law and the engine, and which effects are on and off."""
+    def description(self) -> list[str]:
+        """Return lines about the robot, its clock, the law and the engine, and which effects are on and off."""
         robot, gait, medium = (part(type(x).__name__, x) for x in (self.robot, self.gait, self.medium))
         lines = [f"{self.name}: {robot}", f"gait: {gait}", f"medium: {medium}", f"engine: {self.engine}"]
-        off = [kind for kind in sorted(KINDS) if kind not in [e.kind for e in self.effects]]
-        return [*lines, *of_effects(self.effects), "off, not evaluated: " + (", ".join(off) or "none")]
+        inactive = [kind for kind in sorted(KINDS) if kind not in [e.kind for e in self.effects]]
+        return [*lines, *describe_effects(self.effects), "off, not evaluated: " + (", ".join(inactive) or "none")]
 
 
 def spelled_out(tables: Mapping, name: str) -> dict:
-    """Return the tables of a scene with the names that they leave out: those of the robot's kind, its screw, and the law."""
+    """Return the tables of a scene with the names that they omit: those of the robot's kind, its screw, and the law."""
     tables = {key: dict(table) if isinstance(table, Mapping) else table for key, table in tables.items()}
     medium, robot = (tables.get(key) if isinstance(tables.get(key), dict) else {} for key in ("medium", "robot"))
     if "mjcf" in robot and robot.setdefault("kind", "mjcf") != "mjcf":

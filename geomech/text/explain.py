@@ -24,8 +24,8 @@ MOST_JOINTS = 5  # of which all pairs are drawn side by side
 def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
     intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
-    if hasattr(scene, "told"):  # of bodies in grains, whose modules a swimmer does without
-        return printable("\n".join(scene.told()))
+    if hasattr(scene, "description"):  # of bodies in grains, whose modules a swimmer does without
+        return printable("\n".join(scene.description()))
     system = checked_scene(scene).system
     first, *told = described(system)
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)

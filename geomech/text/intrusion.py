@@ -28,7 +28,7 @@ def text(result: Result) -> str:
     lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
     if matched := getattr(scene, "matched", ""):
         lines.append(matched)
-    lines += scene.effects_told()
+    lines += scene.effects_description()
     place = "angle" if "angle" in columns else max((n for n in "xyz" if n in columns), key=lambda n: np.ptp(columns[n]))
     names = [n for n in columns if n.startswith(("force", "moment")) and not (n == "moment" and "moment_y" in columns)]
     for name in names:

@@ -41,7 +41,7 @@ SAVE = "save it in MATLAB by save(FILE, ..., '-v7')"
 
 @FORMATS.register(suffix=".mat")
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
-    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
+    """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     variables = _variables(raw)
     axes, order = _axes(variables, order)
     about = _about(variables)
@@ -67,7 +67,7 @@ def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
 
 
 def _variables(raw: bytes) -> dict[str, np.ndarray]:
-    """Those of the layout, arrays of real numbers, and what else there is; ValueError if one is missing."""
+    """Return the variables of the file, those of the layout as arrays of real numbers; Refusal if one is missing."""
     if raw[:4] == b"\x89HDF" or raw[:10] == b"MATLAB 7.3":
         raise Refusal("is a MATLAB 7.3 (HDF5) file", instead=SAVE)
     if raw[:3] == b"CDF":
@@ -85,7 +85,7 @@ def _variables(raw: bytes) -> dict[str, np.ndarray]:
 
 
 def _read_version_4(raw: bytes) -> dict[str, np.ndarray]:
-    """The variables of a file of that version, which SciPy reads in Python; ValueError for a damaged one."""
+    """Return the variables of a file of version 4, which SciPy reads in Python; Refusal for a damaged one."""
     from scipy.io import loadmat
 
     try:  # what is damaged makes SciPy raise whatever comes first
@@ -97,7 +97,7 @@ def _read_version_4(raw: bytes) -> dict[str, np.ndarray]:
 
 
 def _axes(variables: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], str]:
-    """(the angles of both axes, the order in which arrays run over them)."""
+    """Return the angles of both axes, and the order in which arrays run over them."""
     angles = functools.partial(checked_axis, largest=LARGEST_ANGLE if ABOUT in variables else 2 * np.pi)
     first, second = (numbers(name, variables[name]) for name in ANGLES)
     if first.ndim == second.ndim == 2 and min(*first.shape, *second.shape) == 1:
@@ -120,7 +120,7 @@ def _axes(variables: dict, order: str) -> tuple[tuple[np.ndarray, np.ndarray], s
 
 
 def _about(variables: dict) -> dict:
-    """What a file of our own says of itself; nothing if that makes no sense."""
+    """Return the attributes of a file that geomech wrote; {} if they make no sense."""
     try:
         attributes = json.loads(str(variables.get(ABOUT, "")))
     except (ValueError, RecursionError):
@@ -129,7 +129,7 @@ def _about(variables: dict) -> dict:
 
 
 def _entries(variables: dict, axes, order: str, about: dict) -> np.ndarray:
-    """A (3, 2, N, M); nan at singular shapes, if the file speaks of such, and there in all entries."""
+    """Return A (3, 2, N, M); nan in all entries at singular shapes, if the file declares any."""
     arrays, expected = {}, tuple(len(a) for a in (axes if order == "ndgrid" else axes[::-1]))
     for name in ENTRIES:
         values = variables[name] if variables[name].dtype.kind == "f" else numbers(name, variables[name])
@@ -143,12 +143,12 @@ def _entries(variables: dict, axes, order: str, about: dict) -> np.ndarray:
 
 
 def _as_ndgrid(values: np.ndarray, order: str) -> np.ndarray:
-    """(..., N, M) of arrays that run as ``order``'s."""
+    """Return values (..., N, M) from arrays in the given order."""
     return values if order == "ndgrid" else values.swapaxes(-1, -2)
 
 
 def _residual(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray:
-    """(3, N, M): rms of what the fit leaves, nan where the file does not say."""
+    """Return the rms residual of the fit (3, N, M), nan where the file has none."""
     values = variables.get(RESIDUAL)
     if not isinstance(values, np.ndarray) or _as_ndgrid(values, order).shape != (3, *A.shape[2:]):
         return np.full((3, *A.shape[2:]), np.nan)
@@ -158,6 +158,6 @@ def _residual(variables: dict, A: np.ndarray, order: str, about: dict) -> np.nda
 
 
 def _error(variables: dict, A: np.ndarray, order: str, about: dict) -> np.ndarray | None:
-    """(3, 2, N, M): half widths of intervals of A, None where the file does not say."""
+    """Return half widths of intervals of A (3, 2, N, M), None where the file has none."""
     values = variables.get(ERROR)
     return checked_error(ERROR, _as_ndgrid(values, order), A, about) if isinstance(values, np.ndarray) else None

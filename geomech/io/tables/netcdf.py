@@ -37,7 +37,7 @@ SHAPE = "shape variable "  # before the name of one that is no angle between lin
 
 @FORMATS.register(suffix=".nc")
 def parse(raw: bytes, sign: str, order: str, sha256: str) -> Stored:
-    """The table in the bytes of a file; ValueError, to follow the file's name, if there is none."""
+    """Return the table in the bytes of a file; Refusal, to follow the file's name, if there is none."""
     if raw[:4] not in (b"CDF\x01", b"CDF\x02"):
         raise Refusal(_other_format(raw))
     if order not in ("", "ndgrid"):
@@ -129,7 +129,7 @@ def _stored(variables: dict, units: dict, attributes: dict, sign: str, sha256: s
 
 
 def _taylor_series(variables: dict, attributes: dict, turn: float) -> TaylorSeries:
-    """What is known along a gait (`geomech.geometry.tube`), A times ``turn``."""
+    """Return the Taylor series about a gait (`geomech.geometry.tube`), A times ``turn``."""
     sized = {"gait": 2, "gait_A": 3, "gait_slope": 4, "gait_errors": 5, "gait_spread": 3, "gait_beyond": 1}
     if missing := [name for name in sized if name not in variables or variables[name][1].ndim != sized[name]]:
         raise Refusal(f"has a gait, but no {missing[0]} that fits it", instead=FITTED)
@@ -160,8 +160,8 @@ def _taylor_series(variables: dict, attributes: dict, turn: float) -> TaylorSeri
 
 
 def _metric(variables: dict, attributes: dict, axes, degree: int) -> tuple[Metric | Finsler | None, float | None]:
-    """What a change of shape costs, and the degree of its power, None where it is a metric of another kind; (None, None) of
-    a file that does not tell."""
+    """Return the metric of shape space, and the degree of its power, None for a metric of another kind; (None, None) of
+    a file without one."""
     power, names, joints = attributes.get("power_degree"), tuple(f"alpha_{k + 1}" for k in range(len(axes))), len(axes)
     if "metric" not in variables and ("norm" not in variables or power is None):
         return None, None
@@ -184,7 +184,7 @@ def _metric(variables: dict, attributes: dict, axes, degree: int) -> tuple[Metri
 
 
 def _check_pairs(variables: dict, axes, masked: np.ndarray) -> None:
-    """ValueError for a CCF of pairs of joints that fits neither grid nor pairs; what is looked up is made anew from A."""
+    """Raise Refusal for a CCF of pairs of joints that fits neither grid nor pairs; it is computed anew from A."""
     pairs = np.array([*combinations(range(1, len(axes) + 1), 2)], float)
     if "pair_joints" in variables and not np.array_equal(variables["pair_joints"][1], pairs):
         raise Refusal(f"has pair_joints other than {pairs.astype(int).tolist()}", instead=SOURCE)
@@ -198,7 +198,7 @@ def _check_pairs(variables: dict, axes, masked: np.ndarray) -> None:
 
 
 def _array(variables: dict, name: str, dimensions: tuple[str, ...], axes) -> np.ndarray:
-    """A variable, or ValueError unless its dimensions are those, in that order, and its shape ends in the grid's."""
+    """Return a variable; Refusal unless its dimensions are those, in that order, and its shape ends in the grid's."""
     given, values = variables[name]
     if given != dimensions:
         raise Refusal(
@@ -210,7 +210,7 @@ def _array(variables: dict, name: str, dimensions: tuple[str, ...], axes) -> np.
 
 
 def _rows(variables: dict) -> bool:
-    """Whether the components are x, y and theta, in that order, if they are named."""
+    """Return whether the components are x, y and theta, in that order, if they are named."""
     if "component" not in variables:
         return True
     names = variables["component"][1]

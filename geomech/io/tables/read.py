@@ -1,4 +1,4 @@
-"""The connection in a file, whichever of the formats it has."""
+"""The connection in a file of any of the formats."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LARGEST = 2_000_000_000  # bytes of a file: the finest field there is
 
 
 def load(path: str | Path, sign: str = "", order: str = "") -> Stored:
-    """The connection in a file of `geomech connection`, .nc or .mat; Refusal, one line, if it holds none.
+    """Return the connection in a file of `geomech connection`, .nc or .mat; Refusal if it has none.
 
     sign: "+" or "-" for xi = + or - A alphadot; if left out as the file says, or made out (`detected_sign`). order:
     "ndgrid" or "meshgrid", the way arrays of a .mat file run; if left out as alpha1 and alpha2 in it run."""
