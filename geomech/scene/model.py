@@ -79,8 +79,7 @@ class Scene(Displayed):
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
-        """Return the scene with some of its [numerics] changed, the system's own among them; an entry given as None is
-        unchanged."""
+        """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry unchanged."""
         own_keys = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with located(self.name):
@@ -92,17 +91,15 @@ class Scene(Displayed):
 
     def changed(self, **changes) -> Scene:
         """Return the scene with some of its parts, or of its system's, changed."""
-        scene_changes = {
-            k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")
-        }
+        parts = {k: v for k, v in changes.items() if k in ("system", "gait", "numerics", "name", "text", "files")}
         with located(self.name):
-            system_changes = {k: v for k, v in changes.items() if k not in scene_changes}
-            system = unwrapped(scene_changes.get("system", self.system))
+            system_changes = {k: v for k, v in changes.items() if k not in parts}
+            system = unwrapped(parts.get("system", self.system))
             for name in system_changes:
                 choose("part", name, ["system", "gait", "numerics", "name", *(f.name for f in _fields(system))])
             if system_changes:
-                scene_changes["system"] = dataclasses.replace(system, **system_changes)
-            return dataclasses.replace(self, **scene_changes)
+                parts["system"] = dataclasses.replace(system, **system_changes)
+            return dataclasses.replace(self, **parts)
 
     def cycle(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None, work: bool = False) -> Cycle:
         """Run a gait, or the scene's own, for amplitudes (...,), all at once."""

@@ -88,7 +88,7 @@ class WrappedSystem:
 
     given: the function, or the object. joints, length, traits: as of `System`."""
 
-    unwrapped: Any
+    wrapped: Any
     joints: int
     length: float = 1.0
     traits: Traits = NOTHING
@@ -141,23 +141,23 @@ def _accepts_two(function: Callable) -> bool:
     return True
 
 
-def as_system(unwrapped: Any, joints: int | None = None) -> System:
+def as_system(system: Any, joints: int | None = None) -> System:
     """Return a system from an object with a velocity: the object itself where it has the five members, else with
     defaults for those it lacks. joints: of a function without an attribute ``joints``. Refusal for anything else."""
-    if not isinstance(unwrapped, type) and all(hasattr(unwrapped, name) for name in MEMBERS):
-        refuse_mutable(unwrapped)
-        if not isinstance(unwrapped.traits, Traits):
-            raise Refusal(f"traits of the {kind_of(unwrapped)} must be Traits(...)", value=unwrapped.traits)
-        return unwrapped
-    function = getattr(unwrapped, "velocity", unwrapped)
-    joints = getattr(unwrapped, "joints", joints)
-    if isinstance(unwrapped, type) or not callable(function) or joints is None:
+    if not isinstance(system, type) and all(hasattr(system, name) for name in MEMBERS):
+        refuse_mutable(system)
+        if not isinstance(system.traits, Traits):
+            raise Refusal(f"traits of the {kind_of(system)} must be Traits(...)", value=system.traits)
+        return system
+    function = getattr(system, "velocity", system)
+    joints = getattr(system, "joints", joints)
+    if isinstance(system, type) or not callable(function) or joints is None:
         raise Refusal(
             "system must be a system such as Swimmer(medium, body), or a function velocity(alpha, alphadot)",
-            value=unwrapped,
+            value=system,
         )
-    refuse_mutable(unwrapped)
-    return WrappedSystem(unwrapped, joints, getattr(unwrapped, "length", 1.0), getattr(unwrapped, "traits", NOTHING))
+    refuse_mutable(system)
+    return WrappedSystem(system, joints, getattr(system, "length", 1.0), getattr(system, "traits", NOTHING))
 
 
 def unwrapped(system: Any) -> Any:
