@@ -44,10 +44,10 @@ class Bare:
     """A law that supplies its traction and nothing else."""
 
     def __init__(self, law):
-        self.connection = law
+        self.law = law
 
     def traction(self, v_t, v_n, eps=0.0):
-        return self.connection.traction(v_t, v_n, eps)
+        return self.law.traction(v_t, v_n, eps)
 
 
 LAW = """

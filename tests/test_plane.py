@@ -242,8 +242,8 @@ def test_beyond_the_field_tiers_solve_around_the_gait(monkeypatch):
         centre=(0.1, 0.2, 0.0, -0.1),
     )
     scene = Scene(Sandy(), gait, Numerics(grid=10, extent=1.0, interpolation=5, directions=64))
-    interpolated_plane, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
-    found = interpolated_plane.study(*asked)
+    tabulated, asked = Study(scene), ([0.5, 0.9], ["area", "path", "direct"])
+    found = tabulated.study(*asked)
     assert "field" in found["seconds"]
     monkeypatch.setattr("geomech.tiers.fitted.FIELD", 9_999)
     study = Study(scene)

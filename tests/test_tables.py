@@ -209,7 +209,7 @@ def test_the_sign_of_a_bare_mat_file_is_made_out(frame, medium, tmp_path):
         assert np.isnan(held.connection.residual).all() and not held.has_residual
         told = tables.load(tmp_path / "a.mat", sign="+")
         np.testing.assert_array_equal(told.connection.A, sign * c.A)
-        assert not [line for line in told.said if "sign" in line]
+        assert not [line for line in told.assumptions if "sign" in line]
 
 
 @pytest.mark.parametrize(

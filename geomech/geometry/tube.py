@@ -239,8 +239,8 @@ class TaylorSeries:
         derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
             "...ij,...j->...i", slope, rate / speed[..., None]
         )
-        A_here = A + slope * s[..., None, None]
-        return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
+        A_shifted = A + slope * s[..., None, None]
+        return derivative + se2.bracket(A_shifted[..., 0], A_shifted[..., 1])
 
     def ccf_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3) of `ccf`."""

@@ -139,8 +139,8 @@ def _brackets(A: Callable, alpha, alphadot, tip) -> np.ndarray:
     nodes, weights = np.polynomial.legendre.leggauss(RADII)
     total = 0.0
     for s, w in zip((nodes + 1) / 2, weights / 2):
-        A_there = A(tip + s * (alpha - tip))
-        u, v = (np.einsum("...ij,...j->...i", A_there, x) for x in (alpha - tip, s * alphadot))
+        A_cone = A(tip + s * (alpha - tip))
+        u, v = (np.einsum("...ij,...j->...i", A_cone, x) for x in (alpha - tip, s * alphadot))
         total = total + w * se2.bracket(u, v).mean(1)
     return total
 

@@ -76,7 +76,7 @@ class Request:
         and self.system.traits.singularity is None,
         doc="Whether a table leads near.",
     )  # fmt: skip
-    stored_table = property(lambda self: stored_table(self.system, "connection"))
+    stored = property(lambda self: stored_table(self.system, "connection"))
 
     @cached_property
     def power(self) -> Callable | None:

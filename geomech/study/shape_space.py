@@ -99,7 +99,7 @@ class ShapeSpace(Question):
                 f"{joints} joints have {len(pairs)} pairs",
                 instead=f"say which, such as --pair 1,{joints}, or give a chain [body] modes",
             )
-        return [(one, through(self.scene, one, self.stored, self.pair is not None)) for one in pairs]
+        return [(one, through(self.scene, one, self.held, self.pair is not None)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name

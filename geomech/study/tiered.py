@@ -121,7 +121,7 @@ class Settings:
         return {**entry, "buys": knob.buys}
 
     @property
-    def table_error(self) -> float:
+    def own_error(self) -> float:
         """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         return float(table_error(self.scene.system, *shapes)[..., 0].max())
