@@ -601,18 +601,18 @@ def test_a_field_written_before_it_had_what_is_left_is_read(field, tmp_path):
     """Its other errors are the same, and its A_error less."""
     raw = (field / "field.nc").read_bytes()
     (tmp_path / "old.nc").write_bytes(raw.replace(b"gait_off", b"old_gait"))
-    old, now = (Connection.load(x).known for x in (tmp_path / "old.nc", field / "field.nc"))
+    old, now = (Connection.load(x).taylor for x in (tmp_path / "old.nc", field / "field.nc"))
     alpha = now.loop.shape(np.arange(6.0))
     np.testing.assert_array_equal(old.connection(alpha), now.connection(alpha))
     less = old.connection_error(alpha) ** 2 + (now.factor * now.standard_error_at(np.arange(6.0))) ** 2
     np.testing.assert_allclose(now.connection_error(alpha) ** 2, less, rtol=1e-5)
-    assert (now.off > 0).any()
+    assert (now.standard_error > 0).any()
 
 
 def test_a_field_written_again_keeps_every_digit(field, tmp_path):
     study = Study(load(field / "mine.toml"))
     fields.save_connection(tmp_path / "again.nc", study)
-    one, other = (Connection.load(x).known for x in (field / "field.nc", tmp_path / "again.nc"))
+    one, other = (Connection.load(x).taylor for x in (field / "field.nc", tmp_path / "again.nc"))
     for f in dataclasses.fields(one):
         a, b = (getattr(x, f.name) for x in (one, other))
         np.testing.assert_array_equal(*((a.coefficients, b.coefficients) if f.name == "loop" else (a, b)))

@@ -120,7 +120,7 @@ def _spectrum(xi) -> _Spectrum:
 
 
 def _values(c: np.ndarray, k: np.ndarray, n: int) -> np.ndarray:
-    """Return sum_k c_k e^(i k t) at the n phases: the inverse of `_Waves.of`."""
+    """Return sum_k c_k e^(i k t) at the n phases: the inverse of `_Waves.coefficients`."""
     spectrum = np.zeros((*c.shape[:-1], n), complex)
     np.add.at(spectrum, (..., k % n), c)
     return np.fft.ifft(spectrum, axis=-1) * n
