@@ -5,7 +5,7 @@ from __future__ import annotations
 from figures import main, style
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -6,7 +6,7 @@ from figures import main
 from geomech.gaits import Butterfly
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 
 def compute(scene: str = "three-link-glass", **numerics) -> dict:

@@ -9,7 +9,7 @@ from figures import main
 from geomech.gaits import Butterfly, Circle
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.tiers import TIERS
 
 GAITS = {"circle": Circle(reverse=True), "butterfly": Butterfly()}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from figures import main
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
 from geomech.study.motion import motion
+from geomech.study.study import Study
 
 
 def compute(scene: str = "butterfly-glass", cycles: int = 1, **numerics) -> dict:

@@ -13,7 +13,7 @@ from figures import main, style
 from geomech.gaits import Sine
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.batch import beside
+from geomech.study.batch import side_by_side
 from rft import Backbone, Transient
 
 AMPLITUDES = (0.1, 0.22, 0.4)  # A / lambda
@@ -38,7 +38,7 @@ def compute(shares=SHARES, elements: int = 100, phases: int = 96) -> dict:
         for a in AMPLITUDES
         for share in shares
     ]
-    run = beside(scenes).cycle(phases=phases)
+    run = side_by_side(scenes).cycle(phases=phases)
     net = np.hypot(run.net[:, 0], run.net[:, 1]).reshape(len(AMPLITUDES), -1)
     xi = run.xi.reshape(len(AMPLITUDES), len(shares), phases, 3)
     return {

@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
     from geomech.scene import toml as toml
     from geomech.scene.kinds import register as register
     from geomech.study import undulation as undulation
-    from geomech.study.bench import Study as Study
+    from geomech.study.study import Study as Study
     from geomech.systems import Swimmer as Swimmer
     from rft import bodies as bodies
     from rft import effects as effects
@@ -58,7 +58,7 @@ _MODULES = {  # by the name they have here; none is imported before it is asked 
 }
 _OBJECTS = {
     **dict.fromkeys(("load", "toml", "Scene", "Numerics"), "geomech.scene"),
-    "Study": "geomech.study.bench",
+    "Study": "geomech.study.study",
     "Swimmer": "geomech.systems",
     "fit_log": "geomech.measured",
     "register": "geomech.scene.kinds",

@@ -37,7 +37,7 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names.s
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for at first use: a command that refuses needs no mechanics."""
+    """Import a name at its first use: a command that refuses needs no mechanics."""
     if name in _MODULES:
         return getattr(importlib.import_module(_MODULES[name]), name)
     if name in {module.name for module in pkgutil.iter_modules(__path__)}:

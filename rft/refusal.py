@@ -71,8 +71,8 @@ def printable(text: str) -> str:
     return re.sub(r"[^ -~\n\t]", _escaped, text)
 
 
-def _escaped(found: re.Match[str]) -> str:
-    letter = found[0]
+def _escaped(match: re.Match[str]) -> str:
+    letter = match[0]
     is_shown = letter.isprintable() or unicodedata.category(letter) == "Zs"
     return letter if is_shown else letter.encode("unicode_escape").decode()
 

@@ -23,12 +23,12 @@ BUILT_IN = ("geomech", "rft")  # packages whose names nobody else may give
 class Registry(Mapping[str, Any]):
     """Parts of one family by name, in the order in which they were registered.
 
-    group: of entry points with which installed packages offer parts. key: attribute that holds a part's name. told: what a
+    group: of entry points with which installed packages offer parts. key: attribute that holds a part's name. noun: what a
     part is, in words, such as "a gait". admits: whether an object is one.
     """
 
-    def __init__(self, group: str, key: str, told: str, admits: Callable[[Any], bool]):
-        self.group, self.key, self.told, self.admits = group, key, told, admits
+    def __init__(self, group: str, key: str, noun: str, admits: Callable[[Any], bool]):
+        self.group, self.key, self.noun, self.admits = group, key, noun, admits
         self._parts: dict[str, Any] = {}
         REGISTRIES[group] = self
 
@@ -73,7 +73,7 @@ class Registry(Mapping[str, Any]):
 
     def put(self, part: Any, name: object) -> None:
         """Add a part under a name; ValueError as `register`."""
-        who = f"{self.told} of one's own, {getattr(part, '__name__', name)},"
+        who = f"{self.noun} of one's own, {getattr(part, '__name__', name)},"
         if isinstance(part, type):
             if not dataclasses.is_dataclass(part) or not part.__dataclass_params__.frozen:
                 raise Refusal(f"{who} must be a value", instead="put @dataclass(frozen=True) above it")
@@ -84,28 +84,29 @@ class Registry(Mapping[str, Any]):
         given = self.key in getattr(part, "__dict__", {}) or name in self
         if not isinstance(name, str) or not name.strip() or (isinstance(part, type) and not given):
             raise Refusal(f"{who} has no name", instead=f'give the class {self.key} = "..."')
-        there = self._parts.get(name, part)
-        if place(there) != place(part):
+        registered = self._parts.get(name, part)
+        if place(registered) != place(part):
             if name in self.built_in:
                 raise Refusal(f"{who} is named {name!r}, as one that is built in", instead="give it another name")
             raise Refusal(
-                f"{who} is named {name!r}, as the {place(there)[1]} of {place(there)[0]}", instead="rename one"
+                f"{who} is named {name!r}, as the {place(registered)[1]} of {place(registered)[0]}",
+                instead="rename one",
             )
         self._parts[name] = part
 
     def restore(self, parts: Mapping[str, Any]) -> None:
         """Hold these parts and no others."""
-        kept = dict(parts)
+        accepted = dict(parts)
         self._parts.clear()
-        self._parts.update(kept)
+        self._parts.update(accepted)
 
     def examples(self) -> dict[str, Any]:
         """Return parts of every class by name: those of its ``examples()``, else one without parameters."""
-        found = {}
+        own_parts = {}
         for name, part in self.items():
             own = getattr(part, "examples", None)
-            found |= own() if own else {name: part() if isinstance(part, type) else part}
-        return found
+            own_parts |= own() if own else {name: part() if isinstance(part, type) else part}
+        return own_parts
 
 
 def classes_with(member: str) -> Callable[[Any], bool]:

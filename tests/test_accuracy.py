@@ -9,7 +9,7 @@ from geomech import scene as scenes
 from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection
 from geomech.study import accuracy, tiered
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.text import accuracy as text
 from geomech.tiers.direct import direct
 from rft import Chain, Viscous, body_velocity

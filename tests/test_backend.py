@@ -4,6 +4,7 @@ tests/test_hard_cases.py); and which of the two is taken."""
 import dataclasses
 import errno
 import hashlib
+import itertools
 import json
 import os
 import resource
@@ -23,10 +24,21 @@ from geomech.gaits import Ellipse
 from geomech.systems import solver
 from geomech.text.explain import explain
 from geomech.text.system import described
-from rft import Chain, DisturbedGround, EndCaps, GrainInertia, SkinFriction, TowedSled, body_velocity, time_steps
+from rft import (
+    Backbone,
+    Chain,
+    DisturbedGround,
+    EndCaps,
+    GrainInertia,
+    SkinFriction,
+    TowedSled,
+    body_velocity,
+    time_steps,
+)
 from rft.balance import backend
 from rft.balance import solver as balance
 from rft.balance.backend import Note
+from rft.balance.newton import Limits
 from rft.bodies import Elements
 from rft.contact import assemble
 from rft.effects import Effect
@@ -98,14 +110,14 @@ def test_starts(how, compiled_code):
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("size", [1e12, 1e31, 1e154, 1e155, 1e200, 1e300])
 @pytest.mark.parametrize("rate", [1e-90, 1.0, 1e90])
-def test_starts_whose_squares_overflow(size, rate, solved_by):
+def test_starts_whose_squares_overflow(rate, solved_by):
     """So that drag reads as none: the answer is that of no start. In a dry medium, and in one in which speed counts."""
     rng = np.random.default_rng(12)
     alpha, alphadot = rng.uniform(-2, 2, (20, 2)), rng.normal(size=(20, 2)) * rate
-    start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
-    for medium in (GLASS, MEDIA["viscous-2"]):
+    sizes = [1e12, 1e31, 1e154, 1e155, 1e200, 1e300]
+    for medium, size in itertools.product((GLASS, MEDIA["viscous-2"]), sizes):
+        start = size * np.eye(4)[np.arange(20) % 4, :3]  # along, across, turning, at rest
         cold, found = (body_velocity(medium, BODY, alpha, alphadot, start=s, backend=solved_by) for s in (None, start))
         assert (found.status == cold.status).all()
         assert apart(found, cold, alphadot, BODY).max() < 1e-10
@@ -156,6 +168,23 @@ def test_parameters_of_each_sample_and_threads(monkeypatch):
         GLASS, BODY, alpha[7], alphadot[7], effects=[e.take(slice(7, 8)) for e in effects], backend="numba"
     )
     np.testing.assert_allclose(alone.xi, fast.xi[7], rtol=0, atol=1e-15)
+
+
+@pytest.mark.usefixtures("compiled_code")
+@pytest.mark.parametrize(
+    "effects", [(), (EndCaps(radius=0.06, tail=1.0), SkinFriction(), TowedSled(1.0, 0.3))], ids=len
+)
+@pytest.mark.parametrize("body", [BODY, Backbone(19)], ids=["chain", "backbone"])
+def test_a_sample_alone_has_the_digits_that_it_has_among_others(body, effects):
+    """Alone its elements share vectors, among others each has one for itself."""
+    from rft.balance.compiled import solve
+
+    rng = np.random.default_rng(8)
+    alpha, alphadot = rng.uniform(-0.4, 0.4, (body.joints, 40)), rng.normal(size=(body.joints, 40))
+    problem = assemble(GLASS, body, effects).problem(alpha, alphadot)
+    common = balance.QUICK, Limits(1e-6, 1e-10), None
+    alone = [solve(problem.take(np.array([i])), *common) for i in range(40)]
+    np.testing.assert_array_equal(np.concatenate(alone, 1), solve(problem, *common))
 
 
 @pytest.mark.usefixtures("compiled_code")

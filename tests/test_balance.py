@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from commands import geomech
-from registry import BODIES, CLOSED, DRY, LINEAR, MEDIA
+from registry import BODIES, CLOSED, DRY, MEDIA
 
 from geomech import symbolic
 from rft import Chain, Coulomb, EndCaps, GrainInertia, Granular, TowedSled, Viscous, body_velocity
@@ -45,18 +45,6 @@ def test_viscous_chain_agrees_with_sympy(link):
     got = body_velocity(Viscous(1.7), Chain((2, 3, 4), frame=f"link-{link}"), shapes, rates)
     np.testing.assert_allclose(got.xi, symbolic.velocity(A, alpha)(shapes, rates), rtol=1e-11, atol=1e-13)
     assert (got.iterations == 1).all()
-
-
-@pytest.mark.parametrize("medium", MEDIA)
-@pytest.mark.parametrize("body", BODIES)
-def test_everything_converges(medium, body):
-    solution = body_velocity(MEDIA[medium], BODIES[body], *samples(BODIES[body], 200))
-    assert set(solution.status.tolist()) <= {"sliding", "stuck"}
-    assert solution.residual.max() < 1e-9
-    assert solution.iterations.max() <= 200
-    if medium in LINEAR:
-        assert (solution.iterations == 1).all()
-        assert (solution.status == "sliding").all()
 
 
 def plain_force(medium, lengths, alpha, alphadot, xi, eps, nodes=4000):
@@ -297,7 +285,7 @@ def test_bad_input_is_refused(alpha, alphadot, kwargs, said):
 
 
 def test_threads_give_the_same_answer():
-    alpha, alphadot = samples(THREE, 40_000)
+    alpha, alphadot = samples(THREE, 10_000)
     one, two = (body_velocity(Coulomb(), THREE, alpha, alphadot, threads=n).xi for n in (1, 2))
     np.testing.assert_allclose(two, one, atol=1e-9)
 

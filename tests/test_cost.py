@@ -20,7 +20,7 @@ from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.run import cost as run_cost
 from geomech.study import cycles, estimate, sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 GLASS = scenes.load("three-link-glass")
 VISCOUS = scenes.load("three-link-viscous")

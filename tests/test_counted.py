@@ -5,7 +5,7 @@ import pytest
 from geomech import scene as scenes
 from geomech.gaits import Fourier
 from geomech.study import accuracy, cost, effort, motion, sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft.balance.listening import listening
 from rft.effects import SkinFriction, Slope
 

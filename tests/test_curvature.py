@@ -11,7 +11,7 @@ from geomech import scene as scenes
 from geomech import symbolic
 from geomech.geometry import connection, curvature
 from geomech.study import fields
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.tiers import fitted
 from rft import se2
 

@@ -11,7 +11,7 @@ from geomech import scene as scenes
 from geomech.run import cost as run_cost
 from geomech.run import jobs
 from geomech.study import sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft.balance.backend import preferring
 from rft.balance.listening import listener, listening, nobody
 from rft.refusal import Refusal

@@ -10,8 +10,8 @@ import pytest
 from geomech import scene as scenes
 from geomech.optimise import checked
 from geomech.run.digest import Undigestible, digest
-from geomech.study.bench import Study
 from geomech.study.effort import _Driven
+from geomech.study.study import Study
 from geomech.systems.solver import Solver
 
 VISCOUS = scenes.load("three-link-viscous")

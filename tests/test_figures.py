@@ -25,8 +25,10 @@ from figures import (
 )
 from geomech.output import plots
 from geomech.scene import load
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import CATALOGUE, Granular
+
+pytestmark = pytest.mark.usefixtures("fastest")
 
 
 def test_fig05c():
@@ -186,7 +188,7 @@ def test_figures_load_nothing_when_imported():
 
 def test_optimal_gaits(tmp_path):
     """Sand's strokes reach further and bring more than the fluid's, and the cheap ones are shorter than the long."""
-    numbers = optimal_gaits.compute(harmonics=2, starts=1, grid=17, phases=64)
+    numbers = optimal_gaits.compute(harmonics=2, starts=1, grid=11, phases=32)
     fluid, sand = numbers.values()
     for aim in optimal_gaits.AIMS:
         assert optimal_gaits.reach(sand[aim].gait) > 1.05 * optimal_gaits.reach(fluid[aim].gait)

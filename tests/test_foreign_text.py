@@ -17,7 +17,7 @@ from geomech.output import display, mat
 from geomech.run import progress
 from geomech.scene import Numerics, Scene
 from geomech.study import fields, sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.text.explain import explain
 from rft import refusal as errors
 
@@ -197,11 +197,11 @@ def test_bars(monkeypatch):
             return super().add_task(title, **more)
 
     monkeypatch.setattr(rich.progress, "Progress", Bars)
-    with progress._on_terminal(progress.Course(f"{ESC} [red]a[/b].toml")):
+    with progress._on_terminal(progress.Computation(f"{ESC} [red]a[/b].toml")):
         (task,) = bars[0].tasks
         (row,) = (bars[0].columns[0].render(task),)
     assert row.plain == errors.printable(ESC) + " [red]a[/b].toml"
-    assert str(progress.Course(ESC)).startswith(errors.printable(ESC))
+    assert str(progress.Computation(ESC)).startswith(errors.printable(ESC))
 
 
 def test_messages_are_no_longer_than_may_be_read(geomech, tmp_path, monkeypatch):

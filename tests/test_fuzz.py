@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import scene as scenes
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 pytestmark = [pytest.mark.usefixtures("fastest"), pytest.mark.filterwarnings("ignore::geomech.core.errors.UnitWarning")]
 

@@ -14,8 +14,8 @@ import geomech.scene as scenes
 from geomech.output import plots
 from geomech.scene.intruder import IntruderScene
 from geomech.scene.stress import load_medium
-from geomech.study.bench import Study
 from geomech.study.intrusion import estimate
+from geomech.study.study import Study
 from rft.plates import VERTICAL, CLeg, Drag, Outline, Penetrate, PlateDrags, Rotate, StressMap, loads
 from rft.refusal import Refusal
 

@@ -28,8 +28,8 @@ from geomech.run.store import Store
 from geomech.run.workers import using
 from geomech.scene import inputs, kinds
 from geomech.study import accuracy, cost, estimate, tiered, walking
-from geomech.study.bench import Study
 from geomech.study.motion import Trajectory
+from geomech.study.study import Study
 from geomech.systems.capabilities import with_solver
 from rft import Backbone, DisturbedGround, Granular, Transient
 from rft import BodyInertia as Heavy
@@ -234,9 +234,9 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
         (field, 4),
         (numbers, 1),
     ):
-        whole, path = ask(), tmp_path / "p"
+        path = tmp_path / "p"
         with counted() as every, jobs.storing(path):
-            ask()
+            whole = ask()
         stopped(path, after, ask)
         again, computed = asked(path, ask)
         assert all(map(np.array_equal, again, whole)) and computed == len(every) - after > 0
@@ -284,7 +284,7 @@ def test_a_march_resumes_where_it_was(effects, tmp_path, monkeypatch):
     with steps() as every:
         whole = ask()
     monkeypatch.setattr(jobs, "CHECKPOINT", -1.0)
-    for after in (1, 20, len(every) - 3):
+    for after in (20, len(every) - 3):
         said = stopped(tmp_path / str(after), after, ask)
         assert (
             said == f"{after} results so far are kept in {tmp_path / str(after)}: the same command goes on from there"
@@ -359,12 +359,12 @@ def test_a_walk_resumes_where_it_was(engine, tmp_path):
     with counted() as every, jobs.storing(tmp_path / "p"):
         whole = ask()
     assert len(every) > 2
-    for after in (1, len(every) - 1):
-        assert stopped(tmp_path / "p", after, ask).startswith(f"{after} results so far are kept")
-        found, strides = asked(tmp_path / "p", ask)
-        assert strides == len(every) - after and found[1:] == whole[1:]
-        for a, b in zip(found.walk[:6], whole.walk[:6], strict=True):
-            np.testing.assert_array_equal(a, b)
+    after = len(every) // 2
+    assert stopped(tmp_path / "p", after, ask).startswith(f"{after} results so far are kept")
+    found, strides = asked(tmp_path / "p", ask)
+    assert strides == len(every) - after and found[1:] == whole[1:]
+    for a, b in zip(found.walk[:6], whole.walk[:6], strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_gaits_are_kept_group_by_group(tmp_path, monkeypatch):

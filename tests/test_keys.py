@@ -41,22 +41,22 @@ EVERY = {  # section and name of every class that a scene may name, by kind of s
 ROOT = pathlib.Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("name", EVERY)
-def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning(name):
+def test_every_key_of_every_class_has_a_type_a_unit_and_a_meaning():
     """In the annotation or the docstring of a class: "name (unit): meaning." for each of its fields, - for no unit."""
-    _, variant = EVERY[name]
-    fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
-    if not variant.file:
-        assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
-    for key in keys_in(variant):
-        place = (
-            f"{variant.kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
-        )
-        assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
-        assert 0 < len(key.unit) < 25, place
-        assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
-        assert worded(key.schema) != "value", f"{variant.kind.__name__}.{key.name}: of a type that no scene file has"
-        assert key.degrees == (key.unit == "rad")
+    for _, variant in EVERY.values():
+        fields = [aliases(variant.kind).get(f.name, f.name) for f in dataclasses.fields(variant.kind) if f.init]
+        if not variant.file:
+            assert [key.name for key in keys_in(variant)] == [x for x in fields if x not in ("solver", *variant.inner)]
+    for _, variant in EVERY.values():
+        for key in keys_in(variant):
+            place = f"{variant.kind.__name__}.{key.name}: say in the docstring of the class what it is, as name (unit): meaning"
+            assert re.search(r"[a-z]{2}|\|z\|", key.meaning), place
+            assert 0 < len(key.unit) < 25, place
+            assert len(key.meaning) < 500, f"{place}, and end the paragraph there"
+            assert worded(key.schema) != "value", (
+                f"{variant.kind.__name__}.{key.name}: of a type that no scene file has"
+            )
+            assert key.degrees == (key.unit == "rad")
 
 
 def test_keys_are_told_as_they_are():
@@ -94,16 +94,21 @@ def test_keys_are_told_as_they_are():
     assert keys["third"].degrees
 
 
-def test_the_command_prints_them_all_or_a_section():
-    code, out, err = geomech("keys")
-    assert (code, err) == (0, "")
+@pytest.fixture(scope="module")
+def printed():
+    """What the command prints of each section; of "" of all."""
+    ended = {section: geomech(*["keys", section][: 1 + bool(section)]) for section in ("", *sections())}
+    assert {(code, err) for code, _, err in ended.values()} == {(0, "")}
+    return {section: out for section, (_, out, _) in ended.items()}
+
+
+def test_the_command_prints_them_all_or_a_section(printed):
     for table, variant in EVERY.values():
-        assert variant.implied or (variant.label or f"[{table}]") in out
-        for key in keys_in(variant):
-            assert re.search(rf"^  {key.name} +{worded(key.schema)} +{re.escape(key.unit)} ", out, re.M), key.name
-    assert max(map(len, out.splitlines())) <= 120
-    assert [geomech("keys", table)[0] for table in TABLES] == [0] * len(TABLES)
-    body = geomech("keys", "body")[1]
+        assert variant.implied or (variant.label or f"[{table}]") in printed[""]
+        assert [key.name for key in keys_in(variant) if f"\n  {key.name} " not in printed[""]] == []
+    assert max(map(len, printed[""].splitlines())) <= 120
+    assert {*TABLES} <= {*printed}
+    body = printed["body"]
     assert "[body]" in body and "[gait]" not in body
     assert re.search(r'^  frame +text +-  "mean" ', body, re.M)
     by_name = "[medium]\nBy name, with no key beside it.\n  name  text  -  required  a medium of the catalogue: glass-"
@@ -306,12 +311,11 @@ def test_the_schema_agrees_with_the_reader_of_meshes(medium, intruder, motion, m
     test_the_schema_agrees_with_the_reader_of_intruders(medium, intruder, motion, more, good, valid)
 
 
-def test_keys_of_all_scenes_are_told():
+def test_keys_of_all_scenes_are_told(printed):
     """Each with a type, a unit and a meaning, in the section that it has in a scene file."""
-    whole = geomech("keys")[1]
+    whole = printed[""]
     for section, parts in sections().items():
-        code, out, err = geomech("keys", section)
-        assert (code, err) == (0, "")
+        out = printed[section]
         for part in parts:
             assert part.title in out and part.title in whole
             block = out.partition(f"{part.title}\n{part.about[:20]}")[2].partition("\n\n")[0]
@@ -324,12 +328,12 @@ def test_keys_of_all_scenes_are_told():
                 )
     assert re.search(r"\n  tilt +number +rad +0.0 +beta, 0 lying flat; in degrees as tilt_deg", whole)
     assert re.search(r"\n  B-11 +number +N/cm\^3 +none +coefficient of a sine of alpha_z", whole)
-    assert re.search(r"\n  elements +whole number +- +100 ", geomech("keys", "numerics")[1])
-    assert re.search(r"\n  triangles +whole number +- +5000 ", geomech("keys", "numerics")[1])
-    of_mesh = geomech("keys", "motion")[1].partition('[motion] kind = "drag" of a mesh\n')[2]
+    assert re.search(r"\n  elements +whole number +- +100 ", printed["numerics"])
+    assert re.search(r"\n  triangles +whole number +- +5000 ", printed["numerics"])
+    of_mesh = printed["motion"].partition('[motion] kind = "drag" of a mesh\n')[2]
     assert re.search(r"^  heading +number +rad +0.0 ", of_mesh.partition("\n\n")[0], re.M)
     assert re.search(r"\n  internal_friction +number +- +none +mu, tan of the angle of repose", whole)
-    assert '[[effects]] kind = "aeration" of an intruder scene\n' in geomech("keys", "effects")[1]
+    assert '[[effects]] kind = "aeration" of an intruder scene\n' in printed["effects"]
 
 
 LEG, BOX = 'kind = "flat-leg"\nradius = 0.02\nwidth = 0.01', "length = 0.1\nheight = 0.03\nwidth = 0.05\nhips = [0.0]"
@@ -403,15 +407,15 @@ def test_the_schema_agrees_with_the_reader_of_mjcf_robots(old, new, good, valid,
             parse(scene)
 
 
-def test_keys_of_robots_are_told():
-    robots = geomech("keys", "robot")[1]
+def test_keys_of_robots_are_told(printed):
+    robots = printed["robot"]
     assert "[robot.screw]" in robots
     assert (
         re.search(r"\n  mass +number +kg +required +mass of all that the wheel carries", robots)
         and "[robot.legs]" in robots
     )
     assert re.search(r"\n  hips +list of numbers +m +required +x of each", robots)
-    assert re.search(r"\n  sweep +number +rad +3.14\d* +angle by which.*sweep_deg", geomech("keys", "gait")[1])
+    assert re.search(r"\n  sweep +number +rad +3.14\d* +angle by which.*sweep_deg", printed["gait"])
 
 
 def test_systems_and_sizes_given_once_are_valid(valid):

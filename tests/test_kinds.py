@@ -25,7 +25,7 @@ from geomech.scene.keys import text
 from geomech.scene.kinds import load_file, register
 from geomech.scene.schema import schema
 from geomech.study import estimate
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import Premise, Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.text.system import notes
@@ -96,7 +96,7 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
 def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
     exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
-    finer = bare.turned(loads="gauss:96")  # leaves a quarter
+    finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
         ours, theirs, better = (x.displacement(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
@@ -104,7 +104,7 @@ def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
         assert estimate.distance(ours, better).max() <= max(off / 2, 1e-9)
     poses, errors = estimate.direct(bare.scene, gait, amplitudes, 128)
     truth = estimate.direct(exact.scene, gait, amplitudes, 1024)[0]
-    assert (estimate.apart(poses, truth, 1.0) <= errors + 1e-9).all()
+    assert (estimate.pose_distance(poses, truth, 1.0) <= errors + 1e-9).all()
     assert exact.tiers == bare.tiers
 
 

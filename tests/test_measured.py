@@ -32,8 +32,8 @@ from geomech.measured import cycles, phase, regression, results, smooth, synthet
 from geomech.output import mat
 from geomech.scene import Scene, load
 from geomech.study import fields
-from geomech.study.bench import Study
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
 from geomech.text import measured as told
@@ -146,7 +146,7 @@ def wandering(velocity, gait, cycles=60, samples=60, spread=0.05, noise=1e-3, se
     way = summed(np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1]))
     pose = np.stack([way.real, way.imag, heading[::2]], -1)[:: finer // 2]
     noisy = lambda x: x + noise * rng.normal(size=x.shape)
-    return log_of(synthetic.Made(t[::finer], noisy(alpha[::finer]), noisy(pose), phase[::finer]))
+    return log_of(synthetic.SyntheticLog(t[::finer], noisy(alpha[::finer]), noisy(pose), phase[::finer]))
 
 
 def covered_at_all_phases(log, velocity, **fit):
@@ -730,7 +730,7 @@ def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous,
     pose = synthetic._integrated(viscous(alpha, alphadot), t[1])[::4]
     noise = 1e-3 * rng.normal(size=(len(pose), 5))
     f = measured.fit_log(
-        log_of(synthetic.Made(t[::4], alpha[::4] + noise[:, :2], pose + noise[:, 2:], t[::4])), harmonics=4
+        log_of(synthetic.SyntheticLog(t[::4], alpha[::4] + noise[:, :2], pose + noise[:, 2:], t[::4])), harmonics=4
     )
     net, off = f.displacement
     assert not f.across and (np.abs(net - true_net(f, viscous)) <= off).all() and off.max() < 4e-3
@@ -818,7 +818,7 @@ BAD = {
     "kilometres": (changed(slice(3, 5), lambda x: 1e12 * x), "entries of A come out as large as .*: give x and y in body"),
     "constant": (changed(2, lambda x: 0 * x + 0.4), "alpha_2 does not move"),
     "at rest": (changed(slice(3, 6), lambda x: 0 * x), "x, y and heading do not move"),
-    "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y: mend that row, or drop it"),
+    "nan": (changed(4, lambda x: x * np.nan, 77), "line 79: a row must be .*, column y, got .*: mend that row, or drop it"),
     "eight": (lambda r: r[: 8 * 30 + 15], r"the joints repeat 8\.. times: give at least 10 cycles"),
     "few": (lambda r: r[:150], r"the joints repeat 4\..* times: give at least 10 cycles"),
     "fewer": (lambda r: r[:90], "90 rows are too few"),
@@ -953,7 +953,7 @@ def test_a_table_as_r_writes_it(short, tmp_path):
 def test_rows_at_uneven_times_tell_the_same(viscous):
     made = synthetic.made(viscous, GAIT, cycles=40, samples=60, seed=1)
     keep = np.sort(np.random.default_rng(0).permutation(len(made.t))[: int(0.7 * len(made.t))])
-    f = measured.fit_log(log_of(synthetic.Made(*(x[keep] for x in made))), harmonics=5)
+    f = measured.fit_log(log_of(synthetic.SyntheticLog(*(x[keep] for x in made))), harmonics=5)
     assert (np.abs(f.displacement[0] - true_net(f, viscous)) <= f.displacement[1]).all()
 
 
@@ -969,7 +969,7 @@ def test_a_log_of_trajectory_is_read(field, tmp_path, monkeypatch):
 def test_the_command_tells_what_the_fit_does(usual, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log = usual.log
-    synthetic.save("log.csv", synthetic.Made(log.t, log.alpha, log.pose, log.t))
+    synthetic.save("log.csv", synthetic.SyntheticLog(log.t, log.alpha, log.pose, log.t))
     code, out, _ = command("fit", "log.csv", "-o", "field.nc", "--scene", "mine.toml", "--json")
     assert code == 0
     found = json.loads(out)

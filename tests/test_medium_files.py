@@ -9,7 +9,7 @@ import pytest
 from commands import geomech
 
 from geomech import scene
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.study.sweep import sweep
 from rft import Chain, Granular, Table, body_velocity
 from rft.laws.base import require_drag

@@ -8,6 +8,7 @@ from geomech.geometry import connection, metric
 from geomech.systems import Swimmer
 from rft import Chain, Granular, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID, SAND, EQUAL = Viscous(2.0), Granular(C=1.8, gamma0=np.radians(13.8)), Chain()
 
 

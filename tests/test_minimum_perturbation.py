@@ -11,7 +11,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import connection, coordinates, curvature
 from geomech.geometry.field import Field
 from geomech.geometry.minimum_perturbation import Basis, minimum_perturbation
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.tiers.area import area
 from geomech.tiers.direct import direct
@@ -19,6 +19,7 @@ from geomech.tiers.path import path
 from rft import Chain, ConstantCurvature, Granular, Serpenoid, Viscous, se2
 from rft.refusal import Refusal
 
+pytestmark = pytest.mark.usefixtures("fastest")
 FLUID = Viscous(2.0)
 
 

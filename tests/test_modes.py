@@ -15,12 +15,13 @@ from geomech.geometry.coordinates import change_velocity
 from geomech.output import mat
 from geomech.scene import Scene
 from geomech.study import fields, sweep
-from geomech.study.bench import Study
-from geomech.study.offer import tiers
+from geomech.study.available import tiers
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
+pytestmark = pytest.mark.usefixtures("fastest")
 LENGTHS, FRAME = (0.8, 1.3, 1.0, 0.7), "link-2"
 ROWS = ((1.4, 0.3, -0.5), (-0.2, 0.9, 2.1))
 MODES = Chain(LENGTHS, 0.3, FRAME, modes=ROWS)

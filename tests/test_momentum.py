@@ -10,7 +10,7 @@ from geomech.gaits import Circle, Ellipse
 from geomech.geometry import coordinates, metric
 from geomech.scene import Scene
 from geomech.study import motion as moving
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.systems.framed import in_frame

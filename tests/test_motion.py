@@ -17,7 +17,7 @@ from geomech.geometry import reconstruct
 from geomech.output import animate, plots, trajectories
 from geomech.scene import Numerics, Scene
 from geomech.study import motion as moving
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Solver, Swimmer
 from geomech.systems.capabilities import solver_of
 from rft import (

@@ -13,13 +13,13 @@ from geomech.geometry.traits import Traits
 from geomech.optimise import checked, optimise
 from geomech.optimise import loops as series
 from geomech.optimise.aims import Aim
-from geomech.optimise.cycles import Phases, Runs, brought
-from geomech.optimise.keeping import Keeping
+from geomech.optimise.constraints import Constraints
+from geomech.optimise.cycles import Phases, Runs, cycle_values
 from geomech.optimise.loops import Loops
 from geomech.optimise.stroke import Stroke
 from geomech.scene import Scene, parse
 from geomech.study import fields
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.capabilities import OwnMetric, capability
 from geomech.text import optimum as optima
@@ -58,7 +58,7 @@ def some_loop(seed=0, joints=2, harmonics=3, phases=32):
 
 @pytest.mark.parametrize(("joints", "medium"), [(2, FLUID), (3, FLUID), (2, Granular(C=0.5, gamma0=0.6))])
 def test_slopes_of_a_cycle_are_those_of_differences_of_whole_gaits(joints, medium):
-    """Every number that `Brought` has, for an odd body off the centre."""
+    """Every number that `CycleValues` has, for an odd body off the centre."""
     system = Swimmer(medium, ODD if joints == 2 else Chain((0.7, 1.4, 0.9, 0.5), frame="link-2"))
     loops, p = some_loop(joints=joints)
     degree = 2.0 if medium is FLUID else 1.0
@@ -332,7 +332,7 @@ def test_starts_go_along_the_limits_where_many_a_loop_is_the_best_near_by():
     assert asked.loops.active(rim) == ["alpha_1 >= -2.5", "alpha_1 <= 1", "alpha_2 >= -2.5", "alpha_2 <= 2.5"]
     for p in (rim, *others):
         assert Stroke.is_one(asked.loops, p)
-        low, high = asked.loops.reach(p)
+        low, high = asked.loops.extremes(p)
         assert (low >= asked.loops.box[0]).all() and (high <= asked.loops.box[1]).all()
 
 
@@ -387,7 +387,7 @@ def test_three_joints_and_gaits_that_must_be_run_as_a_whole():
 
     past = Scene(Swimmer(SAND, Chain(), (Transient(travel=0.1),)), Circle(amplitude=0.8), Numerics(phases=64))
     assert checked(past, "efficiency").degree == 1.0
-    assert checked(past, "displacement").whole
+    assert checked(past, "displacement").by_runs
 
 
 def test_singular_shapes_are_kept_away_from():
@@ -470,7 +470,7 @@ def test_a_cycle_without_slopes_is_that_with():
     system, (loops, p) = Swimmer(FLUID, ODD), some_loop()
     run = system.run(*loops.cycle(p), True)
     b = Phases(loops, system.velocity, lambda *a: system.work(*a).power, 2.0)(p)
-    net, swing, length, power, _ = brought(run, run.work.power, 2.0)
+    net, swing, length, power, _ = cycle_values(run, run.work.power, 2.0)
     assert (swing, length, power) == pytest.approx((b.swing[0], b.length[0], b.power[0]))
     assert net == pytest.approx(b.net[0])
 
@@ -599,8 +599,8 @@ def test_limits_of_each_joint_and_side():
     assert "alpha_1 >= -0.5" in found.active
     assert found.value > found.start.value
     loops = Loops(2, 2, box)
-    assert all((loops.reach(p)[0] >= loops.box[0]).all() for p in loops.starts(loops.of(Circle()), 5))
-    assert all((loops.reach(p)[1] <= loops.box[1]).all() for p in loops.starts(loops.of(Circle()), 5))
+    assert all((loops.extremes(p)[0] >= loops.box[0]).all() for p in loops.starts(loops.of(Circle()), 5))
+    assert all((loops.extremes(p)[1] <= loops.box[1]).all() for p in loops.starts(loops.of(Circle()), 5))
     p = loops.of(Circle(amplitude=0.4, centre=(0.8, 0.0)))
     A, b = loops.limits()
     assert (A @ p.ravel() <= b).all()
@@ -694,7 +694,7 @@ def test_all_starts_keep_off_singular_shapes():
 
 def test_a_loop_that_cannot_be_run_ends_no_search():
     """A velocity that fails beyond 1.1 rad: the best is at its edge."""
-    from geomech.optimise.climb import climb
+    from geomech.optimise.ascent import ascend
 
     system = Swimmer(FLUID, Chain())
 
@@ -704,7 +704,7 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
     loops = Loops(2, 2, 2.5, 32)
     cycles, aim = Phases(loops, velocity), Aim("displacement")
     first = loops.of(Circle(amplitude=0.5))
-    p = climb(cycles, aim, first, most=40)
+    p = ascend(cycles, aim, first, most=40)
     assert np.abs(loops.cycle(p)[0]).max() <= 1.1
     assert aim.value(cycles(p))[0] > 1.5 * aim.value(cycles(first))[0]
 
@@ -726,10 +726,10 @@ def test_other_starts_are_made_one_stroke():
     twice = np.zeros(loops.shape)
     twice[3], twice[4], twice[1], twice[2] = (1.0, 0.0), (0.0, 1.0), (0.4, 0.0), (0.0, 0.4)
     for own, one in ((first, True), (twice, False)):
-        keeping = Keeping(loops, None, own)
-        assert keeping.stroke is one
-        assert Stroke.is_one(loops, keeping.start(twice)) is one
-        assert np.array_equal(keeping.start(first), first)
+        constraints = Constraints(loops, None, own)
+        assert constraints.stroke is one
+        assert Stroke.is_one(loops, constraints.feasible(twice)) is one
+        assert np.array_equal(constraints.feasible(first), first)
 
 
 def test_loops_on_maps_of_all_kinds(stroke):

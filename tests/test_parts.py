@@ -18,8 +18,8 @@ from geomech.io import tables
 from geomech.optimise import optimise
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, kinds, parse
-from geomech.study.bench import Study
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems.base import Cycle, integrated
 from geomech.text.explain import explain
 from rft.refusal import Refusal

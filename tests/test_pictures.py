@@ -13,7 +13,7 @@ from geomech.geometry.field import Field
 from geomech.output import plots
 from geomech.output.plots.precision import KNOBS as PRECISION
 from geomech.output.plots.precision import PANELS
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.study.tiered import KNOBS
 from geomech.systems.base import shape_labels
 from geomech.tiers import TIERS

@@ -10,8 +10,8 @@ import pytest
 from geomech import scene as scenes
 from geomech import terminal
 from geomech.run import progress
-from geomech.run.progress import EVERY, Course
-from geomech.study.bench import Study
+from geomech.run.progress import EVERY, Computation
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 
 VISCOUS = scenes.load("three-link-viscous").with_numerics(grid=5)
@@ -41,7 +41,7 @@ def test_what_is_quick_says_nothing(capsys):
 def test_the_time_to_go(monkeypatch):
     clock = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: clock[0])
-    course = Course("field of x")
+    course = Computation("field of x")
     clock[0] += 20.0
     course.reached(0.25)
     assert str(course) == "field of x: 25 % after 20 s, about 60 s to go"
@@ -51,7 +51,7 @@ def test_the_time_to_go(monkeypatch):
 
 def test_a_part_has_its_own_title(monkeypatch):
     seen = []
-    monkeypatch.setattr(Course, "reached", lambda course, f: seen.append((course.title, f)))
+    monkeypatch.setattr(Computation, "reached", lambda course, f: seen.append((course.title, f)))
     with terminal.progress("displacement") as reached:
         with progress.progress("table") as inner:
             inner(0.5)

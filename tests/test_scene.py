@@ -9,7 +9,7 @@ import pytest
 
 import rft
 from geomech import scene as scenes
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems.base import length_unit
 from rft import Chain, Granular, Viscous
 from rft.refusal import Refusal

@@ -20,12 +20,13 @@ from geomech.io.results import write_netcdf
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, load
 from geomech.study import fields, sweep, tables
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.results import Displacements
+from geomech.study.study import Study
 from geomech.systems import NoSlipSnake, Swimmer
 from rft.laws import CATALOGUE
 
+pytestmark = pytest.mark.usefixtures("fastest")
 GAIT = Ellipse(semi_axes=(0.8, 0.5), tilt=0.4, centre=(0.3, -0.2))
 UNEVEN = rft.Chain((0.7, 1.4, 0.9), frame="link-1", length=0.3)
 PNG = b"\x89PNG\r\n"
@@ -193,10 +194,10 @@ def law_of_units(values, units, plain, length, key=""):
     np.testing.assert_allclose(values, np.array(plain) * (times if len(times) > 1 else times[0]), tolerance, 1e-13)
 
 
-@pytest.mark.parametrize("length", [0.42, 7.5])
-def test_what_leaves_the_library_has_one_unit_and_says_it(length):
+def test_what_leaves_the_library_has_one_unit_and_says_it():
     """Of a body of another length than 1: every number of a table, of a sweep and of their data sets is in the unit that is
     told beside it, and these units are one, but for speeds in body lengths; so are pictures and what a notebook shows."""
+    length = 7.5
     (one, plain), (made, table) = of_length(1.0), of_length(length)
     units, no_units = table["units"], {"units", "seconds", "kept", "medium_error_rule", "area", "path", "direct"}
     lengths = {u for u in units.values() if "m" in u.split("/")[0].split() or "BL" in u}

@@ -13,8 +13,8 @@ from registry import GAITS
 from geomech import scene as scenes
 from geomech.gaits import Circle
 from geomech.study import report, sweep, undulation
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 from geomech.text import displacement
 from rft import BodyInertia, GrainInertia

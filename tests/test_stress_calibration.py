@@ -13,7 +13,7 @@ from geomech.io import rows
 from geomech.scene import penetration
 from geomech.study import stress_calibration
 from rft.plates import VERTICAL, StressMap, calibrate
-from rft.plates.calibrate import COEFFICIENTS, GENERIC, SLIPS, SPREAD, fit_stress, fit_zeta
+from rft.plates.calibrate import COEFFICIENTS, GENERIC, MISTAKES, SPREAD, fit_stress, fit_zeta
 from rft.plates.survey import survey
 
 RAD = np.pi / 180
@@ -164,7 +164,7 @@ def test_slips_of_columns_and_signs_are_named(slip, said):
         with pytest.raises(ValueError, match="like those of no grains") as caught:
             fit_stress(*slip(*noisy(stress, rng, 0.01, GRID)))
         assert said in str(caught.value)
-    assert len(SLIPPED) == len(SLIPS)
+    assert len(SLIPPED) == len(MISTAKES)
 
 
 def test_no_medium_is_taken_for_a_slip():

@@ -7,7 +7,7 @@ from commands import geomech
 
 from geomech import scene as scenes
 from geomech.study import cycles, estimate, sweep
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import CATALOGUE, Granular
 from rft.refusal import Refusal
 

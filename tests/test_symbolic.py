@@ -10,7 +10,7 @@ from geomech import scene as scenes
 from geomech import symbolic
 from geomech.gaits import Circle
 from geomech.scene import Scene
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.symbolic import connections
 from geomech.systems import DifferentialDrive, FloatingChain, IdealFluidSwimmer, NoSlipSnake, Swimmer
 from geomech.systems.framed import formula

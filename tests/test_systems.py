@@ -16,8 +16,8 @@ from geomech.geometry.connection import sign_changes
 from geomech.geometry.traits import Traits
 from geomech.scene import Scene
 from geomech.study import cost, estimate, fields
-from geomech.study.bench import Study
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
 from geomech.systems.capabilities import stored_table
@@ -147,7 +147,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
     with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
-        study.turned(regularisation=1e-3)
+        study.with_numerics(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 

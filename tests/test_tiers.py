@@ -12,8 +12,8 @@ from geomech.geometry import connection, family, harmonics
 from geomech.output import plots
 from geomech.scene import Numerics, Scene
 from geomech.study import estimate
-from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
+from geomech.study.study import METHODS, Study
 from geomech.systems import Swimmer
 from geomech.tiers import TIERS, Plan, Tier, fitted
 from geomech.tiers.direct import direct
@@ -193,7 +193,7 @@ def test_direct_estimates_cover_the_truth(truths):
         poses, error = estimate.direct(coarse, some.gait, a, min(2 ** rng.integers(5, 9), 128))
         estimates.append(error)
         true = truths("estimates", exact, some.system.medium, some.system.body, some.gait, a, 1e-9)
-        errors.append(estimate.apart(poses, true, some.system.body.length))
+        errors.append(estimate.pose_distance(poses, true, some.system.body.length))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -226,7 +226,7 @@ def test_estimates_between_two_rules_cover_exact_integrals(lengths, C, gamma0, a
         Scene(Swimmer(law(C, gamma0), Chain(lengths, frame=frame)), gait) for law in (TractionAlone, Granular)
     )
     (poses, error), (true, _) = (estimate.direct(s, gait, a, 128) for s in (own, exact_))
-    off = estimate.apart(poses, true, 1.0)
+    off = estimate.pose_distance(poses, true, 1.0)
     assert (off <= error).all()
     assert (error < 12 * off.max()).all()
 
@@ -262,7 +262,7 @@ def test_look_up_estimates_cover_the_truth(truths):
         table = Study(some).study(a, [m for m in METHODS if m != "direct"])
         for method, error in table["estimate"].items():
             estimates.append(np.stack([error, table["estimate_heading"][method]], -1))
-            errors.append(estimate.apart(np.array(table[method]), true, 1.0))
+            errors.append(estimate.pose_distance(np.array(table[method]), true, 1.0))
     coverage, excess = judged(estimates, errors)
     assert (coverage >= 0.95).all()
     assert (excess <= 10).all()
@@ -301,7 +301,7 @@ def test_the_cheapest_tier_meets_the_tolerance(tol, every, truths):
     (told,) = answer["estimate"].values()
     assert [*answer["estimate"]] == [answer["tier"]] and max(told) <= tol
     true = truths("tiers", exact, GLASS.system.medium, GLASS.system.body, GLASS.gait, MANY)[::every]
-    off = estimate.apart(np.array(answer[answer["tier"]]), true, 1.0)
+    off = estimate.pose_distance(np.array(answer[answer["tier"]]), true, 1.0)
     assert off[:, 0].max() <= tol
     assert (off[:, 1] <= answer["estimate_heading"][answer["tier"]]).all()
     assert (answer["tier"] == "direct") or (every == 2 and tol >= 1e-3)
@@ -325,7 +325,7 @@ def test_what_the_solver_left_counts_in_the_estimate():
         poses, error = estimate.direct(lazy, lazy.gait, a, 64)
         assert left.min() > 10 * tight.max()
         assert (error >= left).all()
-        off = estimate.apart(poses, Study(sized).displacement("direct", None, a), length)
+        off = estimate.pose_distance(poses, Study(sized).displacement("direct", None, a), length)
         assert (error >= off).all()
         np.testing.assert_allclose(error[:, :1], left, rtol=0.9)
 

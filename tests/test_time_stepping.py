@@ -10,9 +10,9 @@ from geomech.gaits import Butterfly, Circle, Ellipse, Sine
 from geomech.geometry.reconstruct import displacement
 from geomech.scene import Scene
 from geomech.study import estimate, tiered, undulation
-from geomech.study.batch import beside
-from geomech.study.bench import Study
+from geomech.study.batch import side_by_side
 from geomech.study.choose import cheapest
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,
@@ -166,7 +166,7 @@ def test_transients_slow_the_sandfish():
     wave = SANDFISH.gait.amplitude * float(SANDFISH.gait.wavelength())
     effects = [Transient(travel=share * wave) for share in (0.0, 0.1, 0.2, 0.4, 0.65)]
     slowed = [SANDFISH.changed(effects=(effect,)) for effect in effects]
-    net = np.hypot(*beside(slowed).cycle(phases=64).net.T[:2])
+    net = np.hypot(*side_by_side(slowed).cycle(phases=64).net.T[:2])
     lost = 1 - net / net[0]
     assert (np.diff(lost) > 0).all()
     assert lost[2] == pytest.approx(0.098, abs=0.003)
@@ -261,7 +261,6 @@ HARD = {
 }
 
 
-@pytest.mark.usefixtures("solved_by")
 @pytest.mark.parametrize("case", HARD)
 @pytest.mark.parametrize("medium", ["glass-0.3mm-loose", "sharp", "strong"])
 def test_hard_marches_converge(case, medium):
@@ -324,7 +323,7 @@ def test_estimates_of_marches_cover_the_truth(truths):
         a = np.array([0.12, 0.22, 0.35])
         found, error = estimate.direct(scene, scene.gait, a, 64)
         truth = truths("marches", periodic, (effect,), scene.gait, Backbone(30), 256, a)
-        off = estimate.apart(found, truth, scene.system.body.length)
+        off = estimate.pose_distance(found, truth, scene.system.body.length)
         assert (off <= error).all(), type(effect)
         assert (error[:, 0] <= 100 * off[:, 0] + 1e-4).all(), type(effect)
         assert error[:, 1].max() <= 100 * off[:, 1].max() + 1e-4, type(effect)  # one heading may be right by chance
@@ -356,7 +355,7 @@ def errors_over_estimates(scene, pieces, phases, finer, truths):
     scene = scene.with_numerics(pieces=pieces, tolerance=1e-9, cycles=2)
     found, error = estimate.direct(scene, scene.gait, a, phases)
     fine = scene.system.medium, scene.system.body, scene.gait, scene.system.effects, finer * pieces, finer * phases, a
-    return estimate.apart(found, truths("pieces", second_cycle, *fine), 1.0) / (error + 1e-9)
+    return estimate.pose_distance(found, truths("pieces", second_cycle, *fine), 1.0) / (error + 1e-9)
 
 
 @pytest.mark.parametrize(("kind", "seeds"), [("depth", range(10)), ("transient", [0])])

@@ -16,9 +16,9 @@ from geomech.geometry import connection, curvature, family, harmonics, reconstru
 from geomech.geometry.field import Field
 from geomech.scene import IntruderScene, MeshScene, Numerics, Scene, WalkerScene, kinds
 from geomech.study import accuracy, sweep, undulation
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
 from geomech.study.single import single
+from geomech.study.study import Study
 from geomech.systems import Solver, Swimmer
 from geomech.text.explain import explain
 from geomech.tiers.area import area
@@ -64,7 +64,6 @@ PARTS = {
     "Walker": Walker(RHEX, Tripod(2.0), STRESSES["generic"]),
     "WalkerScene": WalkerScene(STRESSES["generic"], RHEX, Tripod(2.0)),
 }  # fmt: skip
-FIELDS = [(name, f.name) for name, part in PARTS.items() for f in dataclasses.fields(part)]
 RIGHT = {  # what looks wrong and is not
     ("Rhex", "inertia", "None"), ("Rhex", "aside", "None"), ("Fineness", "engine", "None"),
     ("harmonics", "None"),
@@ -81,16 +80,17 @@ RIGHT = {  # what looks wrong and is not
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("kind", "field"), FIELDS)
-def test_no_constructor_takes_a_wrong_type(kind, field):
-    for wrong, value in WRONG.items():
+@pytest.mark.parametrize("kind", PARTS)
+def test_no_constructor_takes_a_wrong_type(kind):
+    names = [f.name for f in dataclasses.fields(PARTS[kind])]
+    for field, (wrong, value) in itertools.product(names, WRONG.items()):
         if (field, wrong) in RIGHT or (kind, field, wrong) in RIGHT:
             dataclasses.replace(PARTS[kind], **{field: value})
             continue
         with pytest.raises(ValueError, match=".") as caught:
             dataclasses.replace(PARTS[kind], **{field: value})
-        assert "\n" not in str(caught.value), wrong
-        assert len(str(caught.value)) < 450, wrong
+        assert "\n" not in str(caught.value), (field, wrong)
+        assert len(str(caught.value)) < 450, (field, wrong)
 
 
 def test_every_public_class_is_in_the_table():

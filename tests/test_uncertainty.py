@@ -14,8 +14,8 @@ from geomech.io.results import write_netcdf
 from geomech.output import plots
 from geomech.scene import Scene
 from geomech.study import sweep, uncertainty
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.study.study import Study
 from geomech.study.tables import QUANTITIES, of_pose
 from geomech.systems import Swimmer
 from geomech.text import displacement

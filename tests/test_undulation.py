@@ -14,7 +14,7 @@ from geomech.gaits import Circle, Sine, Wave
 from geomech.geometry.reconstruct import displacement
 from geomech.scene import Scene
 from geomech.study import undulation
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 from rft import (
     CATALOGUE,

@@ -282,7 +282,7 @@ def test_what_is_told_of_a_walk():
     arc = np.stack([0.25 * np.sin(0.1 * t) / 0.1, pose[:, 1], 0 * t], -1)
     more = {"y": y, "roll": zero, "yaw": 0.1 * t}
     turns = one._replace(
-        walk=one.walk._replace(pose=arc, spatial=more, yaw_rate=0.1, lateral_speed=-0.02), turning=0.01, aside=0.003
+        walk=one.walk._replace(pose=arc, spatial=more, yaw_rate=0.1, lateral_speed=-0.02), turning=0.01, lateral=0.003
     )
     said, found = told_of(XPLORER, turns)
     assert "\nturning at 5.7 +- 0.6 degrees/s, drifting aside at -0.02 +- 0.003 m/s (positive: to the left" in said
@@ -443,7 +443,7 @@ def test_an_estimate_that_is_small_by_chance_is_not_taken(monkeypatch):
     numerics = dataclasses.replace(XPLORER.numerics, steps=32, elements=12)
     (one,) = walking.walked([dataclasses.replace(XPLORER, numerics=numerics)])
     change = 0.3 + walking.TO_COME * 0.02
-    assert (one.estimate, one.aside, one.turning) == pytest.approx((0.001 + change, 2 * change, 3 * change))
+    assert (one.estimate, one.lateral, one.turning) == pytest.approx((0.001 + change, 2 * change, 3 * change))
 
 
 def test_trends_of_figure_12():

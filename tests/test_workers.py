@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import geomech
 from tasks import always_dies, dies, doubled, fails, fails_oddly, meets, notes, waits, who
 
 from geomech import scene as scenes
@@ -27,7 +26,7 @@ from geomech.run.jobs import Runner, runner, running
 from geomech.run.workers import using
 from geomech.scene import kinds
 from geomech.study import accuracy, cycles, sweep, tiered
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from rft import threads as threaded
 from rft.balance import backend
 from rft.laws import LAWS
@@ -162,7 +161,7 @@ def status(pid):
 OVER = {"body.length": [1.0, 2.0, 3.0], "medium.C": [1.5, 2.5], "gait.amplitude": [0.4, 0.8, 1.2]}
 
 
-@pytest.mark.parametrize("at_once", [2, 5, 64])
+@pytest.mark.parametrize("at_once", [2, 64])
 def test_a_sweep_has_the_same_digits_whoever_computes(at_once, two, given_away, monkeypatch):
     monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", at_once)
     here, shared = both(two, lambda: sweep.sweep(GLASS, OVER), at_once < 64)
@@ -215,10 +214,9 @@ def test_error_studies_have_the_same_digits_whoever_computes(two, given_away, mo
     assert parts > 2 * len(few) and told == 2 * [(k + 1) / parts for k in range(parts)]
 
 
-@pytest.mark.parametrize(("name", "aim"), [("three-link-glass", "efficiency"), ("three-link-viscous", "displacement")])
-def test_searches_have_the_same_digits_whoever_computes(name, aim, two, given_away):
-    scene, told = scenes.load(name).with_numerics(grid=7, phases=32), []
-    request = checked(scene, aim, harmonics=1, starts=3)
+def test_searches_have_the_same_digits_whoever_computes(two, given_away):
+    scene, told = GLASS.with_numerics(grid=7), []
+    request = checked(scene, "efficiency", harmonics=1, starts=3)
     here, shared = both(two, lambda: search(request, told.append))
     assert here.numbers() | {"seconds": 0.0} == shared.numbers() | {"seconds": 0.0}
     assert here.best.gait == shared.best.gait and here.answers == shared.answers
@@ -260,14 +258,6 @@ def test_plugins_are_known_to_workers(power, two, given_away, monkeypatch):
     np.testing.assert_array_equal(shared["displacement"], here["displacement"])
 
 
-@pytest.mark.parametrize("word", ["0", "-1", "two", "1.5", "9999"])
-def test_numbers_of_workers_that_make_no_sense_are_refused(word, tmp_path):
-    args = ["three-link-viscous", "--over", "gait.amplitude=0.5,1", "-o", "s.nc", "--workers", word]
-    code, out, err = geomech("sweep", *args, cwd=tmp_path)
-    assert (code, out) == (2, "") and err.count("\n") == 1 and "--workers" in err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_processes_are_not_started_before_they_are_asked():
     with using(3):
         assert isinstance(runner().executor, executors.Processes) and runner().executor.pool is None
@@ -285,12 +275,12 @@ def test_a_signal_at_any_moment_leaves_nobody_waiting(monkeypatch):
     monkeypatch.setattr(executors, "SIGNALS", [signal.SIGALRM])
     before = signal.signal(signal.SIGALRM, ring)
     try:
-        for k in range(12):
+        for k in range(4):
             with contextlib.suppress(Rung), using(2):
                 executor = runner().executor
                 assert each(executor, doubled, 2, range(3)) == [0, 2, 4]
                 pool = executor.pool
-                signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 7 * k % 50))
+                signal.setitimer(signal.ITIMER_REAL, 1e-3 * (1 + 13 * k))
                 each(executor, doubled, 2, itertools.count(), 10**9)
             begun = time.monotonic()
             pool._executor_manager_thread and pool._executor_manager_thread.join(5.0)

@@ -15,8 +15,8 @@ from geomech.geometry.traits import Traits
 from geomech.output import plots
 from geomech.scene import Numerics, Scene, from_tables, inputs, load, parse, tables, toml
 from geomech.study import accuracy, cost, undulation
-from geomech.study.bench import Study
 from geomech.study.choose import cheapest
+from geomech.study.study import Study
 from geomech.study.sweep import sweep
 from geomech.systems import NoSlipSnake, Swimmer
 from geomech.systems.base import integrated
@@ -79,7 +79,12 @@ def scenes() -> list[Any]:
     text: str = toml(scene.changed(gait=Circle(amplitude=0.3)))
     study: Study = geomech.Study(scene)
     net: Array = study.displacement("area", amplitudes=[0.5])
-    told = study.study([0.5, 1.0], ["direct"]), study.cost([0.5], ["direct"]), study.turned(phases=64), study.methods
+    told = (
+        study.study([0.5, 1.0], ["direct"]),
+        study.cost([0.5], ["direct"]),
+        study.with_numerics(phases=64),
+        study.methods,
+    )
     more = (
         study.fitted,
         study.curvature,

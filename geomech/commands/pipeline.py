@@ -137,7 +137,7 @@ def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iter
     from geomech.run.digest import digest
 
     context = jobs.context_of([x for x in inputs if x != Path(question.scene.name)])
-    path = store.in_cache(digest(context, question)) if output is None else store.beside(output)
+    path = store.in_cache(digest(context, question)) if output is None else store.partial_file(output)
     refuse_inputs([path] if path else [], inputs)
     with jobs.storing(path, context, output):
         yield

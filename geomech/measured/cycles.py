@@ -1,4 +1,4 @@
-"""The cycles of a log: its period, its phase, and whether they are those of one gait."""
+"""The cycles of a log: its period, its phase, and whether all are cycles of one gait."""
 
 from __future__ import annotations
 
@@ -10,68 +10,69 @@ from geomech.measured import phase
 from geomech.measured.log import Log, check_rows
 from geomech.measured.smooth import Smoothed
 
-FEWEST = 8  # whole cycles: fewer do not tell how they scatter
-ENOUGH = FEWEST + 2  # cycles of a log that surely has as many: half of one at each end is not taken
-ROWS = 12  # a cycle, at least
+FEWEST = 8  # full cycles: fewer do not show their scatter
+ENOUGH = FEWEST + 2  # cycles of a log for that many full ones: half a cycle at each end is not used
+ROWS = 12  # per cycle, at least
 GAP = 1 / 8  # of a cycle without a row, at most
-APART = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
+PERIOD_RATIO = 1.25  # ratio of the periods of the first and the last quarter of a log of two gaits
 TWO = 0.9  # of the spread of cycles of two gaits is that between them; 2/3 of normal ones, 3/4 of a steady drift
-AFTER = 0.8  # the same where all cycles of one come before those of the other
-LEAST_APART = 0.05  # of the gait's size, between the means of two gaits
-STEADY = 4  # times the scatter of a joint's cycles about it, that a drift is at least
+AFTER = 0.8  # the same share where all cycles of one gait come before those of the other
+LEAST_DISTANCE = 0.05  # of the gait's size, between the means of two gaits
+STEADY = 4  # least drift over the scatter of a joint's cycles about it
 SURELY = 1.5  # standard deviations of noise that may look like a motion
-THIN = 1e-3  # of its length, the width of a gait that encloses nothing
-SLIGHT = 0.01  # of a joint, that another must have in it to be named
-REFINED = 3  # times the phase is that of the nearest point of the mean gait
+THIN = 1e-3  # of its length: width of a gait that encloses no area
+SLIGHT = 0.01  # of a joint: smaller contributions of others are not named
+REFINED = 3  # iterations of the phase by the nearest point of the mean gait
 
 
 def period(log: Log) -> float:
-    """Of the joints, in units of t; Refusal, with the place, for too few or too thin cycles, gaps and two gaits."""
+    """Return the period of the joints, in units of t; Refusal, with the line, for too few or too sparse cycles, gaps
+    and two gaits."""
     t = np.linspace(log.t[0], log.t[-1], len(log.t))
     alpha = np.stack([np.interp(t, log.t, a) for a in log.alpha.T], -1)
-    found = phase.period_of(t, alpha)
+    repeat = phase.period_of(t, alpha)
     quarter = len(t) // 4
-    if found and 3 * found < t[quarter] - t[0]:
+    if repeat and 3 * repeat < t[quarter] - t[0]:
         first, last = (phase.period_of(t[k], alpha[k]) for k in (slice(0, quarter), slice(-quarter, None)))
-        if first and last and max(first, last) > APART * min(first, last):
+        if first and last and max(first, last) > PERIOD_RATIO * min(first, last):
             raise log.wrong(
                 f"the joints repeat every {first:.3g} in the first quarter of the log and every {last:.3g} in the last",
                 because="two gaits are in it, give each a file",
             )
-    count = (log.t[-1] - log.t[0]) / found if found else 0.0
+    count = (log.t[-1] - log.t[0]) / repeat if repeat else 0.0
     if count < FEWEST + 1:
-        said = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
-        raise log.wrong(said, instead=f"give at least {ENOUGH} cycles of one gait, some dozens are better")
-    if found * FASTEST < 1.0:
+        what = f"the joints repeat {count:.1f} times" if count else "the joints do not repeat"
+        raise log.wrong(what, instead=f"give at least {ENOUGH} cycles of one gait, some dozens are better")
+    if repeat * FASTEST < 1.0:
         raise log.wrong(
-            f"the joints repeat every {found:.3g} where t is in s", instead="give t in s, or in any longer unit"
+            f"the joints repeat every {repeat:.3g} where t is in s", instead="give t in s, or in any longer unit"
         )
     if (rows := len(log.t) / count) < ROWS:
         raise log.wrong(f"{rows:.1f} rows a cycle are too few", instead=f"give at least {ROWS}")
     gaps = np.diff(log.t)
     k = int(gaps.argmax())
-    if many := int((gaps > max(GAP * found, 2.5 * np.median(gaps))).sum()):
-        here = "its one gap" if many == 1 else f"the longest of {many} gaps"
+    if many := int((gaps > max(GAP * repeat, 2.5 * np.median(gaps))).sum()):
+        which = "its one gap" if many == 1 else f"the longest of {many} gaps"
         raise log.wrong(
-            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / found:.2g} of a cycle, {here}",
+            f"no rows for {gaps[k]:.3g} after this one (t = {log.t[k]:.6g}), {gaps[k] / repeat:.2g} of a cycle, {which}",
             k,
             instead=f"cut the log and give the longest part, or fill what is longer than {GAP:g} of a cycle",
         )
     check_rows(log)
-    return found
+    return repeat
 
 
 def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
-    """Refusal if a joint does nothing but noise, or if all joints are one: what goes to and fro on a line is no loop. rows:
-    a cycle."""
-    off, left = joints.values - joints.values.mean(0), _noise(joints, rows)
-    for name, size, noise in zip(log.joints, off.std(0), left):
+    """Refuse a joint that shows nothing but noise, and joints that are all proportional: motion to and fro on a line is
+    no loop. rows: per cycle."""
+    deviations, noise_sizes = joints.values - joints.values.mean(0), _noise(joints, rows)
+    for name, size, noise in zip(log.joints, deviations.std(0), noise_sizes):
         if size <= noise:
             raise log.wrong(f"{name} does not move beyond its noise", instead="leave it out with --columns")
-    _, size, ways = np.linalg.svd(off, full_matrices=False)
-    if size[1] > max(THIN * size[0], np.sqrt(len(off)) * left.max()):
+    _, size, axes = np.linalg.svd(deviations, full_matrices=False)
+    if size[1] > max(THIN * size[0], np.sqrt(len(deviations)) * noise_sizes.max()):
         return
-    first, last, slope = log.joints[0], log.joints[-1], ways[0, -1] / ways[0, 0]
+    first, last, slope = log.joints[0], log.joints[-1], axes[0, -1] / axes[0, 0]
     raise log.wrong(
         f"{last} is {slope:.3g} times {first}, but for a constant and noise",
         because=f"one shape variable recorded {len(log.joints)} times goes to and fro, and is no loop",
@@ -80,30 +81,35 @@ def check_a_loop(log: Log, joints: Smoothed, rows: float) -> None:
 
 
 def _noise(joints: Smoothed, rows: float) -> np.ndarray:
-    """(d,), rad: what noise may look like in splines through the joints. rows: a cycle."""
+    """Return the rms (d,), rad, that noise may have in splines through the joints. rows: per cycle."""
     return SURELY * joints.noise * np.sqrt(joints.knots / rows)
 
 
 def combined(joints: Smoothed, rows: float) -> dict[int, np.ndarray]:
-    """Joints that are linear combinations of others but for a constant and noise, and the factors (d,) of these, which come
-    before them and are none. rows: a cycle. A wave of one harmonic has no more than two that are none."""
-    off, noise = joints.values - joints.values.mean(0), _noise(joints, rows)
-    others, found = [0], {}
-    for k in range(1, off.shape[1]):
-        factors = np.zeros(off.shape[1])
-        factors[others] = np.linalg.lstsq(off[:, others], off[:, k], rcond=None)[0]
-        left = (off[:, k] - off @ factors).std()
-        if left <= max(THIN * off[:, k].std(), np.hypot(noise[k], np.linalg.norm(factors * noise))):
-            found[k] = factors * (np.abs(factors) * off.std(0) > SLIGHT * off[:, k].std())
+    """Return the joints that are linear combinations of others, up to a constant and noise, with the factors (d,) of
+    these others.
+
+    The others come before them and are not combined themselves. rows: per cycle. Joints of a wave of one harmonic have
+    at most two others."""
+    deviations, noise = joints.values - joints.values.mean(0), _noise(joints, rows)
+    others, factors_of = [0], {}
+    for k in range(1, deviations.shape[1]):
+        factors = np.zeros(deviations.shape[1])
+        factors[others] = np.linalg.lstsq(deviations[:, others], deviations[:, k], rcond=None)[0]
+        residual = (deviations[:, k] - deviations @ factors).std()
+        if residual <= max(THIN * deviations[:, k].std(), np.hypot(noise[k], np.linalg.norm(factors * noise))):
+            factors_of[k] = factors * (np.abs(factors) * deviations.std(0) > SLIGHT * deviations[:, k].std())
         else:
             others.append(k)
-    return found
+    return factors_of
 
 
 def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[np.ndarray, Loop]:
-    """(phase (N,), rad, growing; the mean gait): the phase of each row is that of a sine through the joints at first, then
-    that of the nearest point of the mean gait, remade so that it grows at a uniform rate on average; 0 is where the first
-    harmonic of the first joint is largest."""
+    """Return the phase (N,) of each row, rad, increasing, and the mean gait.
+
+    The phase is that of a sine through the joints at first, then that of the nearest point of the mean gait,
+    transformed so that it grows at a uniform rate on average. Phase 0 is where the first harmonic of the first joint is
+    largest."""
     t = np.linspace(log.t[0], log.t[-1], len(log.t))
     even = np.stack([np.interp(t, log.t, a) for a in joints.values.T], -1)
     at = np.interp(log.t, t, phase.protophase(t, even, period))
@@ -117,7 +123,7 @@ def phased(log: Log, joints: Smoothed, period: float, harmonics: int) -> tuple[n
 
 
 def _start(at: np.ndarray, alpha: np.ndarray) -> float:
-    """The phase at which the first harmonic of the first joint that swings at it is largest."""
+    """Return the phase at which the first harmonic of the first joint that swings with it is largest."""
     cos, sin = phase.fitted_loop(at, alpha, 1)[:, 1:].T
     size = np.hypot(cos, sin)
     k = int(np.flatnonzero(size > 0.5 * size.max())[0])
@@ -125,7 +131,7 @@ def _start(at: np.ndarray, alpha: np.ndarray) -> float:
 
 
 def _check_growing(log: Log, at: np.ndarray, period: float) -> None:
-    """Refusal where the phase stands or runs back for long: over half a cycle it grows by a fifth of one, at least."""
+    """Refuse a log whose phase stands or runs back: over half a cycle it must grow by at least a fifth of one."""
     inside = np.flatnonzero((log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period))
     ahead = np.interp(log.t[inside] + period / 2, log.t, at) - at[inside]
     if (bad := np.flatnonzero(ahead < 0.4 * np.pi)).size:
@@ -137,17 +143,18 @@ def _check_growing(log: Log, at: np.ndarray, period: float) -> None:
         )
 
 
-def whole(log: Log, at: np.ndarray, period: float) -> np.ndarray:
-    """(N,): the number of each row's cycle from 0; -1 in those that are not whole, or too near the log's ends for a phase."""
-    kept = (log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period / 2)
+def cycle_numbers(log: Log, at: np.ndarray, period: float) -> np.ndarray:
+    """Return the number (N,) of each row's cycle from 0; -1 in incomplete cycles and too near the ends of the log for a
+    phase."""
+    inside = (log.t > log.t[0] + period / 2) & (log.t < log.t[-1] - period / 2)
     turns = at / (2 * np.pi)
-    first, last = np.ceil(turns[kept].min()), np.floor(turns[kept].max())
+    first, last = np.ceil(turns[inside].min()), np.floor(turns[inside].max())
     number = np.floor(turns - first).astype(int)
-    return np.where(kept & (turns >= first) & (turns < last), number, -1)
+    return np.where(inside & (turns >= first) & (turns < last), number, -1)
 
 
 def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
-    """Refusal for a joint that runs on from cycle to cycle, by more than it swings in one."""
+    """Refuse a joint that drifts from cycle to cycle by more than it swings in one."""
     c = np.arange(number.max() + 1)
     for name, x in zip(log.joints, alpha.T):
         each = [x[number == k] for k in c]
@@ -162,14 +169,14 @@ def check_no_drift(log: Log, number: np.ndarray, alpha: np.ndarray) -> None:
 
 
 def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarray) -> None:
-    """Refusal if the cycles fall into two kinds: by their first harmonics, along the direction in which these differ most,
-    almost all of the spread is that between two groups."""
+    """Refuse cycles of two kinds: along the direction in which first harmonics differ most, almost all variance is
+    between two groups."""
     count = number.max() + 1
     w = waves(at, 2)
     each = np.array([np.linalg.lstsq(w[number == c], alpha[number == c], rcond=None)[0].ravel() for c in range(count)])
-    off = each - each.mean(0)
+    deviations = each - each.mean(0)
     size = np.linalg.norm(each.mean(0).reshape(5, -1)[1:])
-    score = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    score = deviations @ np.linalg.svd(deviations, full_matrices=False)[2][0]
     order = np.sort(score)
     k = np.arange(1, count)
     low = np.cumsum(order)[:-1] / k
@@ -178,8 +185,8 @@ def check_one_gait(log: Log, at: np.ndarray, number: np.ndarray, alpha: np.ndarr
     best = int(between[2:-2].argmax()) + 2 if count > 5 else 0
     kind = score > (order[best] + order[best + 1]) / 2
     share = AFTER if (kind[1:] != kind[:-1]).sum() == 1 else TWO
-    apart = high[best] - low[best] > LEAST_APART * size and min(k[best], count - k[best]) > 2
-    if apart and between[best] > share * (order**2).sum():
+    distinct = high[best] - low[best] > LEAST_DISTANCE * size and min(k[best], count - k[best]) > 2
+    if distinct and between[best] > share * (order**2).sum():
         change = int(np.flatnonzero(kind != kind[0])[0])
         row = int(np.flatnonzero(number == change)[0])
         raise log.wrong(

@@ -1,4 +1,4 @@
-"""From a log to the connection near its mean gait, and what it predicts."""
+"""The fit of a connection near the mean gait of a log, and its predictions."""
 
 from __future__ import annotations
 
@@ -13,29 +13,31 @@ from geomech.gaits import Fourier
 from geomech.geometry.reconstruct import displacement
 from geomech.geometry.tube import Loop, TaylorSeries, Tube, covering_grid, series, tube
 from geomech.io.tables.base import LARGEST_ENTRY
-from geomech.measured import cycles, regression, slips, smooth, unknowns
-from geomech.measured.left import left
+from geomech.measured import cycles, plausibility, regression, smooth, unknowns
 from geomech.measured.log import Log, read
-from geomech.measured.reach import spread
+from geomech.measured.residual import residual_of
+from geomech.measured.spread import spread
 from rft import se2
 from rft.checks import in_range
 
-HARMONICS = 12  # of the connection, at most; those of the gait go up to as many
+HARMONICS = 12  # of the connection and of the gait, at most
 PHASES = 128  # of the mean gait, at which it is integrated
-SHOWN = 24  # phases at which numbers are told
+PRINTED_PHASES = 24  # phases of printed numbers
 SAFETY = 2.0  # covers the net poses of gaits in sand that pass many places where links begin and cease to stick
 MOST_POINTS, MOST_SHAPES = 201, 100_000  # of a field, along an axis and in all
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What a log tells. times: (C + 1,), at which its C whole cycles begin and the last ends. measured, predicted: (C, 3), the
-    net pose of each cycle, in the body frame at its start, as logged and by the connection along the cycle's own shapes.
-    frequency: cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual:
-    (3,), rms of what the fit leaves of xi, over that of the joint rates; explained: (3,), share of the squares of xi
-    that it does not leave. noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary
-    enough to tell A across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where
-    that is why they do not. length: of the body in m; 1 for a log in body lengths."""
+    """Result of the fit of a log.
+
+    times: (C + 1,), starts of its C full cycles and end of the last. measured, predicted: (C, 3), net pose of each
+    cycle, in the body frame at its start, as logged and by the connection along the cycle's own shapes. frequency:
+    cycles per unit of t. irregular: rms of the phase about a uniform run through each cycle, rad. residual: (3,), rms
+    misfit of xi, over that of the joint rates; explained: (3,), share of the squares of xi that the fit explains.
+    noise: (d + 3,), of the rows' joint angles, x, y and heading. across: whether the cycles vary enough to determine A
+    across the gait. combined: joints that are linear combinations of others, factors (d,) by number, where these are
+    why they do not. length: of the body in m; 1 for a log in body lengths."""
 
     log: Log
     known: TaylorSeries
@@ -56,7 +58,7 @@ class Fitted:
 
     @cached_property
     def gait(self) -> Fourier:
-        """The mean gait, of amplitude 1, with the log's frequency if its t is a time."""
+        """Mean gait, of amplitude 1, with the log's frequency if its t is a time."""
         c = self.known.loop.coefficients
         cos, sin = (tuple(map(tuple, c[:, k::2].tolist())) for k in (1, 2))
         frequency = self.frequency if self.log.seconds else None
@@ -64,18 +66,18 @@ class Fitted:
 
     @cached_property
     def displacement(self) -> tuple[np.ndarray, np.ndarray]:
-        """(net pose (3,) of the mean gait by the connection, half width of its interval (3,))."""
+        """Net pose (3,) of the mean gait by the connection, and half width of its interval (3,)."""
         net, alpha, alphadot = _net(self.known)
         return net, self.known.error(alpha, alphadot)
 
     @cached_property
     def mean(self) -> tuple[np.ndarray, np.ndarray]:
-        """(mean net pose (3,) of the logged cycles, half width of its interval (3,))."""
+        """Mean net pose (3,) of the logged cycles, and half width of its interval (3,)."""
         return mean_of(self.measured, self.known.level)
 
     @cached_property
     def tube(self) -> Tube:
-        """The connection near the mean gait, with a grid for pictures and files."""
+        """Connection near the mean gait, with a grid for pictures and files."""
         wide = float(np.sqrt(np.einsum("iip->pi", self.known.spread).min()))
         extent = max(np.ptp(a) for a in covering_grid(self.known, 2))
         joints = len(self.log.joints)
@@ -84,13 +86,13 @@ class Fitted:
         return tube(self.known, covering_grid(self.known, points), self.residual, self.unit, self.length)
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
-        """(A (T, 3, d) at phases t of the mean gait, half widths of its interval)."""
+        """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
         return series(self.known.A, t), self.known.error_at(t)
 
     @property
     def misfit(self) -> np.ndarray:
-        """(3,), rms over the phase of what A may be off by along the gait, for what is left of xi beyond noise and what the
-        series cuts off."""
+        """Rms (3,) over the phase of the error of A along the gait, from the misfit of xi beyond noise and the
+        truncation of the series."""
         return np.sqrt((self.known.standard_error[:, 0] ** 2).mean(-1))
 
 
@@ -98,12 +100,12 @@ def fit_log(
     log: str | Path | Log, *, columns: Sequence[str] = (), degrees: bool = False, level: float = 0.95,
     harmonics: int | None = None, within: float | None = None, body_length: float = 1.0,
 ) -> Fitted:  # fmt: skip
-    """The connection near the mean gait of a log (`geomech.measured.log.read` says how ``columns`` and ``degrees`` are meant);
-    Refusal, one line, for a log that does not tell it.
+    """Fit the connection near the mean gait of a log; Refusal for a log that does not determine it.
 
-    level: share of cases in which an interval is to cover the truth. harmonics: of the connection in the phase; by
-    cross-validation if left out. within (rad): distance from the mean gait up to which the connection is given; as far as
-    the data reach if left out. body_length (m): of a log in m; 1 for one in body lengths."""
+    columns, degrees: as in `geomech.measured.log.read`. level: share of cases in which an interval should contain the
+    truth. harmonics: of the connection in the phase; by cross-validation if None. within (rad): distance from the mean
+    gait up to which the connection is given; as far as the data extend if None. body_length (m): of a log in m; 1 for
+    one in body lengths."""
     in_range("--level", level, 0.5, 0.999)
     in_range("--body-length", body_length, 1e-9, 1e9)
     if harmonics is not None:
@@ -117,7 +119,7 @@ def fit_log(
     cycles.check_a_loop(log, joints, rows)
     most = max(1, int(min(HARMONICS, joints.knots / 2, rows / 4)))
     phase, loop = cycles.phased(log, joints, period, most)
-    count = cycles.whole(log, phase, period)
+    count = cycles.cycle_numbers(log, phase, period)
     if count.max() + 1 < cycles.FEWEST:
         raise log.wrong(
             f"{count.max() + 1} whole cycles, without the log's ends, are too few",
@@ -125,20 +127,20 @@ def fit_log(
         )
     cycles.check_no_drift(log, count, joints.values)
     cycles.check_one_gait(log, phase, count, joints.values)
-    slips.check_right_handed(log, loop, phase, joints, pose, count)
+    plausibility.check_right_handed(log, loop, phase, joints, pose, count)
     combined = cycles.combined(joints, rows)
-    found = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
-    slips.note_units(log, joints, pose, period, body_length)
-    return found
+    fit = _regressed(log, loop, phase, count, joints, pose, combined, level, harmonics, within, body_length)
+    plausibility.note_units(log, joints, pose, period, body_length)
+    return fit
 
 
 def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, harmonics, within, length) -> Fitted:
-    kept = count >= 0
-    xi, *xi_halves = (_in_the_body(*x)[kept] for x in ((pose.values, pose.rates), *pose.halves))
-    halves = tuple((a[kept], u[kept]) for a, u in joints.halves)
+    inside = count >= 0
+    xi, *xi_halves = (_in_the_body(*x)[inside] for x in ((pose.values, pose.rates), *pose.halves))
+    halves = tuple((a[inside], u[inside]) for a, u in joints.halves)
     nearest = loop.projected(joints.values, phase)
     samples = regression.Samples(
-        nearest[kept], count[kept], joints.values[kept], joints.rates[kept], xi, halves, tuple(xi_halves)
+        nearest[inside], count[inside], joints.values[inside], joints.rates[inside], xi, halves, tuple(xi_halves)
     )
     varies = regression.varied(loop, samples)
     most = int(min(HARMONICS, len(samples.phase) / (samples.cycle[-1] + 1) / 4))
@@ -146,21 +148,21 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
         raise log.wrong(f"--harmonics must be at most {most}, a quarter of the rows of a cycle, got {harmonics}")
     size = joints.knots * (samples.cycle[-1] + 1)
     try:
-        held, varies = unknowns.settled(loop, samples, most, harmonics, varies, size)
-        found, errors = regression.solution(held)
+        equations, varies = unknowns.selected(loop, samples, most, harmonics, varies, size)
+        coefficients, errors = regression.solution(equations)
     except np.linalg.LinAlgError:
         raise log.wrong(
             "its cycles do not settle so many unknowns", instead="lower --harmonics, or give more cycles"
         ) from None
     across, others = varies == regression.RATES, [k for k in range(len(log.joints)) if k not in combined]
     if not combined or across or regression.varied(*regression.of_joints(loop, samples, others)) == varies:
-        combined = {}  # nothing is gained by leaving them out
-    A, errors = (held.split(x, loop) for x in (found, errors))
+        combined = {}  # leaving them out would not help
+    A, errors = (equations.split(x, loop) for x in (coefficients, errors))
     if not across:
         errors = np.concatenate([errors, regression.unknown(loop, A, varies)])
     known = TaylorSeries(
         loop, A[:, :, 0], A[:, :, 1:], errors, spread(loop, samples, within, varies > regression.NOTHING), np.zeros(3),
-        np.zeros((3, 2, 1)), regression.factor(len(held.square), level), level,
+        np.zeros((3, 2, 1)), regression.factor(len(equations.square), level), level,
     )  # fmt: skip
     if (largest := max(np.abs(known.combined).max(), np.abs(known.errors).max())) > LARGEST_ENTRY:
         raise log.wrong(
@@ -168,40 +170,41 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
             instead="give x and y in body lengths or m, and joints that move",
         )
     times, measured, predicted = _cycles(log, known, phase, count, joints, pose)
-    mean, mean_off = mean_of(measured, level)
-    square = (_net(known)[0] - mean) ** 2 - mean_off**2  # less what the mean leaves open
+    mean, mean_error = mean_of(measured, level)
+    square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
-    over = left(known, samples, varies)
-    known = replace(known, beyond=beyond, standard_error=over.off)
+    residual = residual_of(known, samples, varies)
+    known = replace(known, beyond=beyond, standard_error=residual.off)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(
-        log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[kept])),
-        over.residual, over.explained, np.concatenate([joints.noise, pose.noise]), across, combined, length,
+        log, known, times, measured, predicted, frequency, float(np.std((phase - uniform)[inside])),
+        residual.residual, residual.explained, np.concatenate([joints.noise, pose.noise]), across, combined, length,
         samples,
     )  # fmt: skip
 
 
 def _in_the_body(pose: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """xi (N, 3) of poses and their rates in the world."""
+    """Return xi (N, 3) from poses and their rates in the world."""
     return np.column_stack([*se2.rotated(-pose[:, 2], *rate[:, :2].T), rate[:, 2]])
 
 
 def mean_of(poses: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
-    """(mean, half width of its interval) of net poses of cycles (C, 3), neighbours among which are correlated."""
+    """Return the mean of net poses (C, 3) of cycles, and half width of its interval. Neighbouring cycles are
+    correlated."""
     errors = regression.lagged((poses - poses.mean(0)) / len(poses))
     return poses.mean(0), regression.factor(len(poses), level) * np.sqrt((errors**2).sum(0))
 
 
 def _net(known: TaylorSeries) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(net pose (3,) of the mean gait, its shapes and their rates (PHASES, d))."""
+    """Return the net pose (3,) of the mean gait, its shapes and their rates (PHASES, d)."""
     t = 2 * np.pi * np.arange(PHASES) / PHASES
     alpha, alphadot = known.loop.shape(t), known.loop.shape(t, 1)
     return displacement(np.einsum("nij,nj->ni", known.connection(alpha), alphadot)), alpha, alphadot
 
 
 def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
-    """(times (C + 1,), measured (C, 3), predicted (C, 3))."""
+    """Return times (C + 1,), measured (C, 3) and predicted (C, 3) of `Fitted`."""
     from scipy.interpolate import CubicSpline
 
     first = np.floor(phase[count == 0][0] / (2 * np.pi))
@@ -211,8 +214,8 @@ def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
     w, terms = known.terms_at(known.loop.projected(joints.values, phase), joints.values, joints.rates)
     xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
     heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
-    way = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
-    poses = (pose.values, np.stack([way.real, way.imag, heading], -1))
+    path = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)
+    poses = (pose.values, np.stack([path.real, path.imag, heading], -1))
     each = []
     for g in poses:
         at = CubicSpline(log.t, g)(times)

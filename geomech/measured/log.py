@@ -26,18 +26,20 @@ POSE = {
     "heading": ("heading", "theta", "yaw"),
 }
 JOINT = re.compile(r"(alpha|joint|angle|a|q)_?(\d+)(_rad|_deg)?")
-UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns that stand for t, and tell no s
-ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|ms)")  # in units that are not those of t, x and y
-SPIKE = 20.0  # times as far off its neighbours as nine in ten rows
-LARGE = 0.05  # of a column's range, that a row must be off besides
+UNTIMED = ("phase", "frame", "frames", "sample", "index")  # columns in place of t that are no times
+ELSEWHERE = re.compile(r".*_(mm|cm|km|px|pixels?|ms)")  # units that are not those of t, x and y
+SPIKE = 20.0  # deviation from neighbouring rows over that of nine in ten rows
+LARGE = 0.05  # of a column's range: least deviation of an outlier
 WHAT = "give a CSV file with a header such as t,alpha_1,alpha_2,x,y,heading"
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """name: of the file. t: (N,), ascending. alpha: (N, d), rad, without jumps of a turn, as the heading. pose: (N, 3), x, y,
-    heading. joints: the names of their columns. lines: (N,), the rows' lines in the file. seconds: t is a time. metres: x and y
-    are in m by the names of their columns."""
+    """Rows of a log, checked.
+
+    name: of the file. t: (N,), ascending. alpha: (N, d), rad, and the heading have no jumps by a full turn. pose: (N,
+    3), x, y, heading. joints: names of their columns. lines: (N,), line of each row in the file. seconds: t is a time.
+    metres: x and y are in m, by the names of their columns."""
 
     name: str
     t: np.ndarray
@@ -49,16 +51,16 @@ class Log:
     metres: bool = False
 
     def wrong(self, what: str, row: int | None = None, **facts: Any) -> Refusal:
-        """Return what to raise if something is wrong in a row, or in the whole file. facts: as `Refusal` has them."""
+        """Return a Refusal about a row, or about the whole file. facts: keywords of `Refusal`."""
         return Refusal(what, where=self.name if row is None else f"{self.name}, line {self.lines[row]}", **facts)
 
 
 def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -> Log:
-    """The log in a file; Refusal, one line, for one that cannot be used.
+    """Return the log in a file; Refusal for one that cannot be used.
 
-    columns: names of the time, of all joint angles, of x, y and the heading, in this order; known ones if left out
-    (`POSE`, `JOINT`; a log of phases for want of times has those). degrees: joint angles and heading are in degrees, and
-    so are columns whose names end in _deg."""
+    columns: names of the time, of all joint angles, of x, y and the heading, in this order; by default those with known
+    names (`POSE`, `JOINT`; "phase" in place of a time). degrees: joint angles and heading are in degrees, as are
+    columns whose names end in _deg."""
     try:
         source = read_rows(path, LARGEST_FILE, WHAT)
         line, header = source.header
@@ -75,15 +77,16 @@ def read(path: str | Path, columns: Sequence[str] = (), degrees: bool = False) -
     turn = np.where([degrees or name.endswith("_deg") for name in picked], np.pi / 180, 1.0)
     turn[[0, -3, -2]] = 1.0
     rows = rows * turn
-    told = {"seconds": picked[0] not in UNTIMED, "metres": all(name.endswith("_m") for name in picked[-3:-1])}
-    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines, **told)
+    flags = {"seconds": picked[0] not in UNTIMED, "metres": all(name.endswith("_m") for name in picked[-3:-1])}
+    log = Log(source.name, rows[:, 0], rows[:, 1:-3], rows[:, -3:], picked[1:-3], source.lines, **flags)
     _check_times(log)
     _check_units(log, picked, turn)
     return _checked(log)
 
 
 def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -> tuple[str, ...]:
-    """The columns of the time, the joints, x, y and the heading; ValueError if one is missing or ambiguous."""
+    """Return the names of the columns of the time, the joints, x, y and the heading; Refusal if one is missing or
+    ambiguous."""
     if twice := [c for k, c in enumerate(header) if c in header[:k]]:
         raise Refusal(
             f"the column {formatted(twice[0])} is there twice", where=f"{name}, line {line}", instead="rename one"
@@ -103,18 +106,18 @@ def _picked(name: str, line: int, header: tuple[str, ...], columns: list[str]) -
         other = "; columns must be parted by commas" if re.search("[;\\t]", header[0]) else ""
         raise Refusal(f"no header of columns{other}", where=f"{name}, line {line}", instead=WHAT)
     bare = {c: re.sub("_(rad|deg)$", "", c) for c in header}
-    found = {role: next((c for c in header if bare[c] in names), None) for role, names in POSE.items()}
-    found["t"] = found["t"] or ("phase" if "phase" in header else None)
+    roles = {role: next((c for c in header if bare[c] in names), None) for role, names in POSE.items()}
+    roles["t"] = roles["t"] or ("phase" if "phase" in header else None)
     matches = [(int(m[2]), m[1], c) for c in header if (m := JOINT.fullmatch(c))]
     kind = next((m[1] for m in matches), None)
     joints = [c for _, k, c in sorted(matches) if k == kind]
-    missing = [role for role, c in found.items() if c is None]
+    missing = [role for role, c in roles.items() if c is None]
     if missing or len(joints) < 2:
         few = f"{'one column' if joints else 'no columns'} of joint angles, and a gait is a loop of two or more"
         what = f"no column {missing[0]}" if missing else few
         cure = "name them t,alpha_1,alpha_2,x,y,heading, or say --columns"
         raise Refusal(f"{what}; it has {formatted(', '.join(header), 120)}", where=f"{name}, line {line}", instead=cure)
-    return _of_joints(name, [found["t"], *joints, found["x"], found["y"], found["heading"]])
+    return _of_joints(name, [roles["t"], *joints, roles["x"], roles["y"], roles["heading"]])
 
 
 def _of_joints(name: str, columns: list[str]) -> tuple[str, ...]:
@@ -145,7 +148,7 @@ def _check_times(log: Log) -> None:
 
 
 def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
-    """Degrees that are taken for radians, and radians for degrees."""
+    """Refuse degrees that are read as radians; warn of radians read as degrees."""
     step = np.abs(np.diff(log.pose[:, 2]))
     if turn[-1] == 1.0 and (jumps := np.flatnonzero(np.abs(step - 360) < 30)).size:
         k = jumps[0] + 1
@@ -153,19 +156,19 @@ def _check_units(log: Log, picked: Sequence[str], turn: np.ndarray) -> None:
     for k, name in enumerate(log.joints):
         row = int(np.abs(log.alpha[:, k]).argmax())
         if turn[k + 1] == 1.0 and abs(log.alpha[row, k]) > 2 * np.pi:
-            said = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
-            raise log.wrong(said, row, instead="say --degrees if these are degrees")
+            what = f"{name} reaches {log.alpha[row, k]:.4g} where joint angles are in rad"
+            raise log.wrong(what, row, instead="say --degrees if these are degrees")
         if abs(log.alpha[row, k]) > LARGEST_ANGLE:
             raise log.wrong(
                 f"{name} reaches {np.degrees(log.alpha[row, k]):.4g} degrees", row, because="no joint turns so far"
             )
     if (turn[1:-3] != 1.0).all() and (size := np.abs(log.alpha).max()) < np.radians(2 * np.pi):
-        said = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
-        warnings.warn(f"{log.name}: {said}", UnitWarning, stacklevel=3)
+        what = f"joint angles of at most {np.degrees(size):.3g} degrees: drop --degrees if these are rad"
+        warnings.warn(f"{log.name}: {what}", UnitWarning, stacklevel=3)
 
 
 def _checked(log: Log) -> Log:
-    """The log without jumps of a turn; Refusal for a column that does not move."""
+    """Return the log without jumps by a full turn; Refusal for a column that does not move."""
     pose = np.column_stack([log.pose[:, :2], np.unwrap(log.pose[:, 2])])
     alpha = np.unwrap(log.alpha, axis=0)
     for name, values in zip(log.joints, alpha.T):
@@ -177,18 +180,20 @@ def _checked(log: Log) -> Log:
 
 
 def check_rows(log: Log) -> None:
-    """Refusal for a row that is off, or after which a column goes on elsewhere."""
+    """Refuse an outlier, and a column that jumps."""
     step = np.diff(log.t)
     part = step[:-1] / (step[:-1] + step[1:])
     near = np.maximum(step[:-1], step[1:]) <= 2.5 * np.median(step)
     for name, v in zip((*log.joints, "x", "y", "heading"), np.column_stack([log.alpha, log.pose]).T):
-        off = np.where(near, v[1:-1] - (1 - part) * v[:-2] - part * v[2:], 0.0)
-        k = int(np.abs(off).argmax())
-        if abs(off[k]) <= max(SPIKE * np.quantile(np.abs(off), 0.9), LARGE * np.ptp(v)):
+        deviation = np.where(near, v[1:-1] - (1 - part) * v[:-2] - part * v[2:], 0.0)
+        k = int(np.abs(deviation).argmax())
+        if abs(deviation[k]) <= max(SPIKE * np.quantile(np.abs(deviation), 0.9), LARGE * np.ptp(v)):
             continue
-        if abs(off[k]) > abs(v[k + 2] - v[k]):
+        if abs(deviation[k]) > abs(v[k + 2] - v[k]):
             raise log.wrong(
-                f"{name} is {off[k]:.3g} off the rows before and after", k + 1, instead="mend that row, or drop it"
+                f"{name} is {deviation[k]:.3g} off the rows before and after",
+                k + 1,
+                instead="mend that row, or drop it",
             )
         jump = k + 1 if abs(v[k + 1] - v[k]) > abs(v[k + 2] - v[k + 1]) else k + 2
         what = "two gaits are in the file, or the tracking slipped" if name in log.joints else "the tracking slipped"

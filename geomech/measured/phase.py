@@ -1,4 +1,4 @@
-"""The phase of a log: how far its cycles are, growing at a uniform rate on average."""
+"""The phase of a log: place in the cycle, which grows at a uniform rate on average."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from geomech.geometry.tube import waves
 
-LIKELY = 0.9  # of the best correlation of a log with itself: the shortest shift that comes so near is the period
+LIKELY = 0.9  # of the highest autocorrelation: the shortest shift above this is the period
 ORDER = 4  # of the Butterworth filter about the cycle's frequency
-DENSITY = 8  # harmonics of the density of a protophase that is made uniform
+DENSITY = 8  # harmonics of the density of a protophase
 
 
 def period_of(t: np.ndarray, alpha: np.ndarray) -> float:
-    """Time after which the shapes alpha (N, d) at equal steps t repeat best: the first peak of their correlation with
-    themselves that comes near the best one. 0 where there is none."""
-    off = alpha - alpha.mean(0)
+    """Return the period of shapes alpha (N, d) at equally spaced t: the first peak of their autocorrelation that is
+    near the highest. 0 where there is none."""
+    centred = alpha - alpha.mean(0)
     n = len(t)
-    spectrum = np.fft.rfft(off, 2 * n, axis=0)
+    spectrum = np.fft.rfft(centred, 2 * n, axis=0)
     raw = np.fft.irfft(np.abs(spectrum) ** 2, axis=0).sum(1)[: n // 2 + 1]
     correlation = raw / np.arange(n, n - len(raw), -1)
     below = np.flatnonzero(correlation < 0)
@@ -34,28 +34,32 @@ def period_of(t: np.ndarray, alpha: np.ndarray) -> float:
 
 
 def protophase(t: np.ndarray, alpha: np.ndarray, period: float) -> np.ndarray:
-    """(N,), rad: the angle of the analytic signal (Hilbert transform) of the combination of joints that swings most at the
-    cycle's frequency, from half to one and a half times it; alpha (N, d) at equal steps t."""
+    """Return the angle (N,), rad, of the analytic signal (Hilbert transform) of the combination of joints that swings
+    most.
+
+    It is filtered to between half and one and a half times the cycle's frequency. alpha (N, d) is at equally spaced t.
+    """
     from scipy.signal import butter, hilbert, sosfiltfilt
 
-    off = alpha - alpha.mean(0)
+    centred = alpha - alpha.mean(0)
     band = 2 * np.array([0.5, 1.5]) * (t[1] - t[0]) / period
-    slow = sosfiltfilt(butter(ORDER, band, "bandpass", output="sos"), off, axis=0)
+    slow = sosfiltfilt(butter(ORDER, band, "bandpass", output="sos"), centred, axis=0)
     z = hilbert(slow, axis=0)
     _, vectors = np.linalg.eigh(z.conj().T @ z)
     return np.unwrap(np.angle(z @ vectors[:, -1]))
 
 
 def uniform(phase: np.ndarray) -> np.ndarray:
-    """A growing phase (N,), remade so that it is met equally often everywhere in the cycle (Kralemann et al., Phys. Rev. E 77,
-    066205 (2008); Revzen and Guckenheimer, Phys. Rev. E 78, 051907 (2008)): the integral of its density's Fourier series."""
+    """Return a growing phase (N,) with uniform density: the integral of the Fourier series of its density.
+
+    Kralemann et al., Phys. Rev. E 77, 066205 (2008); Revzen and Guckenheimer, Phys. Rev. E 78, 051907 (2008)."""
     k = np.arange(1, DENSITY + 1)
-    whole = phase[phase < phase[0] + 2 * np.pi * np.floor((phase[-1] - phase[0]) / (2 * np.pi))]
-    density = np.exp(-1j * whole[:, None] * k).mean(0)
-    turned = (density / (1j * k) * (np.exp(1j * phase[:, None] * k) - 1)).sum(1)
-    return phase + 2 * turned.real
+    full_cycles = phase[phase < phase[0] + 2 * np.pi * np.floor((phase[-1] - phase[0]) / (2 * np.pi))]
+    density = np.exp(-1j * full_cycles[:, None] * k).mean(0)
+    correction = (density / (1j * k) * (np.exp(1j * phase[:, None] * k) - 1)).sum(1)
+    return phase + 2 * correction.real
 
 
 def fitted_loop(phase: np.ndarray, alpha: np.ndarray, harmonics: int) -> np.ndarray:
-    """(d, 2 K + 1): Fourier coefficients of shapes alpha (N, d) over the phase, by least squares."""
+    """Return Fourier coefficients (d, 2 K + 1) of shapes alpha (N, d) over the phase, by least squares."""
     return np.linalg.lstsq(waves(phase, harmonics), alpha, rcond=None)[0].T

@@ -1,4 +1,4 @@
-"""What a measured gait tells as a result: A, nan where the data do not reach, and all that a lookup near the gait takes."""
+"""Results of a measured gait: A, nan where there are no data, and all data of a look-up near the gait."""
 
 from __future__ import annotations
 
@@ -24,27 +24,28 @@ ALONG = "fitted along the gait alone"
 
 
 def status(fit: Fitted) -> str:
-    """What of A is told, and why not all; with the cure, where joints depend on each other."""
+    """Return which part of A is determined and, if not all, why; with the cure where joints depend on each other."""
     if fit.across:
         return "fitted"
     if not fit.combined:
         return f"{ALONG}: its cycles do not vary enough to tell A across it"
-    said = ", ".join(f"{fit.log.joints[k]} is {_sum(fit, factors)}" for k, factors in fit.combined.items())
+    combinations = ", ".join(f"{fit.log.joints[k]} is {_sum(fit, factors)}" for k, factors in fit.combined.items())
     names = ", ".join(fit.log.joints[k] for k in fit.combined)
     return (
-        f"{ALONG}: {said}, but for constants and noise, which leaves A across it open: leave {names} out with --columns"
+        f"{ALONG}: {combinations}, but for constants and noise, which leaves A across it open: "
+        f"leave {names} out with --columns"
     )
 
 
 def _sum(fit: Fitted, factors: np.ndarray) -> str:
-    """0.5 alpha_1 - 2 alpha_2."""
+    """Return a linear combination as text, such as 0.5 alpha_1 - 2 alpha_2."""
     terms = (f"{x:.3g} {name}" for x, name in zip(factors, fit.log.joints) if x)
     return " + ".join(terms).replace("+ -", "- ")
 
 
 @dataclass(frozen=True)
 class Fit(Question):
-    """The connection near a measured gait; as `fit_log` has it."""
+    """The connection near a measured gait, see `fit_log`."""
 
     log: Path
     columns: tuple[str, ...] = ()
@@ -58,7 +59,7 @@ class Fit(Question):
         return [self.log]
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        found = fit_log(
+        fit = fit_log(
             self.log,
             columns=self.columns,
             degrees=self.degrees,
@@ -67,26 +68,27 @@ class Fit(Question):
             within=self.within,
             body_length=self.body_length,
         )
-        (net, off), (mean, mean_off) = found.displacement, found.mean
-        over, unit = ("component",), f"{found.unit} (x, y), rad (theta)"
-        told = (
+        (net, error), (mean, mean_error) = fit.displacement, fit.mean
+        over, unit = ("component",), f"{fit.unit} (x, y), rad (theta)"
+        variables = (
             Variable("component", over, np.array(COMPONENTS)),
-            Variable("displacement_measured", over, mean, unit, "mean of the log's cycles", mean_off),
-            Variable("displacement_predicted", over, net, unit, "of the mean gait, by the connection", off),
+            Variable("displacement_measured", over, mean, unit, "mean of the log's cycles", mean_error),
+            Variable("displacement_predicted", over, net, unit, "of the mean gait, by the connection", error),
         )
-        return Result("measured", told, {"status": status(found)}, found)
+        return Result("measured", variables, {"status": status(fit)}, fit)
 
 
 def of_fit(fit: Fitted) -> Result:
-    """Return A with its error, the CCF of two joints, and all that a lookup near the gait takes; the NetCDF file of it is read
-    by `Connection.load` and [system] kind = "table"."""
+    """Return A with its error, the CCF of two joints, and all data of a look-up near the gait.
+
+    `Connection.load` and [system] kind = "table" read it from NetCDF."""
     tube, unit = fit.tube, fit.unit
     error = tube.at_grid(tube.taylor.connection_error)
-    found = [*fields.of_connection(tube, error), *fields.of_known(tube.taylor, unit), fields.of_reach(tube)]
+    variables = [*fields.of_connection(tube, error), *fields.of_known(tube.taylor, unit), fields.of_reach(tube)]
     if len(tube.axes) == 2:
-        found.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
+        variables.append(fields.of_ccf(ccf(tube), curvature_error(tube), INTERVAL_OF_CCF))
     axes = fields.coordinates(tube.axes, [(name, "rad") for name in angles_of(tube.axes)])
-    return Result("connection", (*axes, *found), _about(fit), fit)
+    return Result("connection", (*axes, *variables), _about(fit), fit)
 
 
 def _about(fit: Fitted) -> dict:
@@ -115,7 +117,7 @@ def _about(fit: Fitted) -> dict:
 
 
 def scene_toml(fit: Fitted, field: Path, scene: Path) -> str:
-    """A scene of the mean gait with the field's file, named by its place beside the scene."""
+    """Return a scene of the mean gait with the field's file, named relative to the scene."""
     file = os.path.relpath(field.resolve(), scene.resolve().parent)
     head = f"# The mean gait of {len(fit.measured)} cycles of {fit.log.name}, and the connection near it.\n"
     return "\n".join([head, table("system", {"kind": "table", "file": file}), table("gait", gait_table(fit.gait))])

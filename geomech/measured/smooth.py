@@ -1,4 +1,4 @@
-"""Values and rates of noisy channels: least-squares splines whose knots are as close as cross-validation asks for."""
+"""Values and rates of noisy channels by least-squares splines, with knots spaced by cross-validation."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from typing import NamedTuple
 import numpy as np
 
 DEGREE = 5  # of the splines: their rates are of order 5 in the spacing of the knots
-KNOTS = (4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64)  # a cycle, at most
-PIECE = 2000  # rows of a spline that is solved at once
-TRIED = 4000  # rows on which spacings are tried
-CLOSER = 1.5  # knots for each that values want: rates want more
+KNOTS = (4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64)  # per cycle, at most
+PIECE = 2000  # rows of a spline that is solved as one
+TRIED = 4000  # rows for the choice of a spacing
+CLOSER = 1.5  # more knots than is best for values: rates need more
 FEWEST = 2  # rows between two knots; of every second row twice as many, at least
 
 
 class Smoothed(NamedTuple):
-    """values, rates: (N, channels). halves: the same from every second row, from the first and from the second; their noise
-    is independent. knots: a cycle. noise: (channels,), standard deviation of what the spline leaves of the rows."""
+    """Splines through channels.
+
+    values, rates: (N, channels). halves: values and rates from every second row, from the first and from the second on;
+    their noise is independent. knots: per cycle. noise: (channels,), standard deviation of the rows about the spline.
+    """
 
     values: np.ndarray
     rates: np.ndarray
@@ -26,9 +29,11 @@ class Smoothed(NamedTuple):
 
 
 def smoothed(t: np.ndarray, channels: np.ndarray, period: float) -> Smoothed:
-    """Splines through channels (N, C) at times t (N,), which need not be equally spaced. Knots are at rows, as many a cycle
-    as generalised cross-validation likes best in the geometric mean over the channels."""
-    rows = len(t) * period / (t[-1] - t[0])  # a cycle
+    """Return splines through channels (N, C) at times t (N,), which need not be equally spaced.
+
+    Knots are at rows; their number per cycle minimises the geometric mean over the channels of the generalised
+    cross-validation."""
+    rows = len(t) * period / (t[-1] - t[0])  # per cycle
     step = _spacing(t[:TRIED], channels[:TRIED], sorted({max(FEWEST, round(rows / k)) for k in KNOTS}, reverse=True))
     values, rates = _through(t, channels, step, t)
     noise = np.sqrt(((channels - values) ** 2).sum(0) / (len(t) * (1 - 1 / step)))
@@ -37,32 +42,33 @@ def smoothed(t: np.ndarray, channels: np.ndarray, period: float) -> Smoothed:
 
 
 def _spacing(t: np.ndarray, channels: np.ndarray, steps: list[int]) -> int:
-    """Rows between two knots, CLOSER than those of ``steps`` that cross-validation likes best."""
-    found = {}
+    """Return the number of rows between two knots: by CLOSER less than the best of ``steps`` in cross-validation."""
+    scores = {}
     for step in steps:
         curve = _spline(t, channels, step)
-        left, free = channels - curve(t), 1 - len(curve.c) / len(t)
-        found[step] = np.log(np.maximum((left**2).mean(0), 1e-300) / free**2).mean()
-    return max(FEWEST, round(min(found, key=found.get) / CLOSER))
+        residual, free = channels - curve(t), 1 - len(curve.c) / len(t)
+        scores[step] = np.log(np.maximum((residual**2).mean(0), 1e-300) / free**2).mean()
+    return max(FEWEST, round(min(scores, key=scores.get) / CLOSER))
 
 
 def _through(t: np.ndarray, channels: np.ndarray, step: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(values, rates) at times ``at`` (M,), ascending, of the spline with a knot at every so manieth row. It is made of pieces
-    of PIECE rows, which see as far as a spline remembers to either side: the solver's time grows with the square of a piece."""
-    beside, found = 40 * step, []
+    """Return values and rates at ascending times ``at`` (M,) of the spline with a knot at every ``step``-th row.
+
+    It is assembled from pieces of PIECE rows with margins, as the solver's time grows with the square of a piece."""
+    margin, parts = 40 * step, []
     starts = np.arange(0, max(len(t) - PIECE // 2, 1), PIECE)
     ends = np.searchsorted(at, [*t[starts[1:]], np.inf])
     for a, low, high in zip(starts, [0, *ends[:-1]], ends):
-        last = len(t) if high == len(at) else min(len(t), a + PIECE + beside)
-        some = slice(max(0, a - beside) // step * step, last)  # knots stay where they are
-        curve = _spline(t[some], channels[some], step)
+        last = len(t) if high == len(at) else min(len(t), a + PIECE + margin)
+        window = slice(max(0, a - margin) // step * step, last)  # knots stay where they are
+        curve = _spline(t[window], channels[window], step)
         inside = np.clip(at[low:high], curve.t[0], curve.t[-1])
-        found.append((curve(inside), curve.derivative()(inside)))
-    return tuple(np.concatenate(x) for x in zip(*found))
+        parts.append((curve(inside), curve.derivative()(inside)))
+    return tuple(np.concatenate(x) for x in zip(*parts))
 
 
 def _spline(t: np.ndarray, channels: np.ndarray, step: int):
-    """Least squares, with a knot at every so manieth row."""
+    """Return the least-squares spline with a knot at every ``step``-th row."""
     from scipy.interpolate import make_lsq_spline
 
     inner = t[step : len(t) - step : step]

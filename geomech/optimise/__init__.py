@@ -1,4 +1,4 @@
-"""Gaits that are the best of their kind: the largest displacement, efficiency, turning or speed."""
+"""Search for the gaits of a scene with the largest displacement, efficiency, turning or speed."""
 
 from geomech.optimise.optimum import Optimum
 from geomech.optimise.request import Request, checked

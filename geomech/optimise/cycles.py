@@ -1,10 +1,9 @@
-"""What a cycle of a loop brings and costs, with its slopes in the numbers of the loop.
+"""Displacement and cost of a cycle, with their slopes in the numbers of the loop.
 
-Where the velocity follows from shape alone its derivatives by shape and rate are taken at every phase, by central differences
-of one batch of velocities, 4 d + 1 of them whatever the number of harmonics; the chain through the reconstruction
-(`geomech.geometry.reconstruct.slopes`) and the series is exact. Where a gait must be run as a whole the differences are those
-of whole gaits, run side by side.
-"""
+Where the velocity follows from shape alone, its derivatives by shape and rate are computed at every phase by central
+differences: one batch of 4 d + 1 velocities, whatever the number of harmonics. The chain rule through the
+reconstruction (`geomech.geometry.reconstruct.slopes`) and the series is exact. Where a gait can only be run cycle by
+cycle, the differences are those of whole cycles, run in one batch."""
 
 from __future__ import annotations
 
@@ -17,14 +16,16 @@ import numpy as np
 from geomech.geometry.reconstruct import slopes, turning
 from geomech.optimise.loops import Loops
 
-STEP = 1e-5  # of differences: rad, and of the rate
+STEP = 1e-5  # of differences: rad, and relative to the rate
 STEP_OF_RUNS = 1e-3  # rad: cycles repeat to 1e-6 only
 
 
-class Brought(NamedTuple):
-    """Numbers of a cycle, each with its slopes (..., *shape of p). net: (3,), pose. swing: heading at the start beyond its
-    mean, rad. length: of the path. power: mean over phases, at one rad of phase per unit of time. uneven: of the pacing, least
-    where |alphadot| is constant, and more for a longer way: there are spurs that bring nothing."""
+class CycleValues(NamedTuple):
+    """Numbers of a cycle, each with its slopes (..., *shape of p).
+
+    net: pose (3,). swing: heading at the start minus its mean, rad. length: of the path. power: mean over phases, at
+    one rad of phase per unit of time. uneven: a penalty, least where |alphadot| is constant, which grows with the
+    length of the loop, as loops may have spurs that yield nothing."""
 
     net: tuple
     swing: tuple
@@ -34,25 +35,27 @@ class Brought(NamedTuple):
 
 
 class Phases:
-    """Cycles of loops by their velocity(alpha, alphadot) -> (..., 3) and power(alpha, alphadot) -> (...), which is of degree
-    ``degree`` in alphadot; power None where its cost is not asked for."""
+    """Cycles of loops by velocities at phases.
 
-    exact = 1e-10  # rad: what a turn of none may be
+    velocity(alpha, alphadot) -> (..., 3). power(alpha, alphadot, xi) -> (...), of degree ``degree`` in alphadot; None
+    where no cost is needed."""
+
+    exact = 1e-10  # rad: tolerance of a net turn of 0
 
     def __init__(self, loops: Loops, velocity: Callable, power: Callable | None = None, degree: float = 1.0):
         self.loops, self.velocity, self.power, self.degree = loops, velocity, power, degree
-        self.count, self.last, self.warm = 0, None, _begins(velocity)
+        self.count, self.last, self.warm = 0, None, takes_start(velocity)
 
-    def __call__(self, p: np.ndarray) -> Brought:
+    def __call__(self, p: np.ndarray) -> CycleValues:
         loops, d = self.loops, self.loops.joints
         alpha, alphadot = loops.cycle(p)
         speed = np.sqrt((alphadot**2).sum(-1).mean()) or 1.0
-        ways, steps = np.eye(2 * d), np.repeat([STEP, STEP * speed], d)
-        moves = np.concatenate([np.zeros((1, 2 * d)), steps * ways, -steps * ways])[:, None]
-        every = alpha + moves[..., :d], alphadot + moves[..., d:]
+        axes, steps = np.eye(2 * d), np.repeat([STEP, STEP * speed], d)
+        moves = np.concatenate([np.zeros((1, 2 * d)), steps * axes, -steps * axes])[:, None]
+        samples = alpha + moves[..., :d], alphadot + moves[..., d:]
         spans = 2 * steps[:, None]
         self.count += 1
-        xi = self._velocities(*every)
+        xi = self._velocities(*samples)
         if not np.isfinite(xi).all():
             raise RuntimeError("a loop that has no velocity somewhere")
         net, by_xi = slopes(xi[0])
@@ -63,7 +66,7 @@ class Phases:
         zero[:, 2] = swing_by
         length = power = None
         if self.power:
-            P = np.maximum(self.power(*every, xi), 0.0)
+            P = np.maximum(self.power(*samples, xi), 0.0)
             dP = ((P[1 : 2 * d + 1] - P[2 * d + 1 :]) / spans).T  # (N, 2 d)
             mean, q, n = P[0].mean(), self.degree, len(alpha)
             power = mean, self._in_p(dP / n)
@@ -71,18 +74,19 @@ class Phases:
             by_P = root / np.maximum(P[0], 1e-12 * mean + 1e-300) / q
             length = 2 * np.pi * root.mean(), self._in_p(2 * np.pi / n * by_P[:, None] * dP)
         swing = float(swing_by @ xi[0][:, 2])
-        return Brought((net, chain(by_xi)), (swing, chain(zero)), length, power, uneven(loops, alphadot))
+        return CycleValues((net, chain(by_xi)), (swing, chain(zero)), length, power, uneven(loops, alphadot))
 
     def _velocities(self, alpha, alphadot) -> np.ndarray:
-        """xi (1 + 4 d, N, 3) of a loop and of those beside it; balances begin from the last loop and from this."""
+        """Return xi (1 + 4 d, N, 3) of a loop and of its perturbations. Balances start from the last loop, then from
+        this one."""
         if not self.warm:
             return self.velocity(alpha, alphadot)
-        here = self.velocity(alpha[:1], alphadot[:1], start=self.last)
-        self.last = here
-        return np.concatenate([here, self.velocity(alpha[1:], alphadot[1:], start=here)])
+        unmoved = self.velocity(alpha[:1], alphadot[:1], start=self.last)
+        self.last = unmoved
+        return np.concatenate([unmoved, self.velocity(alpha[1:], alphadot[1:], start=unmoved)])
 
     def _in_p(self, by: np.ndarray) -> np.ndarray:
-        """Slopes (..., 2 K + 1, d) from those by shape and rate at every phase, (..., N, 2 d)."""
+        """Return slopes (..., 2 K + 1, d) in p from slopes by shape and rate at every phase, (..., N, 2 d)."""
         d = self.loops.joints
         return self.loops.basis.T @ by[..., :d] + self.loops.rates.T @ by[..., d:]
 
@@ -90,7 +94,7 @@ class Phases:
 class Runs:
     """Cycles of gaits run as a whole, by `System.run`; loops: whatever has ``cycle(p)`` for rows of p. length: of the body."""
 
-    exact = 1e-6  # rad: that to which they repeat
+    exact = 1e-6  # rad: cycles repeat to this
 
     def __init__(
         self, loops, run: Callable, work: bool = False, degree: float = 1.0, length: float = 1.0,
@@ -99,33 +103,34 @@ class Runs:
         self.loops, self.run, self.work, self.degree, self.length, self.step = loops, run, work, degree, length, step
         self.count = 0
 
-    def __call__(self, p: np.ndarray) -> Brought:
+    def __call__(self, p: np.ndarray) -> CycleValues:
         moves = self.step * self.loops.unit * np.eye(p.size).reshape(-1, *p.shape)
-        every = np.concatenate([p[None], p + moves, p - moves])
+        samples = np.concatenate([p[None], p + moves, p - moves])
         self.count += 1
-        done = self.run(*self.loops.cycle(every), self.work)
-        power = None if done.work is None else done.work.power / self.length
-        found = brought(done, power, self.degree)
-        return Brought(*(None if x is None else self._with_slopes(x, p.shape) for x in found))
+        run = self.run(*self.loops.cycle(samples), self.work)
+        power = None if run.work is None else run.work.power / self.length
+        values = cycle_values(run, power, self.degree)
+        return CycleValues(*(None if x is None else self._with_slopes(x, p.shape) for x in values))
 
     def _with_slopes(self, x: np.ndarray, shape: tuple) -> tuple:
-        """(value, slopes) from those of the gait, then of all moved one way and the other, (2 n + 1, ...)."""
+        """Return value and slopes, from values (2 n + 1, ...) of the gait, of n perturbed ones, and of their opposites."""
         n = len(x) // 2
         rise = (x[1 : n + 1] - x[n + 1 :]) / (2 * self.step * self.loops.unit)
         return x[0], np.moveaxis(rise, 0, -1).reshape(*x.shape[1:], *shape)
 
 
-def _begins(velocity: Callable) -> bool:
-    """Whether a velocity may be told where to begin."""
+def takes_start(velocity: Callable) -> bool:
+    """Return whether a velocity accepts a start for its iterations."""
     try:
         return "start" in inspect.signature(velocity).parameters
-    except (TypeError, ValueError):  # of compiled code
+    except (TypeError, ValueError):  # raised for compiled code
         return False
 
 
-def brought(run, power, degree: float) -> tuple:
-    """The numbers of `Brought`, without slopes, of a `Cycle` of gaits (...,) that take ``power`` (..., N), or None: pose,
-    swing, length, power, 0."""
+def cycle_values(run, power, degree: float) -> tuple:
+    """Return the numbers of `CycleValues` without slopes: pose, swing, length, power, 0.
+
+    run: a `Cycle` of gaits (...,). power: (..., N), or None."""
     length = mean = None
     if power is not None:
         P = np.maximum(power, 0.0)
@@ -134,14 +139,15 @@ def brought(run, power, degree: float) -> tuple:
 
 
 def _first_of_turning(n: int) -> np.ndarray:
-    """(N,): heading at phase 0 beyond its mean by the turning velocity at every phase."""
+    """Return the slopes (N,) of the heading at phase 0 minus its mean, by the rate of heading at every phase."""
     unit = np.zeros((n, n, 3))
     unit[..., 2] = np.eye(n)
     return turning(unit)[:, 0]
 
 
 def uneven(loops: Loops, alphadot: np.ndarray) -> tuple:
-    """mean |alphadot|^2 / (mean |alphadot|)^2 - 1, and mean |alphadot|^2 in the unit of the loops; and its slopes."""
+    """Return mean |alphadot|^2 / (mean |alphadot|)^2 - 1 plus mean |alphadot|^2 in units of the loops squared, and its
+    slopes."""
     n, speed = len(alphadot), np.sqrt((alphadot**2).sum(-1)) + 1e-300
     mean, square = speed.mean(), (speed**2).mean()
     by = (2 * alphadot / mean**2 - 2 * square / mean**3 * alphadot / speed[:, None] + 2 * alphadot / loops.unit**2) / n

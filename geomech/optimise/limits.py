@@ -1,4 +1,4 @@
-"""How far joints may go: one limit for all, one for each, or from one angle to another."""
+"""Limits of joints: one for all, one for each, or a lowest and a highest angle for each."""
 
 from __future__ import annotations
 
@@ -14,20 +14,22 @@ from geomech.systems.framed import Framed
 from rft.checks import in_range, is_number, real_array
 from rft.refusal import Refusal, formatted
 
-LEAST, MOST = 1e-6, 100.0  # rad: of a limit, and of the room between two
+LEAST, MOST = 1e-6, 100.0  # rad: of the range between two limits, and of a limit
 Within = float | tuple[tuple[float, float], ...]
-Asked = float | Sequence[float] | Sequence[Sequence[float]] | None
+WithinArgument = float | Sequence[float] | Sequence[Sequence[float]] | None
 
 
-def limits(scene: Scene, within: Asked, phases: int) -> Within:
-    """``within`` as `geomech.optimise.loops.Loops` takes it: a number, all joints being that near to 0, or a pair (lowest,
-    highest) for each. None: as far as the field goes, or the scene's gait if that goes further; all of a stored table.
-    ValueError for what lies outside the field that a scene has."""
+def limits(scene: Scene, within: WithinArgument, phases: int) -> Within:
+    """Return ``within`` as `geomech.optimise.loops.Loops` takes it: a largest |alpha| for all joints, or (lowest,
+    highest) for each.
+
+    None stands for the extent of the field, or of the scene's gait where that is larger; for all of a stored table.
+    Refusal for limits outside the field of a table or frame."""
     system = scene.system
     low, high = edges(system)
     if within is None:
         if stored_table(system, "connection"):
-            return _told(low, high)
+            return _simplified(low, high)
         n = scene.numerics
         within = min(
             max(n.extent, float(np.abs(scene.gait.cycle(phases)[0]).max())), float(np.minimum(-low, high).min())
@@ -43,18 +45,18 @@ def limits(scene: Scene, within: Asked, phases: int) -> Within:
     if (pairs[:, 0] < low - slack[:, 0]).any() or (pairs[:, 1] > high + slack[:, 1]).any():
         field = ", ".join(f"{a:g} to {b:g}" for a, b in zip(low, high))
         raise Refusal(f"--within {_text(within)} lies outside the field that the scene has", instead=field)
-    return _told(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
+    return _simplified(np.maximum(pairs[:, 0], low), np.minimum(pairs[:, 1], high))
 
 
 def edges(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest shapes (joints,) of the field of a table, or of a frame; infinite where there is neither."""
+    """Return the lowest and highest shapes, (joints,) each, of the field of a table or a frame; infinite without one."""
     own = stored_table(system, "connection")
     axes = own.axes if own else system.axes if isinstance(system, Framed) else [(-np.inf, np.inf)] * system.joints
     return np.array([a[0] for a in axes]), np.array([a[-1] for a in axes])
 
 
 def _pairs(within, joints: int) -> np.ndarray:
-    """(joints, 2) of pairs, or of a number for each joint."""
+    """Return (joints, 2) from pairs, or from one number for each joint."""
     x = real_array("--within", within)
     x = np.stack([-x, x], -1) if x.ndim == 1 else x
     good = x.shape == (joints, 2) and (np.abs(x) <= MOST).all() and (x[:, 1] - x[:, 0] >= LEAST).all()
@@ -65,8 +67,8 @@ def _pairs(within, joints: int) -> np.ndarray:
     return x
 
 
-def _told(low: np.ndarray, high: np.ndarray) -> Within:
-    """As short as may be."""
+def _simplified(low: np.ndarray, high: np.ndarray) -> Within:
+    """Return one number where all limits are equal and symmetric, else pairs."""
     if (low == -high[0]).all() and (high == high[0]).all():
         return float(high[0])
     return tuple(zip(low.tolist(), high.tolist()))

@@ -1,4 +1,4 @@
-"""What an optimisation finds."""
+"""Results of an optimisation."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from geomech.systems.capabilities import stored_table
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
-    """A gait by the direct tier. value, error: of the aim. heading: error of the net turn, rad. displacement: (3,), in the
-    frame at the start, the system's unit. length: of the path, work: of a cycle at a rad of phase per unit of time, in body
-    drag x body length; None where nothing tells these, and for the work of a metric that is not one of drag. time: of a rad
-    of phase. limits: of the time."""
+class Evaluation:
+    """A gait as evaluated by the direct tier.
+
+    value, error: of the aim. heading: error of the net turn, rad. displacement: net pose (3,) in the frame at the
+    start, in the system's unit. length: of the path; work: of a cycle at a rad of phase per unit of time, in body drag
+    x body length; None where these are not known, and for the work of a metric that is not one of drag. time: of a rad
+    of phase. limits: names of those that set the time."""
 
     gait: Gait
     value: float
@@ -35,13 +37,15 @@ class Told:
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """What `optimise` found. best, start: told by the direct tier. active: limits that the best touches. answers: value and
-    number of starts of every different loop found, best first; others: of those that a table led to, by the direct tier
-    before it finished them. seconds: it took."""
+    """Result of `optimise`.
+
+    best, start: evaluated by the direct tier. active: limits that the best touches. answers: value and number of starts
+    of every different local optimum, best first; others: the same of those that only a table led to, by the direct
+    tier, unfinished. seconds: duration of the search."""
 
     request: Request
-    best: Told
-    start: Told
+    best: Evaluation
+    start: Evaluation
     active: tuple[str, ...]
     answers: tuple[tuple[float, int], ...]
     others: tuple[tuple[float, int], ...]
@@ -54,16 +58,17 @@ class Optimum:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene with the best gait, in a field that holds it."""
+        """Scene with the best gait, and with a field that is large enough for it."""
         scene, gait = self.request.scene, self.best.gait
         scene = scene.changed(gait=gait)
         if isinstance(gait, Sine) or stored_table(scene.system, "connection"):
             return scene
-        reach = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
-        return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(reach)))
+        largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
+        return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(largest)))
 
     def numbers(self) -> dict:
-        """As JSON has them; the value of a distance is over the body's length, the displacement is not."""
+        """Return the numbers of the JSON output; the value of a distance is over the body's length, the displacement is
+        not."""
         b, system = self.best, self.scene.system
         aim, unit = self.request.aim.unit, length_unit(system)
         return {

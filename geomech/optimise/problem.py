@@ -1,4 +1,4 @@
-"""A way up as a problem of nonlinear programming: what is made small, and the rules that a loop keeps."""
+"""An ascent as a problem of nonlinear programming: an objective to be minimised, and constraints."""
 
 from __future__ import annotations
 
@@ -9,53 +9,61 @@ import numpy as np
 from geomech.optimise.aims import Aim
 from geomech.optimise.stroke import Stroke
 
-EVEN = 1e-3  # of the value: what uneven pacing and a long way cost; it decides among loops that bring the same
+EVEN = 1e-3  # of the value: weight of uneven pacing and length; it decides between loops of equal value
 STRAIGHT = 1e-3  # rad: below it a gait does not turn
-KEPT = 5e-3  # rad, and of a limit: how far beyond a rule a loop may be that counts as keeping it
+FEASIBLE = 5e-3  # rad, and relative to a limit: violation of a constraint up to which a loop counts as feasible
 
 
 class Enough(Exception):
-    """Leaves a search that takes too many cycles."""
+    """A search takes more cycles than it may."""
 
 
 class Problem:
-    """``aim`` near the loop p, in numbers x: those of a loop over its unit and, where a limit of rate paces it, the time of a
-    rad of phase over that of p. cycles: `Phases` or `Runs`; `Enough` after ``most``. told: whenever one is done. even: what
-    uneven pacing and a long way cost, of the value."""
+    """The aim near the loop p as a function of numbers x: the parameters of a loop over its unit and, where a limit of
+    rate sets the pace, the time of a rad of phase over that of p.
 
-    def __init__(self, cycles, aim: Aim, p: np.ndarray, told: Callable, most: float, even: float = EVEN):
-        self.cycles, self.aim, self.loops, self.told, self.last = cycles, aim, cycles.loops, told, cycles.count + most
+    cycles: `Phases` or `Runs`; `Enough` is raised after ``most``. on_cycle: called after every cycle. even: weight of
+    the penalty of uneven pacing and long loops, as a share of the value."""
+
+    def __init__(self, cycles, aim: Aim, p: np.ndarray, on_cycle: Callable, most: float, even: float = EVEN):
+        self.cycles, self.aim, self.loops, self.on_cycle, self.last = (
+            cycles,
+            aim,
+            cycles.loops,
+            on_cycle,
+            cycles.count + most,
+        )
         self.unit, self.shape, self.count = cycles.loops.unit, p.shape, p.size
         self.paced = aim.timed and aim.rate is not None
         self.first = np.append(p.ravel() / self.unit, 1.0) if self.paced else p.ravel() / self.unit
-        self._at, self._found = None, None
-        b = self.brought(self.first)
+        self._at, self._values = None, None
+        b = self.values_at(self.first)
         power = b.power[0] if b.power else None
         self.time = aim.time(np.abs(self.loops.cycle(p)[1]).max(), power, cycles.degree)[0] if aim.timed else 1.0
         self.weight = 0.0 if self.paced else even * max(aim.value(b, 1.0)[0], 0.01)
 
     def loop(self, x: np.ndarray) -> np.ndarray:
-        """p of numbers x."""
+        """Return p of numbers x."""
         return np.reshape(x[: self.count] * self.unit, self.shape)
 
     def slopes(self, by: np.ndarray) -> np.ndarray:
-        """(..., len(x)) of slopes (..., *shape) in p; the pace has none."""
+        """Return slopes (..., len(x)) in x of slopes (..., *shape) in p; those in the time are 0."""
         rows = self.unit * np.reshape(by, (*np.shape(by)[: np.ndim(by) - len(self.shape)], self.count))
         return np.concatenate([rows, np.zeros((*rows.shape[:-1], len(self.first) - self.count))], -1)
 
-    def brought(self, x: np.ndarray):
-        """The cycle of x, for which the value and all rules ask."""
+    def values_at(self, x: np.ndarray):
+        """Return the cycle of x, computed once for the objective and all constraints."""
         x = x[: self.count]
         if self._at is None or not np.array_equal(self._at, x):
             if self.cycles.count >= self.last:
                 raise Enough
-            self._found, self._at = self.cycles(self.loop(x)), np.array(x)
-            self.told()
-        return self._found
+            self._values, self._at = self.cycles(self.loop(x)), np.array(x)
+            self.on_cycle()
+        return self._values
 
-    def down(self, x: np.ndarray) -> tuple[float, np.ndarray]:
-        """What is made small, and its slopes."""
-        b = self.brought(x)
+    def objective(self, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the number to be minimised, and its slopes."""
+        b = self.values_at(x)
         value, by = self.aim.value(b, 1 / (2 * np.pi))
         slower = 1.0
         if self.paced:
@@ -69,31 +77,33 @@ class Problem:
         return self.weight * b.uneven[0] - value / slower, slopes
 
     def by_power(self, b) -> tuple[float, np.ndarray]:
-        """Time of a rad of phase by the limit of power, over that of p, and its slopes."""
+        """Return the time of a rad of phase by the limit of power, over that of p, and its slopes."""
         P, dP = b.power
         slower = (P / self.aim.power) ** (1 / self.cycles.degree) / self.time
         return slower, slower / P / self.cycles.degree * dP
 
-    def rules(
+    def constraints(
         self, turn: float, once: Stroke | None, singularity: Callable | None, away: float, dense: bool = False
     ) -> list[dict]:
-        """turn (rad): of a cycle, at most. once: the stroke that a loop stays. singularity: of shapes, no nearer to 0 than
-        ``away``. dense: limits at so many phases that they hold between them."""
-        found = [_limits(self, dense)]
+        """Return the constraints, as `scipy.optimize.minimize` takes them.
+
+        turn (rad): largest net turn of a cycle. once: the stroke that the loop stays. singularity: a function of
+        shapes, at least ``away`` from 0. dense: limits hold between phases, too."""
+        out = [_limits(self, dense)]
         if self.paced:
-            found.append(_rates(self))
-            found += [_power(self)] if self.aim.power is not None else []
-        theta = self.brought(self.first).net[1][2]
-        if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else, as in sines, none of them turns
-            found += _straight(self, turn)
-        found += [] if once is None else [_once(self, once)]
-        return found + ([] if singularity is None else [_away(self, singularity, away)])
+            out.append(_rates(self))
+            out += [_power(self)] if self.aim.power is not None else []
+        theta = self.values_at(self.first).net[1][2]
+        if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
+            out += _straight(self, turn)
+        out += [] if once is None else [_once(self, once)]
+        return out + ([] if singularity is None else [_away(self, singularity, away)])
 
 
-def kept(rule: dict, x: np.ndarray) -> bool:
-    """Whether numbers x keep a rule, nearly."""
+def is_feasible(rule: dict, x: np.ndarray) -> bool:
+    """Return whether numbers x satisfy a constraint, nearly."""
     slack = rule["fun"](x)
-    return bool((np.abs(slack) if rule["type"] == "eq" else -slack).max() <= KEPT)
+    return bool((np.abs(slack) if rule["type"] == "eq" else -slack).max() <= FEASIBLE)
 
 
 def _linear(A: np.ndarray, limit) -> dict:
@@ -101,13 +111,13 @@ def _linear(A: np.ndarray, limit) -> dict:
 
 
 def _limits(of: Problem, dense: bool) -> dict:
-    """No shape beyond them."""
+    """Return the constraint that no shape exceeds its limits."""
     A, limit = of.loops.limits(dense)
     return _linear(of.slopes(A.reshape(-1, *of.shape)), limit)
 
 
 def _rates(of: Problem) -> dict:
-    """No shape variable faster than the limit: the last of x times that in the time of p."""
+    """Return the constraint that no shape variable is faster than the limit, in the time that the last of x sets."""
     A = np.concatenate([np.kron(of.loops.rates, one) for one in np.eye(of.loops.joints)[:, None]])
     A = of.slopes(np.concatenate([A, -A]).reshape(-1, *of.shape))
     A[:, -1] = -of.aim.rate * of.time
@@ -116,17 +126,17 @@ def _rates(of: Problem) -> dict:
 
 def _power(of: Problem) -> dict:
     def slopes(x):
-        found = -of.slopes(of.by_power(of.brought(x))[1])[None]
-        found[:, -1] = 1.0
-        return found
+        out = -of.slopes(of.by_power(of.values_at(x))[1])[None]
+        out[:, -1] = 1.0
+        return out
 
-    return {"type": "ineq", "fun": lambda x: np.array([x[-1] - of.by_power(of.brought(x))[0]]), "jac": slopes}
+    return {"type": "ineq", "fun": lambda x: np.array([x[-1] - of.by_power(of.values_at(x))[0]]), "jac": slopes}
 
 
 def _straight(of: Problem, turn: float) -> list[dict]:
-    """Net turn of at most ``turn`` either way, or of none."""
-    theta = lambda x: np.array([of.brought(x).net[0][2]])
-    slopes = lambda x: of.slopes(of.brought(x).net[1][2])[None]
+    """Return the constraints of a net turn of at most ``turn`` in either sense, or of none."""
+    theta = lambda x: np.array([of.values_at(x).net[0][2]])
+    slopes = lambda x: of.slopes(of.values_at(x).net[1][2])[None]
     if turn < STRAIGHT:
         return [{"type": "eq", "fun": theta, "jac": slopes}]
     return [
@@ -136,19 +146,19 @@ def _straight(of: Problem, turn: float) -> list[dict]:
 
 
 def _once(of: Problem, stroke: Stroke) -> dict:
-    """Never back."""
+    """Return the constraint that the loop never goes back."""
     swept, slopes = lambda x: stroke.swept(of.loop(x)), lambda x: of.slopes(stroke.slopes(of.loop(x)))
     return {"type": "ineq", "fun": swept, "jac": slopes}
 
 
 def _away(of: Problem, singularity: Callable, least: float) -> dict:
-    """On this side of the singular shapes, and no nearer."""
+    """Return the constraint that shapes stay on one side of the singular ones, at a distance."""
     shapes, h = lambda x: of.loops.cycle(of.loop(x))[0], 1e-6
-    side, ways = np.sign(singularity(shapes(of.first))[0]), h * np.eye(of.loops.joints)
+    side, steps = np.sign(singularity(shapes(of.first))[0]), h * np.eye(of.loops.joints)
 
     def slopes(x):
-        there = shapes(x)
-        by = [(singularity(there + e) - singularity(there - e)) / (2 * h) for e in ways]
+        alpha = shapes(x)
+        by = [(singularity(alpha + e) - singularity(alpha - e)) / (2 * h) for e in steps]
         return of.slopes(side * np.einsum("nk,nj->nkj", of.loops.basis, np.stack(by, -1)))
 
     return {"type": "ineq", "fun": lambda x: side * singularity(shapes(x)) - least, "jac": slopes}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from geomech.core.variables import Result, Variable
-from geomech.optimise.limits import Asked
+from geomech.optimise.limits import WithinArgument
 from geomech.optimise.request import Request, checked
 from geomech.optimise.search import search
 from geomech.run.cost import Cost
@@ -19,13 +19,14 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Optimize(Question):
-    """The best gait of a scene; as `optimise` has it. stretch: it is drawn where equal lengths cost the same, too."""
+    """The best gait of a scene, see `optimise`. stretch: it is also drawn in coordinates where equal lengths have equal
+    costs."""
 
     scene: Scene
     aim: str
     direction: str | None = None
     harmonics: int | None = None
-    within: Asked = None
+    within: WithinArgument = None
     starts: int | None = None
     rate: float | None = None
     power: float | None = None
@@ -53,13 +54,15 @@ class Optimize(Question):
         return self.request.cost()
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        found = search(self.request, progress)
-        best, aim, unit = found.best, self.request.aim, length_unit(self.scene.system)
-        told = [Variable("value", (), best.value, aim.unit, aim.name, best.error)]
-        told += [
+        optimum = search(self.request, progress)
+        best, aim, unit = optimum.best, self.request.aim, length_unit(self.scene.system)
+        variables = [Variable("value", (), best.value, aim.unit, aim.name, best.error)]
+        variables += [
             Variable(name, (), x, u, "net displacement per cycle")
             for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad"))
         ]
         costs = (("path_length", best.length), ("work", best.work))
-        told += [Variable(name, (), x) for name, x in costs if x is not None]
-        return Result("optimum", tuple(told), {"active": found.active, "evaluations": found.evaluations}, found)
+        variables += [Variable(name, (), x) for name, x in costs if x is not None]
+        return Result(
+            "optimum", tuple(variables), {"active": optimum.active, "evaluations": optimum.evaluations}, optimum
+        )

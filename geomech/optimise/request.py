@@ -1,4 +1,4 @@
-"""What is asked of the optimiser, checked before anything is computed, and what it will cost."""
+"""Requests to the optimiser, checked before anything is computed, and their cost."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 from geomech.gaits import Gait, Sine
 from geomech.geometry.connection import evaluate
 from geomech.optimise.aims import Aim
-from geomech.optimise.climb import TRIES
-from geomech.optimise.limits import Asked, limits
+from geomech.optimise.ascent import TRIES
+from geomech.optimise.limits import WithinArgument, limits
 from geomech.optimise.loops import DENSE, IN_MIRROR, OUTLINES, Loops
 from geomech.optimise.undulations import Undulations
 from geomech.scene.model import Scene, checked_scene
@@ -27,31 +27,28 @@ from rft.checks import in_range
 from rft.premise import ALL, Premise
 from rft.refusal import Refusal, located
 
-JOINTS = 12  # more make more numbers than a search without a model of them can find
+JOINTS = 12  # with more, loops have too many parameters for this search
 PHASES = 128  # of a cycle in the search
-FINISHED = 3  # answers of the table that the direct tier goes on from
-BESIDE, MORE = (
-    (0.1, 0.2),
-    3,
-)  # rad, if joints have 2.5: how far off the best it goes on beside it, by the table first from the
-# second; and from how many loops each
-SHARE, LED = 0.8, 4  # of the limits: narrower ones, that the search begins within; and how many of its answers lead on
-ROOM = 1.02  # of the field that is looked up, over the limit: on its way the search steps over it
+FINISHED = 3  # optima by tables that the direct tier improves
+PERTURBATIONS = 0.1, 0.2  # rad, if joints have 2.5: of the best loop; the larger ones are first improved by tables
+MORE = 3  # loops for each of these sizes
+SHARE, LED = 0.8, 4  # narrower limits for a first search, relative; and the number of its optima that are start values
+ROOM = 1.02  # extent of tables over the limit, as iterates exceed it
 NEAR, FINISH, POLISH, RUNS = (
     100,
     16,
     60,
     12,
 )  # steps in tables, by the direct tier, of its best, of gaits run as a whole
-CLIMB = 0.4  # s of a search from one start besides, some twice of what it took on the machine this was written on
-STILL = 1e-12  # of the velocity: what is rounding
-LOOPS = 4 + len(OUTLINES)  # of which one at least turns, if any does
-DEGREES = 1e-3  # by which the degree of the power may scatter
+ASCENT = 0.4  # s of other work per ascent, some twice the time on the machine that this was written on
+STILL = 1e-12  # of the velocity: roundoff
+LOOPS = 4 + len(OUTLINES)  # loops for the test whether any turns
+DEGREES = 1e-3  # largest scatter of the degree of the power
 
 
 @dataclass(frozen=True)
 class Request:
-    """A scene, what is to be large in it, and the loops that are tried; `checked` makes one."""
+    """A scene, an aim, and the loops that are searched; built by `checked`."""
 
     scene: Scene
     aim: Aim
@@ -59,33 +56,33 @@ class Request:
     starts: int
 
     def __reduce__(self) -> tuple:
-        """As it is sent to workers: without what is remembered."""
+        """Return the request as workers receive it, without cached values."""
         return Request, (self.scene, self.aim, self.loops, self.starts)
 
     @property
     def system(self) -> System:
-        """The scene's; in the frame that it has by itself, where the search is, if the scene has another."""
+        """System of the search: the scene's, in its original frame if the scene has another."""
         return _inner(self.scene.system)
 
-    whole = property(
+    by_runs = property(
         lambda self: self.system.traits.steps or isinstance(self.loops, Undulations),
         doc="Whether gaits are run as a whole.",
     )
     looks_up = property(
-        lambda self: not self.whole and self.system.joints == 2 and not self.system.traits.linear and self.stored is None
+        lambda self: not self.by_runs and self.system.joints == 2 and not self.system.traits.linear and self.stored is None
         and self.system.traits.singularity is None,
-        doc="Whether a table leads near.",
+        doc="Whether the search begins with tables.",
     )  # fmt: skip
     stored = property(lambda self: stored_table(self.system, "connection"))
 
     @cached_property
     def power(self) -> Callable | None:
-        """power(alpha, alphadot, xi) in body drag x body length / time: by forces, or as a table tells it; the square of its
-        own metric for a system that has one; None where nothing tells what moving costs."""
+        """Function power(alpha, alphadot, xi) in body drag x body length / time, from forces or a table; the squared
+        speed for a system with its own metric; None where the cost of moving is not known."""
         system = self.system
         if self.stored:
-            told, degree, box = stored_table(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
-            return told and (lambda alpha, alphadot, xi: told.norm(np.clip(alpha, *box), alphadot) ** degree)
+            metric, degree, box = stored_table(system, "metric"), system.traits.power_degree or 2.0, self.loops.box
+            return metric and (lambda alpha, alphadot, xi: metric.norm(np.clip(alpha, *box), alphadot) ** degree)
         if own := capability(system, OwnMetric):
             return lambda alpha, alphadot, xi: own.squared_speed(alpha, alphadot)
         dissipative = capability(system, Dissipative)
@@ -93,11 +90,13 @@ class Request:
 
     @cached_property
     def degree(self) -> float:
-        """Of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; ValueError if there is no such."""
+        """Degree of the power in the rate of shape: 2 in a linear medium, 1 in a dry one; Refusal if it has none."""
         aim, system = self.aim, self.system
         if self.power is None:
             instead = "say --rate" if aim.timed else "optimize for displacement, turning or speed"
-            raise Refusal(f"--for {aim.name} asks for power, which {told_by(system)} does not tell", instead=instead)
+            raise Refusal(
+                f"--for {aim.name} asks for power, which {source_name(system)} does not tell", instead=instead
+            )
         if capability(system, OwnMetric) is not None:
             if aim.power is not None:
                 raise Refusal(f"--power is that of drag, and the {kind_of(system)} has none", instead="say --rate")
@@ -123,41 +122,42 @@ class Request:
 
     @cached_property
     def gait(self) -> Gait:
-        """The scene's; where that goes beyond the limits, drawn together so as to keep them."""
+        """Gait of the scene, made smaller where it exceeds the limits."""
         gait, loops = self.scene.gait, self.loops
         if isinstance(loops, Loops):
-            off = np.abs(gait.cycle(DENSE)[0] - loops.middle).max(0)
-            if (off > loops.half * (1 + 1e-3)).any():
+            excursion = np.abs(gait.cycle(DENSE)[0] - loops.middle).max(0)
+            if (excursion > loops.half * (1 + 1e-3)).any():
                 return loops.gait(loops.fitted(loops.of(gait)))
         return gait
 
     @property
     def phases(self) -> int:
-        """Of a cycle that is told: a multiple of 8, as errors are estimated on an eighth of them."""
+        """Phases at which a gait is evaluated: a multiple of 8, as errors are estimated on an eighth of them."""
         return 8 * -(-max(self.scene.numerics.phases, self.loops.phases) // 8)
 
     def cost(self) -> cost.Cost:
-        """Balances, seconds and memory that it takes at most."""
+        """Return the balances, seconds and memory that the search takes at most."""
         scene, loops, gait = self.scene, self.loops, self.gait
         numbers = int(np.prod(loops.shape))
-        each = 1 + 2 * numbers if self.whole else 1 + 4 * self.system.joints
+        each = 1 + 2 * numbers if self.by_runs else 1 + 4 * self.system.joints
         finished = min(FINISHED, self.starts) if self.looks_up else self.starts
         jobs = cost.direct(scene, gait, 3 + finished, max(scene.numerics.phases, PHASES))
         if self.looks_up:
             jobs += cost.harmonics(scene.changed(system=self.system).with_numerics(extent=self.extent))
-            beside = 2 * MORE * (self.starts > 1)
-            steps = (finished + 2 * beside) * FINISH + POLISH * self.phases / loops.phases
+            perturbed = 2 * MORE * (self.starts > 1)
+            steps = (finished + 2 * perturbed) * FINISH + POLISH * self.phases / loops.phases
         else:
-            steps = self.starts * (RUNS if self.whole else NEAR)
+            steps = self.starts * (RUNS if self.by_runs else NEAR)
         gaits = int(steps * TRIES * each)
-        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, every=True)
-        found, climbs = cost.price(jobs), CLIMB * (self.climbs + 1)
-        return found._replace(seconds=found.seconds + climbs, besides=found.besides + climbs)
+        jobs += cost.direct(scene, gait, gaits, loops.phases, each, checked=False, all_phases=True)
+        total, ascents = cost.price(jobs), ASCENT * (self.ascents + 1)
+        return total._replace(seconds=total.seconds + ascents, besides=total.besides + ascents)
 
     @property
-    def climbs(self) -> int:
-        """How many climbs it takes: from its starts and, where a table leads near, by the direct tier and once more from the
-        best; with several starts also within narrower limits, on from there, and from beside the best."""
+    def ascents(self) -> int:
+        """Number of ascents: one from each start and, where tables are used, by the direct tier and once more from the
+        best; with several starts also within narrower limits, from their results, and from perturbations of the best.
+        """
         if not self.looks_up:
             return self.starts
         more = self.starts + LED + 3 * MORE if self.starts > 1 else 0
@@ -165,15 +165,15 @@ class Request:
 
     @property
     def extent(self) -> float:
-        """Of the field that is looked up."""
+        """Extent of the field of the tables."""
         return float(np.abs(self.loops.box).max()) * ROOM
 
 
 def checked(
-    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: Asked = None,
+    scene: Scene, aim: str, direction: str | None = None, harmonics: int | None = None, within: WithinArgument = None,
     starts: int | None = None, rate: float | None = None, power: float | None = None,
 ) -> Request:  # fmt: skip
-    """The request, or Refusal, one line, for one that makes no sense."""
+    """Return the request; Refusal for one that makes no sense."""
     with located(checked_scene(scene).name):
         in_range("--starts", 1 if starts is None else starts, 1, 1000, whole=True)
         system, limits = scene.system, {"rate": rate, "power": power}
@@ -184,39 +184,39 @@ def checked(
                 because=f"A is known near {near_gait(system)} alone",
                 instead="measure more varied cycles",
             )
-        wanted = Aim(aim, towards, system.length, **limits)
-        if wanted.timed:
+        objective = Aim(aim, towards, system.length, **limits)
+        if objective.timed:
             if system.traits.lacks & Premise.RATE_INDEPENDENT:
                 refuse(system, "speed", Premise.RATE_INDEPENDENT, "optimize for displacement, at the scene's frequency")
             if rate is None and power is None:
                 waves = isinstance(scene.gait, Sine)
                 own = {"power": _own_power(scene)} if waves else {"rate": _own_rate(scene)}
-                wanted = Aim(aim, towards, system.length, **own)
+                objective = Aim(aim, towards, system.length, **own)
         loops = _loops(scene, harmonics, within)
-        if isinstance(loops, Undulations) and not wanted.straight:
+        if isinstance(loops, Undulations) and not objective.straight:
             raise Refusal(
                 "a sine along a straight axis does not turn", because="--for turning takes a gait of few joints"
             )
-        if isinstance(loops, Undulations) and wanted.direction == "y" and system.traits.mirror:
+        if isinstance(loops, Undulations) and objective.direction == "y" and system.traits.mirror:
             raise Refusal("a sine along a straight axis brings nothing across it", instead="drop --direction, or say x")
-        if isinstance(loops, Undulations) and wanted.rate is not None:
+        if isinstance(loops, Undulations) and objective.rate is not None:
             raise Refusal(
                 "a wave is as fast as its power allows", instead="say --power, a limit of rate is that of joints"
             )
-        request = Request(scene, wanted, loops, 1 if starts is None else int(starts))
+        request = Request(scene, objective, loops, 1 if starts is None else int(starts))
         if starts is None and request.looks_up:
             request = dataclasses.replace(request, starts=1 + len(OUTLINES) - IN_MIRROR * _in_mirror(request))
-        if wanted.costs:
+        if objective.costs:
             request.degree  # noqa: B018 - refuses what has none
-        if wanted.straight and _stays(system):
+        if objective.straight and _stays(system):
             raise Refusal(
                 f"the {kind_of(system)} goes nowhere",
                 because="its mean frame stays where it is",
                 instead="optimize for turning",
             )
-        if wanted.name == "turning" and _never_turns(request):
+        if objective.name == "turning" and _never_turns(request):
             whose = (
-                f"{told_by(system)} tells a body whose"
+                f"{source_name(system)} tells a body whose"
                 if stored_table(system, "connection")
                 else f"the {kind_of(system)}'s"
             )
@@ -228,18 +228,18 @@ def checked(
         return request
 
 
-def told_by(system: System) -> str:
-    """A system, or its file."""
+def source_name(system: System) -> str:
+    """Return the name of a system, or of its file."""
     return "the table's file" if stored_table(system, "connection") else f"the {kind_of(system)}"
 
 
 def _in_mirror(request: Request) -> bool:
-    """Whether the last of `OUTLINES` are others in the mirror."""
+    """Return whether the last of `OUTLINES` are mirror images of others."""
     return request.system.traits.mirror and not request.loops.middle.any()
 
 
 def _stays(system: System) -> bool:
-    """Whether no change of shape moves its mean frame, or its own if it has none, at a few shapes that stand for all."""
+    """Return whether no change of shape moves its mean frame, or its own if it has none, tested at a few shapes."""
     if system.traits.steps or not system.traits.linear or stored_table(system, "connection"):
         return False
     with contextlib.suppress(ValueError, TypeError):
@@ -250,29 +250,30 @@ def _stays(system: System) -> bool:
 
 
 def _never_turns(request: Request) -> bool:
-    """Whether the heading of a system is a function of its shape, dA_theta = 0, by a few loops that stand for all."""
+    """Return whether the heading is a function of the shape, dA_theta = 0, tested on a few loops."""
     system, loops = request.system, request.loops
     if system.traits.steps or not system.traits.linear or system.traits.singularity is not None:
         return False
-    some = np.array(loops.starts(loops.of(request.gait), LOOPS))
-    turning = evaluate(system.velocity, *loops.cycle(some))[..., 2]
+    samples = np.array(loops.starts(loops.of(request.gait), LOOPS))
+    turning = evaluate(system.velocity, *loops.cycle(samples))[..., 2]
     return bool(np.abs(turning.mean(-1)).max() <= STILL * np.abs(turning).max())
 
 
 def _own_rate(scene: Scene) -> float:
-    """The fastest rate of shape in the scene's gait, rad/s, where it has a frequency and moves; else 1 rad a unit of time."""
+    """Return the fastest rate of shape in the scene's gait, rad/s; 1 without a frequency, or for a gait that rests."""
     return float(2 * np.pi * (scene.frequency or 0.0) * np.abs(scene.gait.cycle(PHASES)[1]).max()) or 1.0
 
 
 def _own_power(scene: Scene) -> float:
-    """The mean power of the scene's gait at its frequency, or at 1 rad of phase a unit of time; 1 where it rests."""
+    """Return the mean power of the scene's gait at its frequency, or at 1 rad of phase per unit of time; 1 for a gait
+    that rests."""
     gait, system = scene.gait, scene.system
-    done = system.run(*gait.cycle(PHASES), True).work
+    work = system.run(*gait.cycle(PHASES), True).work
     per_second = 2 * np.pi * scene.frequency if scene.frequency else 1.0
-    return float(np.maximum(done.power, 0.0).mean() / system.length * per_second**system.traits.power_degree) or 1.0
+    return float(np.maximum(work.power, 0.0).mean() / system.length * per_second**system.traits.power_degree) or 1.0
 
 
-def _loops(scene: Scene, harmonics: int | None, within: Asked) -> Loops | Undulations:
+def _loops(scene: Scene, harmonics: int | None, within: WithinArgument) -> Loops | Undulations:
     gait, system, n = scene.gait, scene.system, scene.numerics
     if isinstance(gait, Sine):
         for name, value in (("harmonics", harmonics), ("within", within)):

@@ -1,18 +1,18 @@
-"""One stroke a cycle: a loop that goes round its centre once, and never back."""
+"""Strokes: loops that go round their centre once, and never back."""
 
 from __future__ import annotations
 
 import numpy as np
 
-FLAT, BACK = 0.05, 1e-9  # of the first harmonic: how thin a plane is none; of its sweep: how far back is not back
-NEWTON = 3  # steps to the least sweep between two phases
+FLAT, BACK = 0.05, 1e-9  # of the first harmonic: thinner ellipses span no plane; of its sweep: tolerance
+NEWTON = 3  # steps to the least sweep in an interval
 
 
 class Stroke:
-    """The sense and the plane, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`.
+    """The plane and the sense, of its first harmonic, in which a loop p goes round its centre; loops: `Loops`.
 
-    The sweep of p, the area about the centre for each phase, is a trigonometric polynomial. It is held at the least that it
-    has in each of N intervals between phases, so that a loop which goes back nowhere there goes back nowhere."""
+    The area that p sweeps about the centre, per phase, is a trigonometric polynomial. Its minimum is found in each of N
+    intervals between phases; where all minima are positive, the loop never goes back."""
 
     def __init__(self, loops, p: np.ndarray):
         self.plane, size, _ = np.linalg.svd(p[1:3].T, full_matrices=False)  # (joints, 2)
@@ -25,37 +25,37 @@ class Stroke:
             self.side = float(np.sign((u * dv - v * du).mean())) or 1.0
 
     def _going(self, p: np.ndarray, phases: np.ndarray) -> list[np.ndarray]:
-        """The loop about its centre at the phases (N,), and its first three derivatives, (2, N) each."""
+        """Return the loop about its centre at the phases (N,), and its first three derivatives, (2, N) each."""
         q = p @ self.plane
         each = [(1j * self.k[:, None]) ** n * (q[1::2] - 1j * q[2::2]) for n in range(4)]
         return np.split((np.exp(1j * np.outer(phases, self.k)) @ np.concatenate(each, 1)).real.T, 4)
 
     def lowest(self, p: np.ndarray) -> np.ndarray:
-        """(N,): the phase of least sweep in each interval between phases."""
+        """Return the phase (N,) of least sweep in each interval between phases."""
         if self._of is None or not np.array_equal(self._of, p):
-            self._of, self._lowest = np.array(p), self._found(p)
+            self._of, self._lowest = np.array(p), self._minimised(p)
         return self._lowest
 
-    def _found(self, p: np.ndarray) -> np.ndarray:
-        """`lowest`, by Newton's method."""
+    def _minimised(self, p: np.ndarray) -> np.ndarray:
+        """Return `lowest`, by Newton's method."""
         cross = lambda a, b: self.side * (a[0] * b[1] - a[1] * b[0])
-        off = np.zeros_like(self.phases)
+        shift = np.zeros_like(self.phases)
         for _ in range(NEWTON):
-            x, dx, ddx, dddx = self._going(p, self.phases + off)
+            x, dx, ddx, dddx = self._going(p, self.phases + shift)
             rise, bend = cross(x, ddx), cross(dx, ddx) + cross(x, dddx)
             step = -rise / np.where(bend > 0, bend, 1.0)
-            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where it has no least
-            off = np.clip(off + step, -self.width / 2, self.width / 2)
-        return self.phases + off
+            step = np.where(bend > 0, step, -np.sign(rise) * self.width)  # to an edge, where there is no minimum
+            shift = np.clip(shift + step, -self.width / 2, self.width / 2)
+        return self.phases + shift
 
     def swept(self, p: np.ndarray) -> np.ndarray:
-        """(N,): the least area about the centre that the loop p sweeps for each phase, in every interval between phases, over
-        that of its first harmonic."""
+        """Return the least area (N,) per phase that the loop p sweeps about the centre in every interval, over that of
+        its first harmonic."""
         (u, v), (du, dv) = self._going(p, self.lowest(p))[:2]
         return self.side * (u * dv - v * du) / self.size
 
     def slopes(self, p: np.ndarray) -> np.ndarray:
-        """Those of `swept`, (N, *shape of p)."""
+        """Return the slopes of `swept`, (N, *shape of p)."""
         at = self.lowest(p)
         (u, v), (du, dv) = self._going(p, at)[:2]
         kt = np.outer(at, self.k)
@@ -68,14 +68,14 @@ class Stroke:
         return self.side * rows / self.size
 
     def winding(self, p: np.ndarray) -> int:
-        """How often the loop goes round, in the sense of the first."""
+        """Return how often the loop goes round its centre, in the sense of the first."""
         u, v = self._going(p, self.phases)[0]
         q = u + 1j * v
         return int(np.rint(self.side * np.angle(np.roll(q, -1) * np.conj(q)).sum() / (2 * np.pi)))
 
     @classmethod
     def is_one(cls, loops, p: np.ndarray, back: float = BACK) -> bool:
-        """Whether the loop is one stroke, and its sweep nowhere further below 0 than ``back``."""
+        """Return whether the loop is one stroke, with a sweep that is nowhere below -``back``."""
         if p.ndim != 2 or p.shape[1] < 2:
             return False
         own = cls(loops, p)

@@ -1,4 +1,4 @@
-"""Undulation of a body of many elements as two numbers, amplitude over wavelength and waves on the body."""
+"""Undulations of a body of many elements as two numbers: amplitude over wavelength, and waves on the body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ ELEMENTS_PER_WAVE = 12  # with fewer a sine is a polygon
 
 @dataclass(frozen=True)
 class Undulations:
-    """All sines of a body of as many elements as ``first``, which runs them its way, seen at ``phases``. p is (2,)."""
+    """All sines of a body with the elements of ``first``, evaluated at ``phases``. The parameters p are (amplitude,
+    waves)."""
 
     first: Sine
     phases: int = 64
@@ -27,26 +28,26 @@ class Undulations:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest numbers, (2,) each."""
+        """Least and largest parameters, (2,) each."""
         return np.array(LEAST), np.array([MOST[0], min(MOST[1], self.first.elements / ELEMENTS_PER_WAVE)])
 
     def cycle(self, p) -> tuple[np.ndarray, np.ndarray]:
-        """(alpha, alphadot), (..., N, joints), of sines p (..., 2)."""
-        found = [self.gait(x).cycle(self.phases) for x in np.reshape(p, (-1, 2))]
-        return tuple(np.stack(x).reshape(*np.shape(p)[:-1], self.phases, -1) for x in zip(*found))
+        """Return alpha and alphadot (..., N, joints) of sines p (..., 2)."""
+        cycles = [self.gait(x).cycle(self.phases) for x in np.reshape(p, (-1, 2))]
+        return tuple(np.stack(x).reshape(*np.shape(p)[:-1], self.phases, -1) for x in zip(*cycles))
 
     def limits(self, dense: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """(A, b) with A p <= b, which holds at all phases."""
+        """Return (A, b) with A p <= b, which holds at all phases."""
         low, high = self.bounds
         return np.concatenate([np.eye(2), -np.eye(2)]), np.concatenate([high, -low])
 
     def active(self, p) -> list[str]:
-        """Limits that the sine touches."""
-        found = []
+        """Return the limits that the sine touches, as text."""
+        names = []
         for name, x, low, high in zip(NAMES, p, *self.bounds):
-            found += [f"{name} >= {low:g}"] if x <= low * (1 + TOUCHING) else []
-            found += [f"{name} <= {high:g}"] if x >= high * (1 - TOUCHING) else []
-        return found
+            names += [f"{name} >= {low:g}"] if x <= low * (1 + TOUCHING) else []
+            names += [f"{name} <= {high:g}"] if x >= high * (1 - TOUCHING) else []
+        return names
 
     def gait(self, p) -> Sine:
         return dataclasses.replace(self.first, amplitude=float(p[0]), waves=float(p[1]))
@@ -58,10 +59,10 @@ class Undulations:
         return np.clip(p, *self.bounds)
 
     def starts(self, own, count: int, seed: int = 0) -> list[np.ndarray]:
-        """``count`` sines to begin with, ``own`` the first."""
+        """Return ``count`` initial sines, ``own`` the first."""
         rng, (low, high) = np.random.default_rng(seed), self.bounds
         return [self.fitted(own)] + [low + (high - low) * rng.uniform(0.05, 0.5, 2) for _ in range(count - 1)]
 
     def same(self, p, q) -> bool:
-        """Whether two sines are one."""
+        """Return whether two sines are the same."""
         return bool(np.abs(np.asarray(p) - q).max() < 0.01)

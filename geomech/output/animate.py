@@ -14,8 +14,8 @@ from geomech.io.files import atomic_file
 from geomech.output import plots
 from geomech.output.plots.style import styled
 from geomech.run.cost import Cost
+from geomech.run.progress import counted
 from geomech.run.progress import progress as shown
-from geomech.run.progress import told
 from geomech.scene.model import Scene
 from geomech.study.motion import Motion, Picture
 from rft.refusal import Refusal
@@ -77,7 +77,7 @@ def save(path: Path, motion: Motion, field=None, error=None, progress: Callable 
         plots.save(plots.filmstrip(motion, field, error), path)
         return
     some = rows(motion.scene.numerics.phases, motion.cycles)
-    film = told(_frames(motion, some, field, error), len(some), progress)
+    film = counted(_frames(motion, some, field, error), len(some), progress)
     with atomic_file(path) as part:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
 

@@ -12,8 +12,8 @@ import numpy as np
 from geomech.geometry.connection import Connection
 from geomech.geometry.field import Field
 from geomech.output import plots
-from geomech.study.bench import Study
 from geomech.study.results import Displacements
+from geomech.study.study import Study
 from geomech.study.sweep import Swept
 from geomech.study.tables import position_spread
 from geomech.text.system import described

@@ -89,8 +89,8 @@ class Connection:
         if space.planes:
             plots.save(plots.plane_connection_figure(space.planes, **told), path)
             return
-        if space.beside:
-            told |= {"beside": space.beside.fitted, "names": [scene.frame, self.beside]}
+        if space.other:
+            told |= {"beside": space.other.fitted, "names": [scene.frame, self.beside]}
         plots.save(plots.connection_figure(space.study.fitted, **told), path)
 
 
@@ -117,12 +117,12 @@ class Ccf:
 
     def _slices(self, space: Space) -> Any:
         scene, told = space.study.scene, {"style": self.style or "map"}
-        if space.planes_beside:
-            told |= {"beside": space.planes_beside[0], "names": [scene.frame, self.beside]}
+        if space.other_planes:
+            told |= {"beside": space.other_planes[0], "names": [scene.frame, self.beside]}
         return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **told)
 
     def _map(self, space: Space) -> Any:
-        study, scene, other = space.study, space.study.scene, space.beside
+        study, scene, other = space.study, space.study.scene, space.other
         told: dict[str, Any] = {
             "gaits": [scene.gait],
             "error": study.curvature_error,

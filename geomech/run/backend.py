@@ -1,4 +1,4 @@
-"""Which back end a request takes: compiled code where its number of balances is worth it and all workers have it."""
+"""The back end of a request: compiled code where the number of balances is worth its start and all workers have it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 VERSION = f"geomech {version.VERSION}, solver {SOLVER}"
-BACKENDS = "numpy", "numba"  # slow ones first
+BACKENDS = "numpy", "numba"  # slowest first
 MANY = 100_000  # balances, which take NumPy about as long as compiled code takes to load
 
 _most: ContextVar[str] = ContextVar("most", default="numba")
@@ -32,7 +32,7 @@ def fastest() -> str:
 
 @contextlib.contextmanager
 def at_most(name: str) -> Iterator[None]:
-    """Let no back end be taken in the body of the statement that is faster than this one."""
+    """Use no back end faster than this one in the body of the statement."""
     token = _most.set(min(name, fastest(), key=BACKENDS.index))
     try:
         with preferring(min(preferred(), fastest(), key=BACKENDS.index)):
@@ -42,11 +42,11 @@ def at_most(name: str) -> Iterator[None]:
 
 
 def suiting(balances: float) -> contextlib.AbstractContextManager[None]:
-    """Let "auto" be the fastest back end in the body of the statement if so many balances are worth its start."""
+    """Let "auto" be the fastest back end in the body of the statement if this number of balances is worth its start."""
     return preferring(fastest() if balances >= MANY else "")
 
 
 def prefer_for(balances: float) -> None:
-    """Let "auto" be the fastest back end from here on if so many balances are worth its start."""
+    """Let "auto" be the fastest back end from here on if this number of balances is worth its start."""
     if balances >= MANY:
         prefer(fastest())

@@ -1,10 +1,9 @@
-"""What a request costs, and when that is too much to begin without being told to.
+"""Cost of requests, and the limits beyond which they need consent.
 
-Balances and memory are counted beforehand. Seconds are assumed at first, from what balances took on the machine that
-this was written on; where the assumption does not decide, the first balances of the request itself tell what they take
-here. They are part of the request: nothing is computed to be timed. No number that is computed depends on seconds, which
-are of computing, so that other work on the machine does not count.
-"""
+Balances and memory are counted beforehand. Seconds are assumed at first, from the time of balances on the machine that
+this was written on; where the assumption does not decide, the first balances of the request itself are timed. They are
+part of the request: nothing is computed only to be timed. No computed number depends on seconds. Seconds are CPU time,
+so that other work on the machine does not count."""
 
 from __future__ import annotations
 
@@ -15,13 +14,13 @@ from typing import NamedTuple
 from geomech.run.backend import listen, listener, nobody, preferred
 from rft.refusal import Refusal
 
-LONGEST = 60.0  # s of computing that a command begins without being told to
+LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
-BASE = 1.6e8  # bytes: Python with its libraries, and the solver's batch
+BASE = 1.6e8  # bytes: Python, its libraries, and a batch of the solver
 SURE = 10.0  # factor by which the assumed seconds may be wrong
-ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that tell how long others take
-LOADING = 20.0  # times what is usual: a batch that takes longer has loaded or compiled code
+ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that suffice to time them
+LOADING = 20.0  # times the median: a batch that takes longer has loaded or compiled code
 
 # Assumed seconds, for each place of the body where forces are evaluated; measured 3.5e-6 to 6e-6 by NumPy and 0.7e-6 to
 # 1.8e-6 compiled in dry media, 0.4e-6 and 0.2e-6 in a linear one; and for each batch of balances, however small.
@@ -32,12 +31,12 @@ STEP = 200  # balances of large batches that take NumPy as long as one batch, ho
 
 
 class TooLong(Refusal):
-    """What is asked for takes more computing or memory than a command begins without being told to."""
+    """A request needs more computing or memory than a command begins without consent."""
 
 
 class Cost(NamedTuple):
-    """balances: of force. seconds: of computing, ``besides`` of which are of other work. memory: bytes at the peak. steps: of
-    time, in which balances are solved one after the other."""
+    """Cost of a request. balances: of force. seconds: of computing, ``besides`` of which are other work. memory: bytes
+    at the peak. steps: of time, in which balances are solved one after the other."""
 
     balances: int
     seconds: float
@@ -51,55 +50,55 @@ class Cost(NamedTuple):
 
     @property
     def as_balances(self) -> float:
-        """Balances that take NumPy about as long, for the choice of a back end."""
+        """Number of balances that take NumPy about as long, for the choice of a back end."""
         return self.balances + STEP * self.steps
 
     @property
     def small(self) -> bool:
-        """Not worth saying."""
+        """Whether the cost is too small to be printed."""
         return self.seconds < WORTH_SAYING and self.memory < LARGEST
 
     def scaled(self, factor: float) -> Cost:
-        """Return the cost where balances take so many times as long."""
+        """Return the cost if balances take ``factor`` times as long."""
         return self._replace(seconds=self.besides + factor * (self.seconds - self.besides))
 
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
-        """`TooLong` where it goes beyond the limits and ``yes`` does not allow that. less: what to do else."""
+        """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
             limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
             raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say --yes, or {less}")
 
 
 def assumed(samples: float, points: int, linear: bool, batches: float, back_end: str = "") -> float:
-    """Return the seconds that balances take, so many in all in so many batches, by the preferred back end or another."""
+    """Return the assumed seconds of so many balances in so many batches, by the preferred back end or another."""
     back_end = back_end or preferred()
     return samples * points * (LINEAR if linear else 1.0) * BALANCE[back_end] + batches * BATCH[back_end]
 
 
 def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
-    """Call judge(cost) at once where the assumed seconds tell enough, else once the balances to come have told theirs; what
-    it raises ends the request."""
+    """Call judge(cost) at once where the assumed seconds decide, else once the first balances have been timed; an
+    exception from it ends the request."""
     of_balances = cost.seconds - cost.besides
-    tells_enough = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
-    decided = tells_enough or cost.memory > LARGEST
+    is_clear = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
+    decided = is_clear or cost.memory > LARGEST
     listen(
         nobody if decided else _Watch(cost, judge)
-    )  # what an earlier part of the request took says nothing of this one
+    )  # times of an earlier part of the request do not apply to this one
     if decided:
         judge(cost)
 
 
 def is_undecided() -> bool:
-    """Return whether balances to come are still to tell what they take."""
+    """Return whether the first balances are still to be timed."""
     return isinstance(listener(), _Watch) and not listener().over
 
 
 class _Watch:
-    """Times the first balances of a request, but for those that load code."""
+    """A listener that times the first balances of a request, except those that load code."""
 
     def __init__(self, cost: Cost, judge: Callable[[Cost], None]):
         self.cost, self.judge, self.over = cost, judge, False
-        self.back_end = preferred()  # which threads of the solver do not know
+        self.back_end = preferred()  # threads of the solver do not inherit it
         self.last: float | None = None
         self.batches: list[tuple[float, float]] = []  # (seconds, those assumed)
 
@@ -115,11 +114,11 @@ class _Watch:
             self.judge(self.cost.scaled(self._factor()))
 
     def _factor(self) -> float:
-        """Return what balances take over what was assumed."""
+        """Return the seconds of balances over those assumed."""
         factors = sorted(took / each for took, each in self.batches)
         most = LOADING * factors[len(factors) // 2]
-        took, told = map(sum, zip(*((took, each) for took, each in self.batches if took <= most * each)))
-        return took / told
+        took, expected = map(sum, zip(*((took, each) for took, each in self.batches if took <= most * each)))
+        return took / expected
 
 
 def _duration(seconds: float) -> str:

@@ -17,14 +17,14 @@ PLAIN = type(None), bool, int, float, complex, str, bytes, PurePath, Enum, range
 
 
 class Undigestible(TypeError):
-    """A value whose content cannot be told, such as a generator."""
+    """A value without digestible content, such as a generator."""
 
 
 def digest(*values: Any) -> bytes:
-    """Return the SHA-256 of values to the last digit: arrays, numbers, text, containers, functions, objects by their fields.
+    """Return the SHA-256 of values to the last digit: arrays, numbers, text, containers, functions, objects by their
+    fields.
 
-    Fields that take no part in comparisons of a dataclass take none in its digest, nor does what an object has cached.
-    `Undigestible` for what is none of these."""
+    Dataclass fields that are not compared are left out, as are cached properties. `Undigestible` for other objects."""
     hashed = hashlib.sha256()
     try:
         _feed(hashed.update, values)
@@ -100,7 +100,7 @@ def _caches(attribute: Any) -> bool:
 
 
 def _code(f: types.FunctionType) -> tuple:
-    """Return the name of a function of a module; of one made inside another its code and what it has from there, too."""
+    """Return the name of a function of a module; for a function defined inside another its code and closure, too."""
     if "<" not in f.__qualname__:
         return "function", _name(f)
     cells = [cell.cell_contents for cell in f.__closure__ or ()]

@@ -1,4 +1,4 @@
-"""Others who compute: processes of this machine, one a core, or the workers of a Dask cluster."""
+"""Executors: processes of this machine, one per core, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from geomech.run.backend import BACKENDS, VERSION, fastest
 from rft.refusal import Refusal, formatted
 
 AHEAD = 4  # tasks for each worker that are submitted before the oldest is back
-LONGEST_END = 2.0  # s for a pool whose processes are killed to see that
-PATIENCE = 0.2  # s for a pool to drop what is cancelled
+LONGEST_END = 2.0  # s for a pool to notice that its processes were killed
+PATIENCE = 0.2  # s for a pool to drop cancelled tasks
 WAIT = 3.0  # s for the scheduler to answer, and for a first worker
 SEEN = 10.0  # s after which workers of a cluster are counted again: they may come and go
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class Processes:
-    """So many processes, started by the first task; when one is ended from outside all are started anew."""
+    """A pool of so many processes, started by the first task; when one is ended from outside all are started anew."""
 
     remote, patience = False, None
 
@@ -50,7 +50,7 @@ class Processes:
         return AHEAD * self.count
 
     def look(self, future: Future) -> None:
-        """A process that is ended is noticed by the pool."""
+        """Do nothing: the pool notices a process that is ended."""
 
     def failure(self, error: Exception) -> Exception:
         return error
@@ -64,7 +64,9 @@ class Processes:
             manager, processes = pool._executor_manager_thread, list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
             until = time.monotonic() + PATIENCE
-            while manager and _has_cancelled(manager) and time.monotonic() < until:  # those would make it fail, loudly
+            while (
+                manager and _has_cancelled(manager) and time.monotonic() < until
+            ):  # cancelled tasks would make it print a traceback
                 time.sleep(1e-3)
             for process in processes:
                 process.kill()
@@ -100,7 +102,7 @@ def undisturbed() -> Iterator[None]:
 
 
 class Cluster:
-    """The workers of one Dask scheduler; of one that is lost Dask gives the tasks to others."""
+    """The workers of one Dask scheduler. Dask gives the tasks of a lost worker to others."""
 
     remote = True
 
@@ -122,7 +124,7 @@ class Cluster:
     def _connected(self, distributed):
         """Return the client; Refusal if nothing answers, or something else does that says nothing."""
         for name in ("distributed", "distributed.client"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what is wrong is said in a line
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are one line here
         answer: Future = Future()
         threading.Thread(target=self._connect, args=(distributed, answer), daemon=True).start()
         try:
@@ -139,8 +141,10 @@ class Cluster:
     def _connect(self, distributed, answer: Future) -> None:
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of versions that differ: `_checked` tells of what matters
-                distributed.comm.resolve_address(self.address)  # a client of what is none complains when it is gone
+                warnings.simplefilter("ignore")  # on different versions: `_checked` refuses those that matter
+                distributed.comm.resolve_address(
+                    self.address
+                )  # a client of another server prints an error when it is deleted
                 answer.set_result(distributed.Client(self.address, timeout=WAIT, set_as_default=False))
         except Exception as error:
             answer.set_exception(error)
@@ -155,21 +159,21 @@ class Cluster:
                 )
             time.sleep(0.05)
         try:
-            found = self.client.run(_probe)
+            workers = self.client.run(_probe)
         except Exception as error:
             raise Refusal(
                 f"its workers cannot load geomech ({formatted(str(error), 120)})",
                 where=self.place,
                 instead="install it there",
             ) from None
-        for worker, (version, _) in found.items():
+        for worker, (version, _) in workers.items():
             if version != VERSION:
                 raise Refusal(
                     f"the worker {worker} has {version}, this command {VERSION}",
                     where=self.place,
                     instead="install the same there",
                 )
-        return min((back_end for _, back_end in found.values()), key=BACKENDS.index)
+        return min((back_end for _, back_end in workers.values()), key=BACKENDS.index)
 
     def _count(self) -> int:
         """Return the number of threads of all workers."""

@@ -32,16 +32,16 @@ from geomech.run.cost import TooLong, is_undecided
 from geomech.run.digest import Undigestible, digest
 from geomech.run.executors import undisturbed
 from geomech.run.store import CHECKPOINT, Busy, Store
-from geomech.run.tasks import Alone, Order, here, opened, packed, perform
+from geomech.run.tasks import Alone, Order, compute_here, opened, packed, perform
 from rft.refusal import Refusal
 
-WORTH = 3.0  # s of computing, below which other processes are not worth their start: a second of each
+WORTH = 3.0  # s of computing, below which other processes are not worth their start of a second each
 TRIES = 3  # of a task whose process is ended from outside
 
 
 class Executor(Protocol):
-    """Others who compute, by a `concurrent.futures.Executor`. remote: not for this command alone. patience: s after which
-    whoever waits for a result asks `look` whether it will come."""
+    """An executor of tasks, by way of a `concurrent.futures.Executor`. remote: shared with other commands. patience:
+    seconds to wait for a result before `look` is called."""
 
     remote: bool
     patience: float | None
@@ -52,7 +52,7 @@ class Executor(Protocol):
         """Return how many tasks may be submitted before the oldest is back."""
 
     def look(self, future: Future) -> None:
-        """Say what a result waits for."""
+        """Report why a result is late."""
 
     def failure(self, error: Exception) -> Exception:
         """Return the error to raise for one of the executor's own."""
@@ -62,7 +62,7 @@ class Executor(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Runner:
-    """Who computes and what remembers, on which no result depends. context: all that results follow from besides task,
+    """An executor and a store. No result depends on them. context: all data that results depend on besides task,
     arguments and back end."""
 
     store: Store = dataclasses.field(default_factory=Store, compare=False)
@@ -75,49 +75,49 @@ class Runner:
     ) -> Iterator:  # fmt: skip
         """Yield task(common, item) of every item, ``total`` in all, in their order.
 
-        Tasks are computed here as long as all that are left are not worth the start of other processes. Each takes one
-        thread and the back end of the request, so that the digits do not depend on who computes. seconds: of computing
-        that all take, if known; else the first tasks tell. progress: called with the fraction done."""
+        Tasks are computed in this process while the remaining ones are not worth the start of others. Each takes one
+        thread and the back end of the request, so that the digits do not depend on the executor. seconds: of computing
+        that all take, if known; else the first tasks are measured. progress: called with the fraction done."""
         queue, done = _Queue(self, task, common, total, seconds), 0
         with contextlib.closing(queue):
-            for found in queue.results(items):
+            for result in queue.results(items):
                 done += 1
                 if progress:
                     progress(done / max(done, total))
-                yield found
+                yield result
 
     def each(self, function: Callable, items: Sequence) -> Iterator:
-        """Yield function(item) of every item, as `geomech.core.work.each` has it."""
+        """Yield function(item) of every item; see `geomech.core.work.each`."""
         is_task = isinstance(function, functools.partial) and len(function.args) == 1 and not function.keywords
         task, common = (function.func, function.args[0]) if is_task else (_applied, function)
         return self.map(task, common, items, len(items))
 
     def call(self, task: Callable, *arguments) -> Any:
-        """Return task(*arguments), computed here if it is not stored."""
+        """Return task(*arguments), computed if it is not stored."""
         key, kind = self._key(task, arguments), _kind(task)
-        found = self._stored(key, kind)
-        if found is None:
-            found = (task(*arguments),)
-            self._store(key, found[0], kind)
-        return found[0]
+        stored = self._stored(key, kind)
+        if stored is None:
+            stored = (task(*arguments),)
+            self._store(key, stored[0], kind)
+        return stored[0]
 
     def iterate(self, step: Callable, state: Any, count: int, of: tuple, row: Any = Any) -> tuple[Any, list]:
         """Return the state after ``count`` times step(state) -> (state, row), and the rows.
 
-        Pieces of `CHECKPOINT` seconds are stored, from which a stopped request resumes. of: all that steps follow from
-        besides the state, which consists of arrays and numbers. row: the type of a row."""
+        Every `CHECKPOINT` seconds the state is stored, and a stopped request resumes from there. of: all data that
+        steps depend on besides the state, which consists of arrays and numbers. row: the type of a row."""
         rows: list = []
         while (remaining := count - len(rows)) > 0:
             key, kind = self._key(Runner.iterate, (of, state, remaining)), tuple[Any, list[row]]
-            found = self._stored(key, kind)
-            if found is None:
+            stored = self._stored(key, kind)
+            if stored is None:
                 piece, until = [], math.inf if key is None else time.monotonic() + CHECKPOINT
                 while not piece or (len(piece) < remaining and time.monotonic() < until):
                     state, one = step(state)
                     piece.append(one)
                 self._store(key, (state, piece), kind)
             else:
-                after, piece = found[0]
+                after, piece = stored[0]
                 state = _like(state, after)
             rows += piece
         return state, rows
@@ -166,7 +166,7 @@ class _Queue:
         self.common_key = runner._key(task, common)
         self.each, self.took, self.begun = seconds and seconds / total, [], 0
         self.order: Order | None = None
-        self.told: set = set()
+        self.warned: set = set()
         self.waiting: deque[tuple[bytes | None, tuple | _Part]] = deque()
 
     def results(self, items: Iterable) -> Iterator:
@@ -179,43 +179,43 @@ class _Queue:
 
     def close(self) -> None:
         with undisturbed():
-            for _, found in self.waiting:
-                if isinstance(found, _Part):
-                    found.future.cancel()
+            for _, result in self.waiting:
+                if isinstance(result, _Part):
+                    result.future.cancel()
 
     def _begin(self, item: Any) -> tuple[bytes | None, tuple | _Part]:
         self.begun += 1
         key = self.common_key and self.runner._key(self.common_key, item)
-        found = self.runner._stored(key, self.kind)
-        if found is not None:
-            return None, found
+        result = self.runner._stored(key, self.kind)
+        if result is not None:
+            return None, result
         if self._is_shared():
             return key, _Part(self.executor, self.order, pickle.dumps(item))
         start = time.perf_counter()
         with unaided():
-            found = here(self.task, self.common, item, self.back_end, self.total > 1)
+            result = compute_here(self.task, self.common, item, self.back_end, self.total > 1)
         self.took.append(time.perf_counter() - start)
-        self.runner._store(key, found, self.kind)
-        return None, (found,)
+        self.runner._store(key, result, self.kind)
+        return None, (result,)
 
     def _is_due(self) -> bool:
-        found = self.waiting[0][1]
-        return not isinstance(found, _Part) or found.is_ready() or len(self.waiting) >= self.executor.ahead()
+        result = self.waiting[0][1]
+        return not isinstance(result, _Part) or result.is_ready() or len(self.waiting) >= self.executor.ahead()
 
     def _finish(self) -> Any:
-        key, found = self.waiting.popleft()
-        if isinstance(found, _Part):
+        key, result = self.waiting.popleft()
+        if isinstance(result, _Part):
             try:
-                found = (opened(found.result(), self.told),)
+                result = (opened(result.result(), self.warned),)
             except BaseException:
-                found.future.cancel()
+                result.future.cancel()
                 raise
-            self.runner._store(key, found[0], self.kind)
-        return found[0]
+            self.runner._store(key, result[0], self.kind)
+        return result[0]
 
     def _is_shared(self) -> bool:
-        """Return whether others are to compute the next task; once they do, they go on. They begin when it is decided that
-        the request does."""
+        """Return whether the executor is to compute the next task; once it does, it computes all that follow. It starts
+        only when the request has been decided to go on."""
         if is_undecided():
             return False
         if self.executor is None or self.order is not None:
@@ -235,22 +235,22 @@ class _Queue:
             self.executor = None
         return self.order is not None
 
-    def _is_worth_it(self, left: int) -> bool:
-        """Return whether so many tasks, the last ones, take longer than other processes to start."""
+    def _is_worth_it(self, remaining: int) -> bool:
+        """Return whether the remaining tasks take longer than the start of other processes."""
         if self.total == 1:
             return False
-        if self.each is not None and self.each * left >= WORTH:
+        if self.each is not None and self.each * remaining >= WORTH:
             return True
-        if len(self.took) < 2 or left < 2:
+        if len(self.took) < 2 or remaining < 2:
             return False
         each = sum(self.took[1:]) / (len(self.took) - 1)  # the first one also loads what is needed
         each = max(each, sum(self.took) / len(self.took)) if sum(self.took) > WORTH else each
-        return each * left > WORTH
+        return each * remaining > WORTH
 
 
 class _Part:
-    """A task that others compute. Its result is waited for in a queue whose lock no signal leaves held, as one may that
-    arrives inside of `Future.result`."""
+    """A task at an executor. Its result is taken from a queue whose lock no signal can leave held, unlike that of
+    `Future.result`."""
 
     def __init__(self, executor: Executor, order: Order, item: bytes):
         self.executor, self.order, self.item = executor, order, item
@@ -296,23 +296,24 @@ def runner() -> Runner:
 
 
 @contextlib.contextmanager
-def running(some: Runner) -> Iterator[Runner]:
-    """Let ``some`` be `runner` in the body of the statement."""
-    token = _runner.set(some)
+def running(new: Runner) -> Iterator[Runner]:
+    """Let ``new`` be `runner` in the body of the statement."""
+    token = _runner.set(new)
     try:
-        with working(some):
-            yield some
+        with working(new):
+            yield new
     finally:
         _runner.reset(token)
 
 
 def unaided() -> contextlib.AbstractContextManager[Runner]:
-    """Let nothing be given away or stored in the body of the statement: it is a task, or no part of a request."""
+    """Compute all tasks in this process, without storing, in the body of the statement: it is a task, or no part of a
+    request."""
     return running(_ALONE)
 
 
 def context_of(files: Iterable[Path]) -> tuple:
-    """Return all that results follow from besides tasks and arguments: code of one's own, and files."""
+    """Return all data that results depend on besides tasks and arguments: plug-ins, and files."""
     from geomech.scene.kinds import code
 
     return code(), [hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.is_file()]
@@ -320,13 +321,13 @@ def context_of(files: Iterable[Path]) -> tuple:
 
 @contextlib.contextmanager
 def storing(path: Path | None, context: tuple = (), output: Path | None = None, keep: bool = False) -> Iterator[Runner]:
-    """Store results of tasks in ``path`` in the body of the statement; None: nowhere. At its end the file goes, unless
-    ``keep``.
+    """Store results of tasks in ``path`` in the body of the statement; None: nowhere. At its end the file is removed,
+    unless ``keep``.
 
-    context: all that they follow from besides the tasks, such as files and code of one's own. output: of which there may
-    be one computation at a time: Refusal while another is under way. A resumed request takes no back end that those who
-    began it had not. What is raised, a signal among others, says in a note what is kept; an error leaves nothing, unless it
-    came after the first write, and a refusal nothing at all."""
+    context: all data that results depend on besides the tasks, such as files and plug-ins. output: of which one
+    computation at a time is allowed: Refusal while another runs. A resumed request uses no back end that it did not
+    have at first. An interrupt or a signal notes what is stored; so does an error after the first write, an earlier one
+    removes the file, and `TooLong` always does."""
     try:
         store = Store(path, output is not None, BACKENDS.index(fastest()))
     except Busy:
@@ -336,8 +337,8 @@ def storing(path: Path | None, context: tuple = (), output: Path | None = None, 
         ) from None
     with at_most(BACKENDS[min(store.mark, len(BACKENDS) - 1)]):
         try:
-            with running(dataclasses.replace(runner(), store=store, context=(VERSION, *context))) as some:
-                yield some
+            with running(dataclasses.replace(runner(), store=store, context=(VERSION, *context))) as new:
+                yield new
         except TooLong:
             store.close(done=True)
             raise

@@ -1,4 +1,4 @@
-"""How far a long computation is: a bar on a terminal and in a notebook, a line every ten seconds in a pipe."""
+"""Progress of a long computation: a bar on a terminal and in a notebook, a line every ten seconds in a pipe."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ EVERY = 10.0  # s between lines
 REDRAWN = 0.5  # s between drawings of a notebook's bar, and before the first
 
 
-class Course:
-    """Of a computation. title: of what is under way. fraction: done of that. shown: called whenever there is news."""
+class Computation:
+    """State of a computation. title: what is computed. fraction: the part that is done. shown: called whenever one
+    changes."""
 
     def __init__(self, title: str):
         self.shown: Callable = lambda: None
@@ -32,23 +33,23 @@ class Course:
 
     @property
     def seconds(self) -> float:
-        """Since it began."""
+        """Seconds since it began."""
         return time.monotonic() - self.start
 
     def __str__(self) -> str:
         seconds, fraction = self.seconds, self.fraction
         if not 0 < fraction < 1:
             return f"{self.title}: under way for {seconds:.0f} s"
-        left = seconds * (1 / fraction - 1)
-        return f"{self.title}: {100 * fraction:.0f} % after {seconds:.0f} s, about {left:.0f} s to go"
+        remaining = seconds * (1 / fraction - 1)
+        return f"{self.title}: {100 * fraction:.0f} % after {seconds:.0f} s, about {remaining:.0f} s to go"
 
 
-_under_way: ContextVar[Course | None] = ContextVar("course", default=None)
+_current: ContextVar[Computation | None] = ContextVar("course", default=None)
 
 
-def told(found: Iterable, count: int, progress: Callable | None) -> Iterator:
-    """What is found, ``count`` in all, while ``progress`` is told how much of it there is."""
-    for done, one in enumerate(found, 1):
+def counted(items: Iterable, count: int, progress: Callable | None) -> Iterator:
+    """Yield items, ``count`` in all, and call ``progress`` with the fraction done before each."""
+    for done, one in enumerate(items, 1):
         if progress:
             progress(done / count)
         yield one
@@ -56,9 +57,10 @@ def told(found: Iterable, count: int, progress: Callable | None) -> Iterator:
 
 @contextlib.contextmanager
 def progress(title: str, bar: bool = True):
-    """A function that takes the fraction done, and shows it: in a notebook as a bar; on a terminal as one too, unless ``bar``
-    is False; else as lines on standard error. Within another it is a part of that, under its own title."""
-    outer = _under_way.get()
+    """Yield a function that takes the fraction done and shows it: in a notebook as a bar; on a terminal, too, unless
+    ``bar`` is False; else as lines on standard error. Inside another computation it is a part of that, under its own
+    title."""
+    outer = _current.get()
     if outer is not None:
         before = outer.title, outer.fraction, outer.start
         outer.begin(title)
@@ -67,16 +69,16 @@ def progress(title: str, bar: bool = True):
         finally:
             outer.title, outer.fraction, outer.start = before
         return
-    course = Course(title)
-    token = _under_way.set(course)
+    computation = Computation(title)
+    token = _current.set(computation)
     try:
-        with _way(bar)(course):
-            yield course.reached
+        with _display_for(bar)(computation):
+            yield computation.reached
     finally:
-        _under_way.reset(token)
+        _current.reset(token)
 
 
-def _way(bar: bool) -> Callable:
+def _display_for(bar: bool) -> Callable:
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     if hasattr(shell, "kernel"):  # of a notebook; IPython on a terminal has none
         return _in_notebook
@@ -84,19 +86,21 @@ def _way(bar: bool) -> Callable:
 
 
 @contextlib.contextmanager
-def _on_terminal(course: Course):
+def _on_terminal(computation: Computation):
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task(escape(course.title), total=1.0)
-        course.shown = lambda: bars.update(task, completed=course.fraction, description=escape(course.title))
+        task = bars.add_task(escape(computation.title), total=1.0)
+        computation.shown = lambda: bars.update(
+            task, completed=computation.fraction, description=escape(computation.title)
+        )
         yield
 
 
 @contextlib.contextmanager
-def _in_notebook(course: Course):
+def _in_notebook(computation: Computation):
     from IPython.display import HTML, display
 
     handle, due = None, time.monotonic() + REDRAWN
@@ -105,29 +109,31 @@ def _in_notebook(course: Course):
         nonlocal handle, due
         if time.monotonic() < due and not (last and handle):
             return
-        said, part = (
-            (f"{course.title}: done in {course.seconds:.0f} s", 1.0) if last else (str(course), course.fraction)
+        text, part = (
+            (f"{computation.title}: done in {computation.seconds:.0f} s", 1.0)
+            if last
+            else (str(computation), computation.fraction)
         )
-        text = HTML(f'<progress max="1" value="{part:.4f}"></progress> {html.escape(said)}')
+        text = HTML(f'<progress max="1" value="{part:.4f}"></progress> {html.escape(text)}')
         if handle is None:
             handle = display(text, display_id=True)
         else:
             handle.update(text)
         due = time.monotonic() + REDRAWN
 
-    course.shown = show
+    computation.shown = show
     yield
     show(last=True)
 
 
 @contextlib.contextmanager
-def _in_pipe(course: Course):
+def _in_pipe(computation: Computation):
     over = threading.Event()
 
     def speak():
         while not over.wait(EVERY):
-            with contextlib.suppress(OSError, ValueError, AttributeError):  # nobody need listen
-                print(course, file=sys.stderr, flush=True)
+            with contextlib.suppress(OSError, ValueError, AttributeError):  # the pipe may be closed
+                print(computation, file=sys.stderr, flush=True)
 
     speaker = threading.Thread(target=speak, daemon=True)
     speaker.start()

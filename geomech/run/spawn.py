@@ -1,4 +1,4 @@
-"""Processes that know nothing of the program that starts them, which so needs no guard, and that end with it."""
+"""Processes that do not load the program that starts them, which so needs no guard, and that end with it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ UNHEARD = [getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(sig
 
 def pool(count: int) -> ProcessPoolExecutor:
     """Return so many processes, each of one thread of BLAS, that start with the tasks they get."""
-    with _environment({"PYTHONWARNINGS": "ignore"}):  # else it warns, after a kill, of what it then removes
+    with _environment({"PYTHONWARNINGS": "ignore"}):  # else it warns, after a kill, of the resources that it removes
         resource_tracker.ensure_running()
     return ProcessPoolExecutor(count, Context(), begin)
 
 
 def begin() -> None:
-    """Be a worker: what is printed goes to the error stream, and the process ends with its parent, also in the middle of a
-    task."""
+    """Start a worker: printed text goes to the error stream, and the process ends with its parent, even within a task."""
     sys.geomech_worker = True
     os.dup2(2, 1)
     parent = parent_process()

@@ -1,4 +1,4 @@
-"""Results in an sqlite file, which one command at a time has open; nothing that is read back from it is code."""
+"""Results in an sqlite file, which one command at a time has open; nothing that is read from it is executed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from geomech.io.files import hidden, note
 from rft.refusal import Refusal
 
 CHECKPOINT = 2.0  # s between writes; a request that takes less writes nothing
-LARGEST = 6_000_000_000  # bytes of results in a file, as the largest sweep has; what is beyond is computed again
+LARGEST = 6_000_000_000  # bytes of results in a file, as of the largest sweep; further ones are not stored
 OURS = 0x67656F6D  # application_id of our files
 DAMAGED = sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR  # the last where tables are not ours
 ARRAY = 1  # code of arrays in a value
@@ -36,7 +36,7 @@ class Foreign(sqlite3.DatabaseError):
 
 
 def encoded(value: Any) -> bytes:
-    """Return a result as bytes; TypeError for what is not made of numbers, text, arrays and containers of these."""
+    """Return a result as bytes; TypeError unless it consists of numbers, text, arrays and containers of these."""
     return msgspec.msgpack.encode(value, enc_hook=_as_plain)
 
 
@@ -50,7 +50,7 @@ def _as_plain(x: Any) -> Any:
 
 
 def decoded(raw: bytes, kind: Any) -> Any:
-    """Return the result of the type ``kind`` that bytes stand for; ValueError or TypeError if they stand for none."""
+    """Return the result of the type ``kind`` from bytes; ValueError or TypeError if they encode none."""
     return msgspec.msgpack.decode(raw, type=kind, dec_hook=_checked, ext_hook=_array)
 
 
@@ -92,12 +92,12 @@ class Store:
             return None
         try:
             return (decoded(row[0], kind),)
-        except (ValueError, TypeError):  # of msgspec's among them
+        except (ValueError, TypeError):  # msgspec's errors among them
             return None
 
     def put(self, key: bytes, value: Any, kind: Any) -> None:
-        """Store a result, unless it is no data. TypeError where it is not of the type that is declared: as that it would
-        never be found again."""
+        """Store a result, unless it cannot be encoded. TypeError where it is not of the declared type, as which it is
+        read back."""
         if self.lost or self.size > LARGEST:
             return
         try:
@@ -155,7 +155,7 @@ class Store:
                 instead="remove it, or choose another output",
             )
         self._try(self._connect)
-        while self.db is not None and not self.path.exists():  # who had it has removed it a moment ago
+        while self.db is not None and not self.path.exists():  # its owner has removed it a moment ago
             self._disconnect()
             self._try(self._connect)
 
@@ -183,10 +183,10 @@ class Store:
                 self.path.with_name(self.path.name + ending).unlink()
 
     def _try(self, act: Callable[..., T], *arguments) -> T | None:
-        """Return act(...); None after an error of the file, for which another one is begun, or none."""
+        """Return act(...); None after an error of the file, which is then replaced or given up."""
         try:
             return act(*arguments)
-        except (sqlite3.Error, OSError, UnicodeError) as error:  # the last of names in a damaged file
+        except (sqlite3.Error, OSError, UnicodeError) as error:  # UnicodeError: of names in a damaged file
             code = getattr(error, "sqlite_errorcode", 0) & 0xFF
             if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 self._disconnect()
@@ -212,7 +212,7 @@ class Store:
         try:
             other = next(name for name in names if not os.path.lexists(name))
             self.path.rename(other)
-            self._unlink()  # the journal, which is the other one's
+            self._unlink()  # the journal of the renamed file
         except (OSError, StopIteration) as error:
             self._lose(error)
             return
@@ -224,23 +224,25 @@ class Store:
         self.lost, self.new = True, {}
         if self.db is not None:
             with contextlib.suppress(sqlite3.Error):
-                self.db.execute("ROLLBACK")  # what is written stays, and the lock
+                self.db.execute("ROLLBACK")  # earlier results stay, and so does the lock
 
 
-def beside(output: Path) -> Path:
-    """Return the file that keeps what is done for an output, a file or a folder: ``.NAME.partial`` beside or in it."""
+def partial_file(output: Path) -> Path:
+    """Return the file that stores unfinished results of an output, a file or a folder: ``.NAME.partial`` beside or in
+    it."""
     if output.is_dir():
         place = output / (output.resolve().name or "geomech")
     elif ".." in output.parts or output.is_symlink():  # one file for all names of an output
         place = Path(os.path.realpath(output))
     else:
         place = output
-    there = next((p for p in place.parents if p.is_dir()), place.parent)
-    return hidden(there / "-".join(place.relative_to(there).parts), ".partial")
+    folder = next((p for p in place.parents if p.is_dir()), place.parent)
+    return hidden(folder / "-".join(place.relative_to(folder).parts), ".partial")
 
 
 def in_cache(question: bytes) -> Path | None:
-    """Return the file in the user's cache folder that keeps what is done of what is only printed; None without one."""
+    """Return the file in the user's cache folder that stores unfinished results of a command without output; None
+    without a folder."""
     named = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
     folder = Path(os.environ.get("XDG_CACHE_HOME") or named.get(sys.platform) or "~/.cache")
     try:

@@ -1,4 +1,4 @@
-"""One task as it is sent to a process that may know nothing of it yet, and what comes back."""
+"""One task as it is sent to a process that has not loaded anything yet, and its outcome."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from rft.refusal import Refusal
 
 
 class Order(NamedTuple):
-    """What all tasks of a request share. version: of the code. back_end: what "auto" stands for. plugins: (name, text) of the
-    files of one's own. classes: (module, name) of those that were registered. work: the function and what it is given, as
-    `pickle` has them, which takes the classes."""
+    """Data common to all tasks of a request.
+
+    version: of the code. back_end: that "auto" stands for. plugins: (name, text) of plug-in files. classes: (module,
+    name) of registered classes. work: the pickled function and its common argument, which need these classes."""
 
     version: str
     back_end: str
@@ -29,7 +30,8 @@ class Order(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """value, or the error that was raised; notes: warnings (text, category, file, line)."""
+    """Result of a task: value, or the error that was raised and its traceback (where); notes: warnings (text, category,
+    file, line)."""
 
     value: Any
     error: BaseException | None
@@ -38,7 +40,7 @@ class Outcome(NamedTuple):
 
 
 class Alone(Exception):
-    """Other processes cannot compute it, and why. worth_saying: not of a function that is made inside another."""
+    """A task that other processes cannot compute, and why. worth_saying: False for a function defined inside another."""
 
     def __init__(self, text: str, worth_saying: bool = False):
         super().__init__(text)
@@ -46,7 +48,7 @@ class Alone(Exception):
 
 
 def packed(task: Callable, common: Any, back_end: str) -> Order:
-    """Return the order of a task; `Alone` for what no other process could know."""
+    """Return the order of a task; `Alone` for one that no other process could load."""
     from geomech.scene import kinds
 
     classes = kinds.registered()
@@ -61,15 +63,15 @@ def packed(task: Callable, common: Any, back_end: str) -> Order:
     return Order(VERSION, back_end, kinds.files(), classes, work)
 
 
-def here(task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True) -> Any:
-    """Return task(common, item), computed as anywhere else; the only one of a request may take all threads."""
+def compute_here(task: Callable, common: Any, item: Any, back_end: str, one_of_many: bool = True) -> Any:
+    """Return task(common, item), computed as in a worker; the only task of a request may use all threads."""
     with one_thread() if one_of_many else contextlib.nullcontext(), preferring(back_end):
         return task(common, item)
 
 
 @functools.lru_cache(maxsize=4)
 def _known(order: Order) -> tuple[Callable, Any]:
-    """Return (task, common), once all that they are made of is known here."""
+    """Return (task, common), after registering all classes that they need."""
     if order.version != VERSION:
         raise Refusal(f"a worker has {VERSION}, this command {order.version}", instead="install the same there")
     if order.plugins or order.classes:
@@ -78,7 +80,7 @@ def _known(order: Order) -> tuple[Callable, Any]:
 
 
 def _learn(order: Order) -> None:
-    """Register the classes of one's own."""
+    """Register the classes of plug-ins."""
     from geomech.scene import kinds
 
     for name, text in order.plugins:
@@ -88,12 +90,12 @@ def _learn(order: Order) -> None:
 
 
 def perform(order: Order, item: bytes) -> bytes:
-    """Return the `Outcome` of a task, pickled; what goes wrong is raised where the command is."""
+    """Return the `Outcome` of a task, pickled; errors are raised where the command runs."""
     value, error, where = None, None, ""
     with _noted() as notes:
         try:
             task, common = _known(order)
-            value = here(task, common, pickle.loads(item), order.back_end)
+            value = compute_here(task, common, pickle.loads(item), order.back_end)
         except Exception as raised:
             error, where = _sendable(raised), traceback.format_exc()
     notes = tuple((str(w.message), w.category, w.filename, w.lineno) for w in notes or ())
@@ -111,8 +113,7 @@ def _sendable(error: Exception) -> Exception:
 
 @contextlib.contextmanager
 def _noted() -> Iterator[list | None]:
-    """Warnings that are raised meanwhile; None in a process that does more than this (a thread of Dask's), whose filters
-    are not ours."""
+    """Record warnings; None in a process with other work (a thread of Dask's), whose filters must not change."""
     if not getattr(sys, "geomech_worker", False):
         yield None
         return
@@ -121,12 +122,12 @@ def _noted() -> Iterator[list | None]:
         yield notes
 
 
-def opened(outcome: bytes, told: set) -> Any:
-    """Return the value of an outcome; raises and warns as the task did. told: warnings already passed on."""
+def opened(outcome: bytes, warned: set) -> Any:
+    """Return the value of an outcome; raise and warn as the task did. warned: warnings already passed on."""
     value, error, where, notes = pickle.loads(outcome)
     for text, category, file, line in notes:
-        if (text, category) not in told:
-            told.add((text, category))
+        if (text, category) not in warned:
+            warned.add((text, category))
             warnings.warn_explicit(text, category, file, line)
     if error is not None:
         raise error from Elsewhere(where)
@@ -134,4 +135,4 @@ def opened(outcome: bytes, told: set) -> Any:
 
 
 class Elsewhere(Exception):
-    """Where in a worker an error was raised."""
+    """Traceback of an error that was raised in a worker."""

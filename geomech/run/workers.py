@@ -1,11 +1,10 @@
-"""Who computes: this process, as many others as there are cores, or a Dask cluster.
+"""Executors of large requests: this process, as many others as there are cores, or a Dask cluster.
 
-Large requests are computed in tasks that do not depend on who computes them, so that the numbers are the same to the last
-digit. `using` is said around a computation and is no argument of it:
+Large requests are computed in tasks whose results do not depend on the executor, to the last digit. `using` is written
+around a computation and is no argument of it:
 
     with geomech.workers.using(4):
-        study.compute_field()
-"""
+        study.compute_field()"""
 
 from __future__ import annotations
 
@@ -25,9 +24,11 @@ MOST = 1024  # processes
 
 @contextlib.contextmanager
 def using(count: int | None = None, scheduler: str | None = None) -> Iterator[None]:
-    """Compute what is large in the body of the statement by ``count`` processes, by default one a core, or on the Dask
-    cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786". Processes start when something turns out to be
-    worth it. Refusal for what is none, and at once for a scheduler that does not answer."""
+    """Compute large requests in the body of the statement by ``count`` processes, by default one per core, or on the
+    Dask cluster of the ``scheduler`` at an address such as "tcp://10.0.0.1:8786".
+
+    Processes start when a request turns out to be worth it. Refusal for wrong arguments, and at once for a scheduler
+    that does not answer."""
     executor = _executor(count, scheduler)
     try:
         with (

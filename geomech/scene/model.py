@@ -1,4 +1,4 @@
-"""A scene: what is simulated and how finely. It is a value; `geomech.study.bench.Study` stores what is computed for
+"""A scene: what is simulated and how finely. It is a value; `geomech.study.study.Study` stores what is computed for
 one."""
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""What accuracy costs: every approximation of a question as a knob, set from coarse to fine, error against time.
+"""Accuracy studies: error against computing time of a question, at settings of every approximation from coarse to fine.
 
-A knob declares its settings, the order theory gives its error and what it is measured against: the truth, the same for all
-knobs, or the limit of that knob alone, all else being equal.
-"""
+A knob declares its settings, the order of its error by theory and its reference: the truth, common to all knobs, or the
+limit of that knob alone, all else being equal."""
 
 from __future__ import annotations
 
@@ -23,10 +22,10 @@ from geomech.study.question import Allow, Progress, Question
 
 
 class Adjustable(Protocol):
-    """A question whose approximations can be set: what an accuracy study is made of.
+    """A question whose approximations can be set: the subject of an accuracy study.
 
-    measures: the errors that it has, by name. tolerances: for which the cheapest settings are told. runs: each setting is
-    timed so often. picture: the figure of `geomech.output.plots` that draws the study."""
+    measures: names of its errors. tolerances: for which the cheapest settings are reported. runs: how often each
+    setting is timed. picture: the figure of `geomech.output.plots` that draws the study."""
 
     scene: Any
     measures: ClassVar[tuple[str, ...]]
@@ -35,35 +34,36 @@ class Adjustable(Protocol):
     runs: int
 
     def check(self) -> None:
-        """Refusal for what makes no sense."""
+        """Refuse a question that makes no sense."""
 
     def cost(self) -> Cost:
-        """Return what all settings take, each ``runs`` times."""
+        """Return the cost of all settings, each run ``runs`` times."""
 
     def prepared(self) -> Self:
-        """Return the question with what all settings share, computed once."""
+        """Return the question with the data that all settings share, computed once."""
 
     def knobs(self) -> list[Knob]: ...
 
     def numbers(self, knob: Knob | None, value: Any) -> list[np.ndarray]:
-        """Return the answer at a setting; of a knob at None its limit, without a knob the truth."""
+        """Return the answer at a setting; for a value of None the limit of the knob, without a knob the truth."""
 
-    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
-        """Return the error by measure."""
+    def errors(self, numbers_: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        """Return the error of an answer by measure."""
 
-    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
-        """Return what a line of the study says of a knob."""
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
+        """Return the entries of a line of the study that describe a knob."""
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
-        """Return the setting to take for a tolerance, of lines as `lines` has them."""
+        """Return the best setting for a tolerance; ``lines`` as of `lines`."""
 
     def facts(self) -> dict[str, Any]:
-        """Return what holds of the whole study."""
+        """Return attributes of the whole study."""
 
 
 def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
-    """Return what an accuracy study asks of a scene: a displacement, forces along a motion, or the speed of a robot."""
-    kinds = {"robot": "walking", "intruder": "intrusion"}  # each loaded where it is asked for
+    """Return the question of an accuracy study of a scene: a displacement, forces along a motion, or the speed of a
+    robot."""
+    kinds = {"robot": "walking", "intruder": "intrusion"}  # loaded only where needed
     module = next((module for part, module in kinds.items() if hasattr(scene, part)), "tiered")
     kind = import_module(f"geomech.study.{module}").Settings
     return kind(scene) if runs is None else kind(scene, runs)
@@ -71,77 +71,81 @@ def adjustable(scene: Any, runs: int | None = None) -> Adjustable:
 
 @dataclass(frozen=True)
 class Accuracy(Question):
-    """Error and seconds of a question at every setting of its knobs.
+    """Error and computing time of a question at every setting of its knobs.
 
-    Each setting is timed ``runs`` times, and the quickest counts, so that what a first call loads and warms does not.
-    Seconds are of one thread's computing."""
+    Each setting is timed ``runs`` times, and the quickest counts, so that first calls that load and warm up do not.
+    Seconds are CPU seconds of one thread."""
 
     scene: Any
     runs: int | None = None
 
     @cached_property
-    def asked(self) -> Adjustable:
+    def question(self) -> Adjustable:
         return adjustable(self.scene, self.runs)
 
     def check(self) -> None:
-        self.asked.check()
+        self.question.check()
 
     def cost(self) -> Cost:
-        return self.asked.cost()
+        return self.question.cost()
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        asked = self.asked.prepared()
-        knobs, runs, tasks = asked.knobs(), asked.runs, []
+        question = self.question.prepared()
+        knobs, runs, tasks = question.knobs(), question.runs, []
         if any(knob.against == "truth" for knob in knobs):
             tasks.append((None, None, 1))
         for knob in knobs:
             tasks += [(knob, None, 1)] if knob.against == "limit" else []
             tasks += [(knob, value, runs) for value in knob.values]
-        found = runner().map(answered, asked, tasks, len(tasks), progress=progress)
-        true = next(found)[0] if tasks[0][0] is None else None
+        answers = runner().map(answered, question, tasks, len(tasks), progress=progress)
+        true = next(answers)[0] if tasks[0][0] is None else None
         rows = []
         for knob in knobs:
-            truth = next(found)[0] if knob.against == "limit" else true
+            truth = next(answers)[0] if knob.against == "limit" else true
             for value in knob.values:
-                numbers, seconds = next(found)
-                rows.append((knob.label, value, seconds, *asked.errors(numbers, truth).values()))
-        return _result(asked, knobs, rows)
+                numbers, seconds = next(answers)
+                rows.append((knob.label, value, seconds, *question.errors(numbers, truth).values()))
+        return _result(question, knobs, rows)
 
 
-def _result(asked: Adjustable, knobs: list[Knob], rows: list[tuple]) -> Result:
+def _result(question: Adjustable, knobs: list[Knob], rows: list[tuple]) -> Result:
     labels, values, seconds, *errors = zip(*rows)
     over = ("setting",)
-    found = [
+    variables = [
         Variable("knob", over, np.array(labels)),
         Variable("value", over, np.array(values, float)),
         Variable("seconds", over, np.array(seconds), "s"),
-        *(Variable(measure, over, np.array(e)) for measure, e in zip(asked.measures, errors)),
+        *(Variable(measure, over, np.array(e)) for measure, e in zip(question.measures, errors)),
     ]
-    told = [(knob, measure, asked.told(knob, measure)) for measure in asked.measures for knob in knobs]
-    bare = Result("accuracy", tuple(found), {"knobs": told}, asked)
-    choices = [asked.cheapest(lines(bare), float(tolerance)) for tolerance in asked.tolerances]
-    return Result("accuracy", tuple(found), {**asked.facts(), "knobs": told, "cheapest": choices}, asked)
+    descriptions = [
+        (knob, measure, question.describe(knob, measure)) for measure in question.measures for knob in knobs
+    ]
+    bare = Result("accuracy", tuple(variables), {"knobs": descriptions}, question)
+    choices = [question.cheapest(lines(bare), float(tolerance)) for tolerance in question.tolerances]
+    return Result(
+        "accuracy", tuple(variables), {**question.facts(), "knobs": descriptions, "cheapest": choices}, question
+    )
 
 
-def answered(asked: Any, task: tuple[Knob | None, Any, int]) -> tuple[list[np.ndarray], float]:
+def answered(question: Any, task: tuple[Knob | None, Any, int]) -> tuple[list[np.ndarray], float]:
     """Return the answer at a setting, and the seconds that the quickest of its runs took."""
     (knob, value, runs), times = task, []
     for _ in range(runs):
         start = time.thread_time()
-        numbers = asked.numbers(knob, value)
+        numbers = question.numbers(knob, value)
         times.append(time.thread_time() - start)
     return numbers, min(times)
 
 
 def lines(result: Result) -> list[dict[str, Any]]:
     """Return a line {"label", ..., "order", "value", "error", "seconds", "slope"} for every knob and measure."""
-    found = []
-    for knob, measure, told in result.attributes["knobs"]:
-        some = result["knob"].values == knob.label
-        errors, seconds = result[measure].values[some].tolist(), result["seconds"].values[some].tolist()
+    out = []
+    for knob, measure, description in result.attributes["knobs"]:
+        rows = result["knob"].values == knob.label
+        errors, seconds = result[measure].values[rows].tolist(), result["seconds"].values[rows].tolist()
         numbers = {"value": list(knob.values), "error": errors, "seconds": seconds, "slope": slope(knob.values, errors)}
-        found.append({**told, **numbers})
-    return found
+        out.append({**description, **numbers})
+    return out
 
 
 def slope(values, errors) -> float | None:
@@ -155,7 +159,7 @@ def slope(values, errors) -> float | None:
 
 
 def table(result: Result) -> dict[str, Any]:
-    """Return {"scene", ..., "lines": [...], "cheapest": [...]}, as JSON has a study."""
+    """Return the JSON of a study: {"scene", ..., "lines": [...], "cheapest": [...]}."""
     facts = dict(result.attributes)
     del facts["knobs"]
     head, last = {}, facts.pop("cheapest")
@@ -165,6 +169,6 @@ def table(result: Result) -> dict[str, Any]:
 
 
 def study(scene: Any, progress: Callable | None = None, runs: int | None = None) -> dict[str, Any]:
-    """Return the accuracy study of a scene of any kind as a table. Who computes: `geomech.run.workers`."""
+    """Return the accuracy study of a scene of any kind as a table. Executors: see `geomech.run.workers`."""
     question = Accuracy(scene, runs)
     return table(question.answer(progress or (lambda done: None), lambda cost: None))

@@ -1,4 +1,5 @@
-"""Scenes side by side: those that differ in their gaits and in what effects let differ are one batch of the solver."""
+"""Batches of scenes: scenes that differ only in their gaits and in batched fields of effects share one batch of the
+solver."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from rft.effects import batched_effect
 
 
 def kind(scene: Scene) -> str:
-    """The same for scenes that can share a batch."""
+    """Return a text that is equal for scenes that can share a batch."""
     effects = [
         (type(e), [getattr(e, f.name) for f in dataclasses.fields(e) if f.name not in e.batched])
         for e in getattr(scene.system, "effects", ())
@@ -23,10 +24,10 @@ def kind(scene: Scene) -> str:
     return repr((rest, scene.numerics, scene.gait.joints, s.traits.lacks, effects))
 
 
-def beside(scenes: list[Scene], amplitudes=None) -> Scene:
-    """One scene with the gaits and effects of several side by side, each for all amplitudes or its own one."""
+def side_by_side(scenes: list[Scene], amplitudes=None) -> Scene:
+    """Return one scene with the gaits and effects of several, each for all amplitudes or its own one."""
     count = 1 if amplitudes is None else len(amplitudes)
-    gaits = Beside(tuple(s.gait for s in scenes), amplitudes)
+    gaits = GaitBatch(tuple(s.gait for s in scenes), amplitudes)
     joined = dataclasses.replace(scenes[0], gait=gaits)
     if not isinstance(joined.system, Swimmer):
         return joined
@@ -35,8 +36,8 @@ def beside(scenes: list[Scene], amplitudes=None) -> Scene:
 
 
 @dataclasses.dataclass(frozen=True)
-class Beside:
-    """Several gaits run at once, each for ``amplitudes`` or its own one: what a batch asks of a gait."""
+class GaitBatch:
+    """Several gaits in one batch, each for all ``amplitudes`` or its own one."""
 
     gaits: tuple[Gait, ...]
     amplitudes: list[float] | None
@@ -50,6 +51,6 @@ class Beside:
         return max(g.harmonics for g in self.gaits)
 
     def cycle(self, phases: int, amplitudes=None) -> tuple[np.ndarray, np.ndarray]:
-        """alpha, alphadot (gaits x amplitudes, phases, joints)."""
+        """Return alpha and alphadot (gaits x amplitudes, phases, joints)."""
         each = [g.cycle(phases, [g.amplitude] if self.amplitudes is None else self.amplitudes) for g in self.gaits]
         return tuple(np.concatenate(x) for x in zip(*each))

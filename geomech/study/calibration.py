@@ -1,4 +1,4 @@
-"""Calibrations: a law and its covariance from measurements, by the law's name; what is said of them and written."""
+"""Calibrations: a law and its covariance from measurements, by the law's name, and their texts and files."""
 
 from __future__ import annotations
 
@@ -28,15 +28,14 @@ SIZES = {
     "length": "m",
     "depth": "m",
     "density": "kg/m^3",
-}  # of the rod and the bed, as options have them
+}  # of the rod and the bed, by the names of options
 
 MOST_LINES = 60  # of a table of residuals
 
 
 @dataclass(frozen=True, eq=False)
 class OfDrag:
-    """A law fitted to the drag on a rod (`rft.calibrate`). psi_deg: (N,), the angles as they were measured. name: of the
-    file."""
+    """A law fitted to the drag on a rod (`rft.calibrate`). psi_deg: (N,), the measured angles. name: of the file."""
 
     fit: Fit
     psi_deg: np.ndarray
@@ -44,12 +43,12 @@ class OfDrag:
     picture, scene = "drag_figure", "a scene"
 
     def notes(self) -> list[str]:
-        """What one who uses the medium should know."""
+        """Return notes for users of the medium."""
         return []
 
     def numbers(self) -> dict:
-        """What `geomech calibrate --json` prints. covariance: of ``parameters``, gamma0 in rad; errors: the standard ones, of
-        gamma0 in degrees, and intervals with 95 %, alike."""
+        """Return the JSON of `geomech calibrate`. covariance: of ``parameters``, gamma0 in rad; errors: standard ones,
+        of gamma0 in degrees; intervals with 95 %, likewise."""
         f = self.fit
         medium = self._medium()
         medium.pop("covariance", None)
@@ -60,8 +59,8 @@ class OfDrag:
             "covariance": f.covariance.tolist(),
             "rms": f.rms,
             "parameters": list(f.names),
-            "errors": dict(zip(map(_in_degrees, f.names), _shown(f, f.errors).tolist())),
-            "intervals": dict(zip(map(_in_degrees, f.names), _shown(f, f.intervals).tolist())),
+            "errors": dict(zip(map(_in_degrees, f.names), _displayed(f, f.errors).tolist())),
+            "intervals": dict(zip(map(_in_degrees, f.names), _displayed(f, f.intervals).tolist())),
             "axial_force_N": f.axial_force,
             "axial_stress_Pa": f.axial_stress,
             "end_caps": f.end_caps,
@@ -75,7 +74,7 @@ class OfDrag:
         }  # fmt: skip
 
     def _medium(self) -> dict:
-        """The table [medium] of the law."""
+        """Return the table [medium] of the law."""
         values = {f.name: getattr(self.fit.medium, f.name) for f in dataclasses.fields(self.fit.medium)}
         if "gamma0" in values:
             values = {_in_degrees(k): math.degrees(x) if k == "gamma0" else x for k, x in values.items()}
@@ -84,7 +83,7 @@ class OfDrag:
         return {"law": self.fit.law, **{k: x for k, x in values.items() if x is not None}}
 
     def toml(self) -> str:
-        """A file that a scene takes as ``[medium] file``."""
+        """Return the text of a file for ``[medium] file`` of a scene."""
         f, own = self.fit, getattr(self.fit.medium, "uncertain", ())
         of = f"; covariance of {', '.join(own)}" + (", gamma0 in rad" if "gamma0" in own else "") if own else ""
         of += f", widened for {f.degrees_of_freedom} degrees of freedom (Student)" if own else ""
@@ -92,10 +91,10 @@ class OfDrag:
         return about + table("medium", self._medium())
 
     def text(self) -> str:
-        """All of it in words and a table of residuals."""
+        """Return the numbers in words, and a table of residuals."""
         f = self.fit
         lines = [f"{f.law} law fitted to {self.name}: {f.data.n_forces} forces at {f.data.n_angles} angles"]
-        for name, x, (low, high) in zip(f.names, _shown(f, f.values), _shown(f, f.intervals)):
+        for name, x, (low, high) in zip(f.names, _displayed(f, f.values), _displayed(f, f.intervals)):
             unit = f" {UNITS[name]}" if UNITS.get(name) else ""
             lines.append(f"{name:13}{x:12.5g}, {low:.4g} to {high:.4g}{unit} with 95 %")
         if f.axial_stress and "axial_stress" not in f.names:
@@ -115,13 +114,13 @@ class OfDrag:
         if self.psi_deg.size > MOST_LINES:
             return "\n".join([*lines, "residuals: with --json"])
         lines.append("  psi_deg  F_parallel_N       law  F_perpendicular_N       law")
-        for psi, forces, left in zip(self.psi_deg, f.data.forces.T, f.residuals.T):
-            (t, n), (law_t, law_n) = forces, np.round(forces - left, 12) + 0.0
+        for psi, forces, residual in zip(self.psi_deg, f.data.forces.T, f.residuals.T):
+            (t, n), (law_t, law_n) = forces, np.round(forces - residual, 12) + 0.0
             lines.append(f"{psi:9.4g} {t:13.4g} {law_t:9.4g} {n:18.4g} {law_n:9.4g}")
         return "\n".join(lines)
 
     def curves(self, count: int = 181) -> dict:
-        """Numbers of its picture (`plots.drag_figure`): data and law by psi in degrees, (2, N) each."""
+        """Return the numbers of the picture (`plots.drag_figure`): data and law by psi in degrees, (2, N) each."""
         psi, f = np.linspace(0.0, np.pi / 2, count), self.fit
         return {
             "psi_deg": np.degrees(f.data.psi), "forces": f.data.forces, "residuals": f.residuals, "rms": f.rms,
@@ -129,8 +128,8 @@ class OfDrag:
         }  # fmt: skip
 
 
-def _shown(f: Fit, values: np.ndarray) -> np.ndarray:
-    """Values (n, ...) of the parameters with gamma0 in degrees."""
+def _displayed(f: Fit, values: np.ndarray) -> np.ndarray:
+    """Return values (n, ...) of the parameters with gamma0 in degrees."""
     return np.array([np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)])
 
 
@@ -139,8 +138,8 @@ def _in_degrees(name: str) -> str:
 
 
 def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
-    """Root mean square of forces about their means at equal angles, N, with the degrees of freedom that these leave; None if
-    no angle is repeated. It is what no law can go below."""
+    """Return the root mean square of forces about their means at equal angles, N, with the remaining degrees of
+    freedom; None if no angle is repeated. No law can fit better."""
     _, which, counts = np.unique(psi.round(9), return_inverse=True, return_counts=True)
     if (free := psi.size - counts.size) < 1:
         return None
@@ -149,17 +148,17 @@ def repeats(psi: np.ndarray, forces: np.ndarray) -> float | None:
 
 
 def of_drag(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfDrag:
-    """A law fitted to the file or sample ``source``. sizes: of `SIZES`, those that overrule the header lines. Refusal, one
-    line that names the file, if the data are bad or do not settle the law."""
+    """Fit a law to the file or sample ``source``. sizes: of `SIZES`, overruling the header lines. Refusal, with the
+    file's name, if the data are bad or do not determine the law."""
     if "area" in sizes:
         raise Refusal("--area belongs to another measurement", instead=f"leave it out for --law {law}")
     measured = drag.read(source)
     with located(measured.name):
         rod = Rod(**{**measured.sizes, **sizes})
         data = rod_drag(*measured.rows)
-        found = OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
-        found.toml()  # what no medium can be, such as a k of thousands, is refused here
-    return found
+        calibration = OfDrag(fit(law, data, rod, end_caps), measured.rows[0], measured.name)
+        calibration.toml()  # refuses impossible media, such as a k of thousands
+    return calibration
 
 
 CALIBRATIONS: dict[str, Callable[..., OfDrag | OfPlates | OfPenetration]] = {
@@ -171,8 +170,10 @@ CALIBRATIONS: dict[str, Callable[..., OfDrag | OfPlates | OfPenetration]] = {
 
 @dataclass(frozen=True)
 class Calibration(Question):
-    """A law fitted to measurements. law: one of CALIBRATIONS, by the columns of the file if None. sizes: those of the rod or
-    plate that overrule the file's. end_caps: e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
+    """A law fitted to measurements.
+
+    law: one of CALIBRATIONS; by the columns of the file if None. sizes: of the rod or plate, overruling the file's.
+    end_caps: e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
 
     source: str
     law: str | None = None
@@ -190,10 +191,10 @@ class Calibration(Question):
         _ = self.chosen
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        found = CALIBRATIONS[self.chosen](self.chosen, self.source, dict(self.sizes), self.end_caps)
-        told = found.numbers()
-        names = told["parameters"]
-        deviations = np.sqrt(np.diag(np.reshape(told["covariance"], (len(names), len(names)))))
+        calibration = CALIBRATIONS[self.chosen](self.chosen, self.source, dict(self.sizes), self.end_caps)
+        numbers = calibration.numbers()
+        names = numbers["parameters"]
+        deviations = np.sqrt(np.diag(np.reshape(numbers["covariance"], (len(names), len(names)))))
         over = ("parameter",)
         variables = Variable("parameter", over, np.array(names)), Variable("standard_error", over, deviations)
-        return Result("calibration", variables, {"notes": found.notes()}, found)
+        return Result("calibration", variables, {"notes": calibration.notes()}, calibration)

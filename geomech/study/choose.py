@@ -1,4 +1,4 @@
-"""The cheapest way to a displacement that can be trusted far enough."""
+"""The cheapest tier and settings for a displacement within a tolerance."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from geomech.gaits import Gait
 from geomech.geometry.gait import checked_gait
 from geomech.scene.model import Scene
 from geomech.study import cost, tables, uncertainty
-from geomech.study.bench import Study
-from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, apart, in_groups
+from geomech.study.estimate import CHECKED, FEWEST_STEPS, against_direct, in_groups, pose_distance
 from geomech.study.results import Displacements
+from geomech.study.study import Study
 from geomech.systems.capabilities import pieces_per_length, settling, solver_of
 from geomech.tiers.base import solved_phases
 from geomech.tiers.direct import DIRECT
@@ -21,19 +21,18 @@ from rft.checks import is_number, real_array
 from rft.refusal import Refusal
 
 MOST_PHASES = 1 << 16
-FINEST_PIECES = 640  # that a tolerance asks for
+FINEST_PIECES = 640  # of body, for a tolerance
 
 
 def cheapest(
     scene: Scene, amplitudes: Sequence[float], tol: float, gait: Gait | None = None, ask: Callable = lambda jobs: None
 ) -> dict:
-    """A table as `Study.study` gives it, of one tier, and besides {"tier", "settings"}; its seconds are of all, the search
-    included. It is the cheapest tier, and for the direct tier the fewest phases, with every estimated error of position at
-    most ``tol`` body lengths.
+    """Return a table as of `Study.study` for the cheapest tier with errors of position of at most ``tol`` body lengths,
+    with {"tier", "settings"} besides.
 
-    Look-up tiers are tried in the order of their cost as long as that is below the direct tier's. ask: told the jobs to
-    come (`geomech.study.cost`) before each is done. Refusal if no tier gets there.
-    """
+    For the direct tier, the fewest phases are found. Its seconds include the search. Look-up tiers are tried in the
+    order of their cost, as long as that is below the direct tier's. ask: called with the jobs to come
+    (`geomech.study.cost`) before each. Refusal if no tier is accurate enough."""
     if not (is_number(tol) and 0 < tol <= 1e300):
         raise Refusal("--tol must be a number > 0 in body lengths", value=tol)
     study, start = Study(scene), time.perf_counter()
@@ -53,10 +52,10 @@ def cheapest(
         more = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
         return Displacements(tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more))
 
-    some = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
+    sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
     if study.lookups:
-        pilot, settings = _refined(scene, gait, amplitudes[some], tol / 4, phases, ask)
+        pilot, settings = _refined(scene, gait, amplitudes[sampled], tol / 4, phases, ask)
         phases = settings["phases"]
     plans = {m: study.plan(m, gait, amplitudes) for m in study.lookups}
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
@@ -66,10 +65,10 @@ def cheapest(
             break
         ask(cost.predicted(scene, plans[method], len(amplitudes)))
         try:
-            checked = study.displacement(method, gait, amplitudes[some])
-        except ValueError:  # the gait leaves the field or the family: this tier cannot say
+            checked = study.displacement(method, gait, amplitudes[sampled])
+        except ValueError:  # the gait leaves the field or the family of this tier
             continue
-        if (apart(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
+        if (pose_distance(checked, pilot[0], system.length) + pilot[1])[:, 0].max() <= tol:
             poses = study.displacement(method, gait, amplitudes)
             error, spread = against_direct(scene, poses, gait, amplitudes), study.spread(method, gait, amplitudes)
             if spread is not None:
@@ -78,10 +77,10 @@ def cheapest(
                 return answer(method, poses, error, {"grid": scene.numerics.grid})
     (poses, error), settings = _refined(scene, gait, amplitudes, tol, phases, ask)
     if error[:, 0].max() > tol:
-        found = " and ".join(f"{n} {name}" for name, n in settings.items())
+        settings_text = " and ".join(f"{n} {name}" for name, n in settings.items())
         finer = "lower [numerics] regularisation and tolerance" if solver_of(system) else "take a finer table"
         raise Refusal(
-            f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {found})",
+            f"no tier gets to {tol:g} body lengths (best estimate {error[:, 0].max():.1e} with {settings_text})",
             where=scene.name,
             instead=f"raise --tol, or {finer}",
         )
@@ -89,9 +88,10 @@ def cheapest(
 
 
 def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask: Callable):
-    """The direct tier at twice the phases, or the pieces of body where these leave more, again and again, for the
-    amplitudes that need it, until all positions are within ``tol`` or doubling stops helping. Returns (poses, errors) and
-    {"phases": ..., "pieces": ... where there are any}."""
+    """Return (poses, errors) of the direct tier with twice the phases, or pieces of body where these cause the larger
+    error, again and again, and {"phases": ..., "pieces": ... if any}.
+
+    Only amplitudes that need it are refined, until all positions are within ``tol`` or doubling no longer helps."""
     ask(cost.direct(scene, gait, len(amplitudes), phases))
     poses, error, of_pieces = in_groups(scene, gait, amplitudes, phases)
     error, open_, pieces = error + of_pieces, np.arange(len(amplitudes)), getattr(solver_of(scene.system), "pieces", 0)
@@ -102,9 +102,9 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
         finer_scene = scene.with_numerics(pieces=pieces) if pieces_per_length(scene.system) else scene
         ask(cost.direct(finer_scene, gait, len(worse), phases))
-        finer, now, left = in_groups(finer_scene, gait, amplitudes[worse], phases)
-        stalled = (now + left > 0.9 * error[worse])[:, 0].all() and phases > 1024
-        poses[worse], error[worse], of_pieces[worse], open_ = finer, now + left, left, worse
+        finer, now, finer_pieces = in_groups(finer_scene, gait, amplitudes[worse], phases)
+        stalled = (now + finer_pieces > 0.9 * error[worse])[:, 0].all() and phases > 1024
+        poses[worse], error[worse], of_pieces[worse], open_ = finer, now + finer_pieces, finer_pieces, worse
         if stalled:
             break
     return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_per_length(scene.system) else {})}

@@ -1,9 +1,8 @@
-"""What studies cost, counted beforehand: force balances and memory of each part of a request, a list of jobs.
+"""Cost of studies, counted beforehand: force balances and memory of each part of a request, a list of jobs.
 
-Balances are counted as tiers and estimates (`geomech.study.estimate`) ask for them; where time stepping goes on until cycles
-repeat, nobody knows how many these are. Seconds are those of `geomech.run.cost`. From Python nothing is refused: ask
-`Study.cost`, and decide.
-"""
+Balances are counted as tiers and estimates (`geomech.study.estimate`) need them; where time stepping goes on until
+cycles repeat, their number is assumed. Seconds are those of `geomech.run.cost`. From Python nothing is refused: see
+`Study.cost`."""
 
 from __future__ import annotations
 
@@ -34,8 +33,8 @@ from geomech.systems.framed import Framed
 from geomech.tiers import fitted, harmonic
 from geomech.tiers.base import Plan, Table, solved_phases
 
-CLOSED = 1e-6  # s a velocity takes that needs no balance of forces, measured for those that ship, assumed for others
-LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number of it that this sums; measured
+CLOSED = 1e-6  # s of a velocity without balance of forces, measured for built-in systems, assumed for others
+LOOK, READ = 2.2e-7, 1.1e-9  # s for each look-up in a table, and for each number that it sums; measured
 CYCLES = 3  # until they repeat, assumed
 COPIES = 14  # of the angles and velocities of a gait while they are solved and integrated
 TABLES = 4  # of a table while it is built, interpolated and written
@@ -43,8 +42,10 @@ ROW = 800  # bytes of an amplitude's results by all tiers, as lists and as text
 
 
 class Job(NamedTuple):
-    """Part of a request. count: of velocities that are solved, in so many ``batches``. weight: of one, in those of the
-    scene's system as it is. besides: seconds of other work. memory: bytes at the peak."""
+    """Part of a request.
+
+    count: number of velocities, solved in ``batches``. weight: of one, relative to the scene's system as it is.
+    besides: seconds of other work. memory: bytes at the peak."""
 
     scene: Scene
     count: float
@@ -73,8 +74,8 @@ def price(jobs: Sequence[Job]) -> Cost:
 def study(
     scene: Scene, plans: Mapping[str, Plan], count: int, gait: Gait | None = None, tables: bool = True
 ) -> list[Job]:
-    """`Study.study` of ``count`` amplitudes of a gait, or the scene's own, by the plans of tiers; without tables if they are
-    there."""
+    """Return the jobs of `Study.study` for ``count`` amplitudes of a gait, or the scene's own, by plans of tiers;
+    without tables if these are stored."""
     gait, phases = gait or scene.gait, scene.numerics.phases
     jobs, names = [], set()
     for plan in sorted(plans.values(), key=lambda plan: -plan.numbers):
@@ -93,35 +94,36 @@ def study(
 
 
 def predicted(scene: Scene, plan: Plan, count: int) -> list[Job]:
-    """The prediction of ``count`` amplitudes by a tier, with its table."""
+    """Return the jobs of a prediction of ``count`` amplitudes by a tier, with its table."""
     table = built(scene, plan.table, plan.numbers) if plan.table else []
     return table + _looked_up(scene, plan, count, scene.numerics.phases)
 
 
 def balances(plan: Plan, count: int, phases: int) -> int:
-    """Velocities that the prediction of ``count`` amplitudes at so many phases takes, with its table."""
+    """Return the number of velocities for a prediction of ``count`` amplitudes at so many phases, with its table."""
     return (plan.table.balances if plan.table else 0) + plan.balances(count, phases)
 
 
 def _looked_up(scene: Scene, plan: Plan, count: int, phases: int) -> list[Job]:
-    """What a tier takes beside its table."""
+    """Return the jobs of a tier besides its table."""
     if plan.table:
         return [Job(scene, 0, 0, besides=(LOOK + READ * plan.read) * count * phases)]
     return _spread_out(scene, plan.balances(count, phases), BASE)
 
 
 def _spread_out(scene: Scene, count: float, memory: float) -> list[Job]:
-    """Velocities at shapes all over the field."""
+    """Return the jobs of velocities at shapes all over the field."""
     return [Job(scene, count, -(-count // SAMPLES_TOGETHER), memory=memory)]
 
 
 def frame(scene: Scene) -> list[Job]:
-    """The field that a frame is made of which is one itself, as "minimum-perturbation" is."""
+    """Return the jobs of the field that defines a frame, as "minimum-perturbation" has one."""
     return connection(scene) if isinstance(scene.system, Framed) else []
 
 
 def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize) -> list[Job]:
-    """What an uncertain medium does to ``count`` amplitudes (`uncertainty.of_medium`), at most so many side by side."""
+    """Return the jobs of an uncertain medium for ``count`` amplitudes (`uncertainty.of_medium`), at most ``together``
+    in a batch."""
     if not uncertainty.uncertain(scene.system):
         return []
     phases = max(uncertainty.PHASES, 8 * gait.harmonics)
@@ -130,17 +132,18 @@ def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize)
 
 def direct(
     scene: Scene, gait: Gait, count: int, phases: int, together: int = sys.maxsize, checked: bool = True,
-    every: bool = False,
+    all_phases: bool = False,
 ) -> list[Job]:  # fmt: skip
-    """The direct tier for ``count`` amplitudes, at most ``together`` side by side, with its estimate of the error
-    (`estimate.direct`) or, if not ``checked``, without. every: balances of all phases, those that are images too."""
+    """Return the jobs of the direct tier for ``count`` amplitudes, at most ``together`` in a batch, with its estimate
+    of the error (`estimate.direct`) if ``checked``. all_phases: balances are solved at all phases, at mirror images,
+    too."""
     system, stepping = scene.system, scene.system.traits.steps
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, gaits_per_batch(system, phases))
-    held = group * (60 * costed(system).elements + costed(system).memory) if stepping else 0
-    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + held) + count * ROW
-    solves = (lambda n: n) if every else (lambda n: solved_phases(system, gait, n))
+    stored = group * (60 * costed(system).elements + costed(system).memory) if stepping else 0
+    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
+    solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)
     jobs = [
@@ -149,11 +152,12 @@ def direct(
     ]
     return jobs + (
         frame(scene) * groups * (len(runs) - 1) if isinstance(system, Framed) else []
-    )  # other models have their own
+    )  # other models have frames of their own
 
 
 def cycles_of(system: System) -> int:
-    """Return how many cycles a gait is run for: as it is told, one where no cycle is like another, else an assumption."""
+    """Return the number of cycles that a gait is run for: the setting, one where every cycle differs, else an
+    assumption."""
     return CYCLES if settling(system) else (system.traits.steps and solver_of(system).cycles) or 1
 
 
@@ -169,24 +173,25 @@ def _runs(scene: Scene, phases: int) -> list[tuple[int, float]]:
 
 
 def connection(scene: Scene) -> list[Job]:
-    """The connection with its CCF."""
+    """Return the jobs of the connection with its CCF."""
     return built(scene, fitted.table(scene.system, scene.numerics))
 
 
 def harmonics(scene: Scene) -> list[Job]:
-    """The harmonics of the velocity."""
+    """Return the jobs of the harmonics of the velocity."""
     return built(scene, harmonic.table(scene.system, scene.numerics))
 
 
 def built(scene: Scene, table: Table, numbers: int = 0) -> list[Job]:
-    """A table, beside which so many numbers are held."""
+    """Return the jobs of a table. numbers: stored besides."""
     if table.axes:
         table.axes()  # refuses a field that is too large
     return _spread_out(scene, table.balances, BASE + 8 * TABLES * (table.numbers + numbers))
 
 
 def of_even_part(scene: Scene) -> list[Job]:
-    """What of the velocity is even in alphadot (`Study.even_part`): a look at a few shapes, and at all where it is not odd."""
+    """Return the jobs of the even part of the velocity (`Study.even_part`): at a few shapes, and at all where it is not
+    odd."""
     system = scene.system
     if stored_table(system, "connection"):
         return []
@@ -196,13 +201,13 @@ def of_even_part(scene: Scene) -> list[Job]:
 
 
 def of_planes(scene: Scene, pairs: Sequence[tuple[int, int]], at: Sequence) -> list[Job]:
-    """Planes of pairs of joints through shapes (`Study.plane`)."""
+    """Return the jobs of planes of pairs of joints through shapes (`Study.plane`)."""
     balances = [fitted.plane_balances(scene.system, scene.numerics, *one) for one in zip(pairs, at)]
     return [job for count in balances for job in _spread_out(scene, count, BASE)]
 
 
 def of_metric(scene: Scene) -> list[Job]:
-    """The metric, with the harmonic table where it shares the velocities of that one (`Study.compute_metric`)."""
+    """Return the jobs of the metric, with the harmonic table where they share velocities (`Study.compute_metric`)."""
     system, n = scene.system, scene.numerics
     if stored_table(system, "metric"):
         return []
@@ -214,8 +219,8 @@ def of_metric(scene: Scene) -> list[Job]:
 
 
 def of_effort(scene: Scene, count: int, gait: Gait | None = None) -> list[Job]:
-    """Path length and work of ``count`` amplitudes (`effort.effort`): steps of time again at half and a quarter of the
-    phases, and a quarter of the phases with twice the pieces."""
+    """Return the jobs of path length and work of ``count`` amplitudes (`effort.effort`): for time stepping again at
+    half and a quarter of the phases, and with twice the pieces at a quarter."""
     phases, system = effort.phases_of(scene), scene.system
     once = lambda n: direct(scene, gait or scene.gait, count, n, checked=False)
     jobs = once(phases)

@@ -1,4 +1,4 @@
-"""The net displacement of a gait per cycle: by each tier with its error, or by the cheapest that is good enough."""
+"""The net displacement of a gait per cycle: by each tier with its error, or by the cheapest that is accurate enough."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ from geomech.core.variables import Result
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import cost
-from geomech.study.bench import METHODS, Study
 from geomech.study.choose import cheapest
 from geomech.study.effort import refuse_costless, with_effort
 from geomech.study.question import Allow, Progress, Question
+from geomech.study.study import METHODS, Study
 from rft.refusal import Refusal
 
 
 @dataclass(frozen=True)
 class Displacement(Question):
-    """How far a gait of each amplitude goes, by tiers of METHODS; without any by all of a plain study.
-
-    effort: with path length, work and cost of transport."""
+    """Net displacement of a gait by amplitude, by tiers of METHODS; without any by all of a plain study. effort: with
+    path length, work and cost of transport."""
 
     scene: Scene
     amplitudes: tuple[float, ...]
@@ -46,13 +45,13 @@ class Displacement(Question):
         return self.study.cost(self.amplitudes, self.chosen, more=more)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        found = self.study.study(self.amplitudes, self.chosen, progress=progress).result
-        return with_effort(found) if self.effort else found
+        result = self.study.study(self.amplitudes, self.chosen, progress=progress).result
+        return with_effort(result) if self.effort else result
 
 
 @dataclass(frozen=True)
 class Cheapest(Question):
-    """How far a gait goes by the cheapest tier whose errors of position are at most ``tolerance``, body lengths."""
+    """Net displacement of a gait by the cheapest tier whose errors of position are at most ``tolerance``, body lengths."""
 
     scene: Scene
     amplitudes: tuple[float, ...]
@@ -72,13 +71,13 @@ class Cheapest(Question):
             refuse_costless(self.scene)
 
     def cost(self) -> Cost:
-        # What a tolerance takes is known only once a tier has run: `allow` is asked before each.
+        # The cost of a tolerance is known only once a tier has run: `allow` is called before each.
         return cost.price(self._more)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         ask = lambda jobs: allow(cost.price([*jobs, *self._more]))
-        found = cheapest(self.scene, self.amplitudes, self.tolerance, ask=ask).result
-        return with_effort(found) if self.effort else found
+        result = cheapest(self.scene, self.amplitudes, self.tolerance, ask=ask).result
+        return with_effort(result) if self.effort else result
 
 
 def displacement(

@@ -1,10 +1,9 @@
-"""What moving costs: the metric of a system's shape space, and length of path, work and cost of transport of its gaits.
+"""The cost of moving: the metric of a system's shape space, and path length, work and cost of transport of its gaits.
 
-Power is in axial drags of the whole body times body lengths a unit of time, in which phase grows by 1 rad; in a fluid the drag
-is that at a body length a unit of time. Work is its integral over a cycle, path length that of F = power^(1/degree)
-(`geomech.geometry.metric`): in a dry medium the same, in body lengths. Cost of transport is work over that of towing the body,
-straight and along itself, as far in the same time.
-"""
+Power is in axial drags of the whole body times body lengths per unit of time, in which phase grows by 1 rad; in a fluid
+the drag is that at a body length per unit of time. Work is its integral over a cycle; path length is the integral of F
+= power^(1/degree) (`geomech.geometry.metric`): in a dry medium both are equal, in body lengths. Cost of transport is
+work over that of towing the body, straight and along itself, as far in the same time."""
 
 from __future__ import annotations
 
@@ -45,15 +44,15 @@ from rft.premise import ALL, SHAPE_ALONE
 from rft.refusal import Refusal
 
 DEPENDS_ON = ("grid", "extent", "interpolation")  # of [numerics]
-HIGHEST = 14  # harmonic of a norm: what the 24 directions of the harmonic table tell well
+HIGHEST = 14  # harmonic of a norm that the 24 directions of the harmonic table resolve well
 METRIC = "of the system's own metric"
-EVEN = 1e-6  # of the power: a solver's rounding is below it
+EVEN = 1e-6  # of the power: above a solver's tolerance
 
 
 def why_none(system: System) -> str:
-    """Why a system has no metric, in words that follow its name; "" if it has one."""
-    if blame := because(system, SHAPE_ALONE):
-        return f"no metric with {blame}: its power does not follow from shape alone"
+    """Return why a system has no metric, in words that follow its name; "" if it has one."""
+    if parts := because(system, SHAPE_ALONE):
+        return f"no metric with {parts}: its power does not follow from shape alone"
     if stored_table(system, "connection"):
         return "" if stored_table(system, "metric") else "no metric with this table: its file tells no power"
     if capability(system, OwnMetric) is not None:
@@ -68,13 +67,13 @@ def why_none(system: System) -> str:
 
 
 def _who(system: System) -> str:
-    """What of a system is to blame; the whole where no premise is lacking."""
+    """Return the parts of a system that break a premise; the whole system where none does."""
     return listed(system, ALL)
 
 
 @lru_cache(maxsize=16)
 def _even(system: System) -> bool:
-    """Whether power is the same for alphadot and -alphadot, at a few shapes that stand for all."""
+    """Return whether power is equal for alphadot and -alphadot, tested at a few shapes."""
     if system.traits.linear:
         return True
     rng = np.random.default_rng(0)
@@ -84,7 +83,7 @@ def _even(system: System) -> bool:
 
 
 def table(system: System, numerics: Numerics, progress: Callable | None = None) -> Metric | Finsler:
-    """The metric on the field's grid: quadratic where xi = A alphadot, else a norm. ValueError if it has none."""
+    """Return the metric on the field's grid: quadratic where xi = A alphadot, else a norm. Refusal if there is none."""
     if reason := why_none(system):
         raise Refusal(reason)
     if own := stored_table(system, "metric"):
@@ -99,7 +98,7 @@ def table(system: System, numerics: Numerics, progress: Callable | None = None) 
 
 
 def shared(system: System) -> bool:
-    """Whether a metric takes the very velocities of the harmonic table."""
+    """Return whether the metric can be computed from the velocities of the harmonic table."""
     of_its_own = system.traits.linear or capability(system, OwnMetric) is not None or stored_table(system, "connection")
     return not of_its_own and HARMONIC.is_offered(system)
 
@@ -112,20 +111,20 @@ def shared_table(system: System, numerics: Numerics) -> Table:
 def with_harmonics(
     system: System, numerics: Numerics, progress: Callable | None = None
 ) -> tuple[Harmonics, Metric | Finsler]:
-    """The harmonic table and the metric from the same force balances. ValueError if it has no metric."""
+    """Return the harmonic table and the metric from the same force balances. Refusal if there is no metric."""
     if reason := why_none(system):
         raise Refusal(reason)
     seen = _Watched(system)
-    found = harmonic.table(seen, numerics).build(progress)
-    P, size = np.concatenate(seen.powers), np.prod([len(a) for a in found.axes])
-    P = np.concatenate([P, P[: size - len(P)][::-1]])  # where left and right are alike half of the grid is solved
-    F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, found.axes))
+    harmonics = harmonic.table(seen, numerics).build(progress)
+    P, size = np.concatenate(seen.powers), np.prod([len(a) for a in harmonics.axes])
+    P = np.concatenate([P, P[: size - len(P)][::-1]])  # with mirror symmetry half of the grid is solved
+    F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
-    return found, metric.norm_from_samples(F, found.axes, unit, found.degree, highest=HIGHEST)
+    return harmonics, metric.norm_from_samples(F, harmonics.axes, unit, harmonics.degree, highest=HIGHEST)
 
 
 class _Watched:
-    """A system of which powers are kept as its velocities are asked for, shape after shape of a half of the grid."""
+    """A system that records powers whenever its velocities are computed, shape after shape on half of the grid."""
 
     def __init__(self, system: System):
         self.system, self.powers = system, []
@@ -140,7 +139,7 @@ class _Watched:
 
 
 class _Driven(connection.Reporting):
-    """The velocity of a system, which tells the power besides."""
+    """The velocity of a system, which also passes on the power."""
 
     def __init__(self, system: System, powers: list):
         self.with_report, self.receive = partial(velocity_and_power, system), powers.append
@@ -158,7 +157,7 @@ def _norm(power, degree: float) -> np.ndarray:
 
 
 def refuse_costless(scene: Scene) -> None:
-    """Refusal for a scene of which nothing says what moving costs."""
+    """Refuse a scene whose cost of moving is not known."""
     system = scene.system
     if not any(capability(system, kind) for kind in (Dissipative, OwnMetric)):
         what = "its file does not tell it" if stored_table(system, "connection") else "nothing says what moving costs"
@@ -166,10 +165,13 @@ def refuse_costless(scene: Scene) -> None:
 
 
 def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> dict[str, np.ndarray]:
-    """{"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the direct tier. Each
-    error is the change with half of the phases, in time stepping at least a quarter of that from there to a quarter of them,
-    and twice that with twice the pieces into which effects cut the body; what cycles still to come would change is not in
-    it. Path lengths are nan where power is of no one degree in the rate. ValueError where nothing says what moving costs."""
+    """Return {"path_length", "work", "path_length_error", "work_error"} (B,) of a gait, or the scene's own, by the
+    direct tier.
+
+    Each error is the change with half of the phases; in time stepping at least a quarter of the change from half to a
+    quarter of them; and twice the change with twice the pieces into which effects cut the body. Changes by later cycles
+    are not included. Path lengths are nan where power has no one degree in the rate. Refusal where the cost of moving
+    is not known."""
     system, gait = scene.system, checked_gait(scene.gait if gait is None else gait)
     amplitudes = real_array("amplitudes", [gait.amplitude] if amplitudes is None else amplitudes).ravel()
     in_range("phases", phases or 8, 8, 1e6, whole=True)
@@ -182,13 +184,13 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
 
     integral = lambda rates: 2 * np.pi * rates.mean(-1)
 
-    def told(some):
-        shapes = gait.cycle(phases, some)
+    def integrals(amplitudes):
+        shapes = gait.cycle(phases, amplitudes)
         rates = _rates(system, *shapes)
         fine = integral(rates)
         fewer = [tuple(x[..., ::step, :] for x in shapes) for step in (2, 4)]
-        if system.traits.steps:  # a step rests on the one before: fewer phases are other steps
-            half, quarter = (integral(_rates(system, *some)) for some in fewer)
+        if system.traits.steps:  # each step depends on the one before: fewer phases are other steps
+            half, quarter = (integral(_rates(system, *coarser)) for coarser in fewer)
             error = np.maximum(np.abs(fine - half), np.abs(half - quarter) / 4)
         else:
             half, quarter = (integral(rates[..., ::step]) for step in (2, 4))
@@ -198,38 +200,38 @@ def effort(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int 
         return np.concatenate([fine, error], 1)
 
     names = ("path_length", "work", "path_length_error", "work_error")
-    return dict(zip(names, in_groups(told, amplitudes, gaits_per_batch(system, phases))[:, :4].T))
+    return dict(zip(names, in_groups(integrals, amplitudes, gaits_per_batch(system, phases))[:, :4].T))
 
 
 def phases_of(scene: Scene, phases: int | None = None) -> int:
-    """Return the phases that `effort` takes where so many are asked for, or the scene's own."""
+    """Return the number of phases of `effort`, rounded up, from the number given or the scene's own."""
     return max(32 if scene.system.traits.steps else 8, -(-(phases or scene.numerics.phases) // 4) * 4)
 
 
 def _rates(system: System, alpha, alphadot) -> np.ndarray:
-    """(B, 2, N): what path length and work are the integrals of, nan where there is none."""
+    """Return the integrands of path length and work, (B, 2, N), nan where there is none."""
     degree = system.traits.power_degree
     own = capability(system, OwnMetric)
-    if own is not None:  # a metric, of which there is no work
+    if own is not None:  # a metric has no work
         square = np.asarray(own.squared_speed(alpha, alphadot))
         return np.stack([_norm(square, 2.0), np.full_like(square, np.nan)], 1)
-    done = system.run(alpha, alphadot, True).work
-    P = power(system, alpha, alphadot) if done is None else done.power / system.length
+    work = system.run(alpha, alphadot, True).work
+    P = power(system, alpha, alphadot) if work is None else work.power / system.length
     return np.stack([np.full_like(P, np.nan) if degree is None else _norm(P, degree), P], 1)
 
 
 def with_effort(result: Result) -> Result:
-    """Return net displacements with path length and work of a cycle, their errors, and by tier the efficiency, net distance
-    in body lengths over path length, and the cost of transport, work over that of towing the body as far; nan where there
-    is none."""
+    """Return net displacements with path length and work of a cycle, their errors, and by tier the efficiency (net
+    distance in body lengths over path length) and the cost of transport (work over that of towing the body as far); nan
+    where undefined."""
     scene, gait = result.subject
-    found, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
+    efforts, unit = effort(scene, gait, result["amplitude"].values), units(scene.system)
     degree, distance = scene.system.traits.power_degree, result["net_distance"].values / scene.system.length
     with np.errstate(divide="ignore", invalid="ignore"):
         towed = np.nan * distance if degree is None else distance * (distance / (2 * np.pi)) ** (degree - 1)
-        ratios = {"efficiency": distance / found["path_length"], "cost_of_transport": found["work"] / towed}
+        ratios = {"efficiency": distance / efforts["path_length"], "cost_of_transport": efforts["work"] / towed}
     more = [
-        Variable(key, ("amplitude",), found[key], unit.get(key, ""), "", found[f"{key}_error"])
+        Variable(key, ("amplitude",), efforts[key], unit.get(key, ""), "", efforts[f"{key}_error"])
         for key in ("path_length", "work")
     ]
     more += [Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()]
@@ -237,7 +239,7 @@ def with_effort(result: Result) -> Result:
 
 
 def units(system: System) -> dict[str, str]:
-    """Return the units of what `with_effort` adds."""
+    """Return the units of the variables that `with_effort` adds."""
     if capability(system, OwnMetric) is not None:
         return {"path_length": METRIC, "efficiency": f"BL / {METRIC}"}
     length = "BL" if system.traits.power_degree == 1 else "sqrt(axial drag at 1 BL per unit of time, BL, unit of time)"

@@ -1,10 +1,10 @@
-"""How far a displacement can be trusted.
+"""Estimates of the error of displacements.
 
-Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the phases
-and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half the
-length; a table against half of its grid, and by what its fit left (`System.table_error`); every other tier against the
-direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net headings, in rad.
-"""
+Every estimate is a refinement, never a constant: the direct tier against itself at half, a quarter and an eighth of the
+phases and, on the quarter, with the regularisation ten times smaller and exact link integrals, or with pieces of half
+the length; a table against half of its grid, and by the residual of its fit (`System.table_error`); every other tier
+against the direct tier. Errors come in pairs: the distance between net positions, in body lengths, and between net
+headings, in rad."""
 
 from __future__ import annotations
 
@@ -22,75 +22,82 @@ from rft.refusal import located
 CHECKED = (
     33  # amplitudes at which a look-up tier is compared with the direct one; between them the worse neighbour counts
 )
-FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still makes a gait
-REFERENCE_PHASES = 64  # of that comparison where no direct tier is asked for
-MOST_PIECES = 10_000  # to a body length
+FEWEST_STEPS = 64  # of time stepping that is refined: an eighth of them still resolves a gait
+REFERENCE_PHASES = 64  # of that comparison without the direct tier in the request
+MOST_PIECES = 10_000  # per body length
 SAFETY = 2.5  # covers the truth in more than 95 % of random scenes while the median estimate stays below ten errors
-SEEN = 1.2  # times the difference to finer rounding and exact integrals: nearly all of the error is in it
+SEEN = 1.2  # times the difference from smaller regularisation and exact integrals, which is nearly all of the error
 SEEN_BY_RULES = (
-    3.5  # between two rules of an order of 1 in dry media, and for position and heading half of the larger: chance
+    3.5  # likewise between two rules, of order 1 in dry media; at least half of the larger of both, as they scatter
 )
 ROUNDING = 2e-16  # of a velocity
 
 
 def distance(a, b) -> np.ndarray:
-    """Between the positions of poses (..., 3)."""
+    """Return the distance between the positions of poses (..., 3)."""
     return np.hypot(a[..., 0] - b[..., 0], a[..., 1] - b[..., 1])
 
 
-def apart(a, b, length: float) -> np.ndarray:
-    """(..., 2): between the positions of poses (..., 3), over ``length``, and between their headings, rad."""
+def pose_distance(a, b, length: float) -> np.ndarray:
+    """Return (..., 2): distance of positions of poses (..., 3), over ``length``, and of headings, rad."""
     return np.stack([distance(a, b) / length, np.abs(a[..., 2] - b[..., 2])], -1)
 
 
 def direct(scene: Scene, gait: Gait, amplitudes: np.ndarray, phases: int) -> tuple[np.ndarray, np.ndarray]:
-    """(poses (B, 3), errors (B, 2), body lengths and rad) of the direct tier; phases is rounded up to a multiple of 8,
-    >= 32. Many amplitudes go in groups, so that memory is bounded."""
+    """Return poses (B, 3) and errors (B, 2), body lengths and rad, of the direct tier.
+
+    phases is rounded up to a multiple of 8, >= 32. Many amplitudes are computed in groups, so that memory is bounded.
+    """
     poses, *errors = in_groups(scene, gait, amplitudes, phases)
     return poses, sum(errors)
 
 
 def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int) -> tuple[np.ndarray, ...]:
-    """(poses, errors of all but the pieces of body, errors of these) of the direct tier; None: the gait's own amplitude."""
+    """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier. amplitudes:
+    None for the gait's own."""
     size = gaits_per_batch(scene.system, phases)
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
     one = (
         _direct if scene.system.traits.steps else partial(runner().call, _direct)
-    )  # pieces of steps are stored by themselves
+    )  # time stepping stores its own checkpoints
     with located(scene.name):
-        return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, some, phases) for some in groups)))
+        return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, group, phases) for group in groups)))
 
 
 def _direct(
     scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(poses, errors of all but the pieces of body, errors of these) of the direct tier."""
+    """Return poses, errors without those of the pieces of body, and errors of these, of the direct tier."""
     phases = max(32, 8 * -(-phases // 8))
     system, stepping = scene.system, scene.system.traits.steps
     shapes = gait.cycle(max(FEWEST_STEPS, phases) if stepping else phases, amplitudes)
-    every = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
+    strided = [tuple(x[..., ::step, :] for x in shapes) for step in (8, 4, 2, 1)]
     run = system.run(*shapes)
-    if stepping:  # a step rests on the one before: fewer phases are other steps
-        eighth, coarse, half, full = *(_with_fewer(system, *fewer) for fewer in every[:3]), run.net
+    if stepping:  # each step depends on the one before: fewer phases are other steps
+        eighth, coarse, half, full = *(_with_fewer(system, *fewer) for fewer in strided[:3]), run.net
     else:
         eighth, coarse, half = (displacement(run.xi[..., ::step, :]) for step in (8, 4, 2))
         full = run.net
-    error = _left(
-        *(apart(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
+    error = _remaining(
+        *(pose_distance(*pair, scene.system.length) for pair in ((coarse, eighth), (half, coarse), (full, half))),
         stepping or not system.traits.smooth,
     )
     error += 2 * np.pi * (np.maximum(run.residual, ROUNDING) * run.speed)[:, None]
     if finer := refined(system):
-        off = apart(finer.run(*every[1], start=run.xi[..., ::4, :]).net, coarse, scene.system.length)
-        error += SEEN * off if is_closed(system) else SEEN_BY_RULES * np.maximum(off, off.max(-1, keepdims=True) / 2)
-    error += np.asarray(run.to_come)[..., None] + table_error(system, *every[2])
-    return full, error, pieces_error(scene, shapes, every[1], coarse)
+        difference = pose_distance(finer.run(*strided[1], start=run.xi[..., ::4, :]).net, coarse, scene.system.length)
+        error += (
+            SEEN * difference
+            if is_closed(system)
+            else SEEN_BY_RULES * np.maximum(difference, difference.max(-1, keepdims=True) / 2)
+        )
+    error += np.asarray(run.to_come)[..., None] + table_error(system, *strided[2])
+    return full, error, pieces_error(scene, shapes, strided[1], coarse)
 
 
 def _with_fewer(system, alpha, alphadot) -> np.ndarray:
-    """Poses by fewer steps of time than were asked for; RuntimeError, which says so."""
+    """Return poses by fewer time steps than the request has; a RuntimeError says so."""
     try:
         return system.run(alpha, alphadot).net
     except RuntimeError as error:
@@ -100,43 +107,43 @@ def _with_fewer(system, alpha, alphadot) -> np.ndarray:
 
 
 def pieces_error(scene: Scene, shapes, fewer, coarse: np.ndarray) -> np.ndarray:
-    """(B, 2), body lengths and rad: what pieces that are no shorter leave of the effects that vary along an element.
+    """Return (B, 2), body lengths and rad: error of effects that vary along an element, from the finite length of its
+    pieces.
 
-    fewer: a quarter of the phases of ``shapes``, where pieces of half the length are compared with ``coarse``, the poses
-    there. Which pieces the pivots lie in is chance, so the error is of order 2 in the mean only: half of the pieces against a
-    quarter, at all phases, shows what that may hide.
-    """
+    fewer: a quarter of the phases of ``shapes``, where pieces of half the length are compared with ``coarse``, the
+    poses there. Which pieces the pivots lie in is chance, so the error is of order 2 on average only: half of the
+    pieces against a quarter, at all phases, shows how large this scatter is."""
     cut = pieces_per_length(scene.system)
     if not cut:
         return np.zeros((*coarse.shape[:-1], 2))
     net = lambda n, cycle: scene.with_numerics(pieces=min(max(1, n), MOST_PIECES)).system.run(*cycle).net
     length = scene.system.length
-    doubled = apart(net(2 * cut, fewer), coarse, length)
-    chance = apart(net(cut // 2, shapes), net(cut // 4, shapes), length) / 8
+    doubled = pose_distance(net(2 * cut, fewer), coarse, length)
+    chance = pose_distance(net(cut // 2, shapes), net(cut // 4, shapes), length) / 8
     return 2.0 * np.maximum(doubled, chance)
 
 
-def _left(d0, d1, d2, kinks: bool) -> np.ndarray:
-    """Error after the last of three doublings of the phases, which moved the answer by d0, d1 and d2.
+def _remaining(d0, d1, d2, kinks: bool) -> np.ndarray:
+    """Return the error after the last of three doublings of the phases, which changed the answer by d0, d1 and d2.
 
-    If each doubling multiplies the error by r, what is left after the last is d2 r / (1 - r), and r is estimated from the
-    moves. Where links stick, theory gives r = 1/4 (order 2) but single moves scatter: r is then at least 1/4, and the
-    largest of the three moves, each carried forward by r, stands for the last. SAFETY is set by the coverage test.
-    """
+    If each doubling multiplies the error by r, the error after the last is d2 r / (1 - r), and r is estimated from the
+    changes. Where links stick, theory gives r = 1/4 (order 2) but single changes scatter: r is then at least 1/4, and
+    the largest of the three changes, each multiplied by the missing powers of r, stands for the last. SAFETY is set by
+    the coverage test."""
     r = np.clip(np.sqrt(d2 / np.maximum(d0, 1e-300)), 0.25 if kinks else 0.0, 0.5)
     move = np.maximum.reduce([d2, d1 * r, d0 * r * r]) if kinks else d2
     return SAFETY * move * r / (1.0 - r)
 
 
 def against_direct(scene: Scene, poses, gait: Gait, amplitudes: np.ndarray, reference=None) -> np.ndarray:
-    """Errors (B, 2), as in `direct`, of poses (B, 3) by any other tier. reference: (poses, errors) of the direct tier at
-    the same amplitudes; computed at some of them if not given."""
+    """Return errors (B, 2), as in `direct`, of poses (B, 3) by any other tier. reference: (poses, errors) of the direct
+    tier at the same amplitudes; computed at some of them if None."""
     if reference is None:
-        some = np.unique(np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int))
-        reference = direct(scene, gait, amplitudes[some], max(REFERENCE_PHASES, 8 * gait.harmonics))
+        checked = np.unique(np.linspace(0, len(amplitudes) - 1, CHECKED).round().astype(int))
+        reference = direct(scene, gait, amplitudes[checked], max(REFERENCE_PHASES, 8 * gait.harmonics))
     else:
-        some = np.arange(len(amplitudes))
-    at_some = apart(poses[some], reference[0], scene.system.length) + reference[1]
-    left = np.searchsorted(some, np.arange(len(amplitudes)), side="right") - 1
-    right = np.minimum(left + (some[left] < np.arange(len(amplitudes))), len(some) - 1)
-    return np.maximum(at_some[left], at_some[right])
+        checked = np.arange(len(amplitudes))
+    checked_errors = pose_distance(poses[checked], reference[0], scene.system.length) + reference[1]
+    lower = np.searchsorted(checked, np.arange(len(amplitudes)), side="right") - 1
+    upper = np.minimum(lower + (checked[lower] < np.arange(len(amplitudes))), len(checked) - 1)
+    return np.maximum(checked_errors[lower], checked_errors[upper])

@@ -1,4 +1,4 @@
-"""Connections, their CCFs and what else a study tells of shape space, as variables of results."""
+"""Connections, CCFs and other fields of a study over shape space, as variables of results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from geomech.io.tables.netcdf import SHAPE
 from geomech.scene.model import Scene
 from geomech.scene.write import toml
 from geomech.study import effort
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.study.tables import COMPONENTS
 from geomech.systems.base import System, length_unit, shape_labels
 from geomech.systems.capabilities import OwnMetric, Recorded, capability, solver_of, stored_table
@@ -32,21 +32,23 @@ INTERVAL_OF_A = "half width of the interval of A"
 
 
 def of_study(study: Study) -> Result:
-    """Return A (component, joint, alpha_1, ...), its fit residual, the rms of xi, the CCF with its estimated error, of each
-    pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; what a change of shape costs, where
-    something says it; with units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table"
-    read the file of it."""
+    """Return A (component, joint, alpha_1, ...), its fit residual, the rms of xi, and the CCF with its estimated error,
+    of each pair of joints; for two joints, where xi is not linear in alphadot, its odd harmonics; the metric, where
+    there is one.
+
+    With units, conventions (`about`) and the scene's text. `Connection.load` and [system] kind = "table" read it from a
+    file."""
     labels = shape_labels(study.scene.system)
     return Result("connection", (*coordinates(study.fitted.axes, labels), *variables(study)), attributes(study), study)
 
 
 def save_connection(path: str | Path, study: Study) -> None:
-    """Write what `of_study` has as NetCDF; the file appears whole or not at all."""
+    """Write the result of `of_study` as NetCDF; the file appears whole or not at all."""
     write_netcdf(path, of_study(study))
 
 
 def attributes(study: Study) -> dict:
-    """Return what a scene's connection is, what it rests on, and the scene's text, as attributes of a file."""
+    """Return title, conventions, numerics and text of a scene, as attributes of a file of its connection."""
     scene = study.scene
     numerics = (
         repr(scene.numerics) if solver_of(scene.system) is None else f"{scene.numerics}, {solver_of(scene.system)}"
@@ -66,55 +68,55 @@ def attributes(study: Study) -> dict:
 
 
 def variables(study: Study) -> list[Variable]:
-    """Return what a study tells of shape space, without its coordinates."""
+    """Return the fields of a study, without their coordinates."""
     unit = length_unit(study.scene.system)
-    found = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
+    variables = of_connection(study.fitted, stored_table(study.scene.system, "A_error"))
     if isinstance(study.fitted, Tube):
-        found += [*of_known(study.fitted.taylor, unit), of_reach(study.fitted)]
+        variables += [*of_known(study.fitted.taylor, unit), of_reach(study.fitted)]
     if len(study.fitted.axes) == 2:
         what = INTERVAL_OF_CCF if isinstance(study.fitted, Tube) else ERROR_OF_CCF
-        found.append(of_ccf(study.curvature, study.curvature_error, what))
+        variables.append(of_ccf(study.curvature, study.curvature_error, what))
     elif len(study.fitted.axes) > 2:
-        found += of_pairs(study.two_form, two_form.error(study.fitted))
+        variables += of_pairs(study.two_form, two_form.error(study.fitted))
     if isinstance(study.scene.system, Framed):
-        found.append(of_frame(study.scene.system.field.field))
+        variables.append(of_frame(study.scene.system.field.field))
     if not effort.why_none(study.scene.system):
-        found += of_metric(
+        variables += of_metric(
             study.metric, capability(study.scene.system, OwnMetric) is None
-        )  # before the harmonics, whose velocities it may share
+        )  # before the harmonics, as they may share velocities
     if (harmonics := study.harmonics) is not None:
-        found += of_harmonics(harmonics, unit)
+        variables += of_harmonics(harmonics, unit)
     if (even := study.even_part) is not None:
         units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
         name = "rms over directions of xi(alphadot) + xi(-alphadot), |alphadot| = 1, which A takes for 0"
-        found.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
-    return found
+        variables.append(Variable("even_part", ("component", *angles_of(study.fitted.axes)), even, units, name))
+    return variables
 
 
 def of_connection(fitted: Connection, error: np.ndarray | None = None) -> list[Variable]:
-    """Return A, what its fit leaves, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
+    """Return A, its fit residual, and the rms of xi. error: half widths (3, d, N_1, ...) of intervals of A."""
     angles = angles_of(fitted.axes)
     units = f"{unit_name(fitted.unit)} rad-1 (x, y), rad rad-1 (theta)"
-    left = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
+    residual = "rms of xi - A alphadot over directions of alphadot, |alphadot| = 1"
     speed = "rms of xi over directions of alphadot, |alphadot| = 1"
     return [
         Variable(
             "A", ("component", "joint", *angles), fitted.A, units, "local connection", error, error_label=INTERVAL_OF_A
         ),
-        Variable("fit_residual", ("component", *angles), fitted.residual, units, left),
+        Variable("fit_residual", ("component", *angles), fitted.residual, units, residual),
         Variable("speed", ("component", *angles), fitted.speed, units, speed),
     ]
 
 
 def of_reach(tube: Tube) -> Variable:
-    """How far the grid of a connection near one gait is from it."""
+    """Return the distance of the grid of a connection near one gait from it."""
     shapes = np.stack(np.meshgrid(*tube.axes, indexing="ij"), -1)
-    told = "distance from the mean gait over that which the data reach: A is nan beyond 1"
-    return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", told)
+    label = "distance from the mean gait over that which the data reach: A is nan beyond 1"
+    return Variable("reach", angles_of(tube.axes), tube.reach(shapes), "1", label)
 
 
 def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
-    """What a connection near one gait is looked up in (`geomech.geometry.tube`)."""
+    """Return the arrays of a connection near one gait (`geomech.geometry.tube`)."""
     units, order = (
         f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)",
         "Fourier coefficients, 1, cos t, sin t, cos 2t ..., of",
@@ -147,18 +149,18 @@ def of_known(known: TaylorSeries, unit: str) -> list[Variable]:
 
 
 def of_ccf(field: Field, error: Field | None = None, what: str = ERROR_OF_CCF, name: str = "ccf") -> Variable:
-    """Return a CCF as a variable. what: its error is, in words."""
+    """Return a CCF as a variable. what: text on the kind of its error."""
     units = f"{unit_name(field.unit)} rad-2 (x, y), rad rad-2 (theta)"
-    said, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
-    return Variable(name, dims, field.values, units, said, None if error is None else error.values, error_label=what)
+    label, dims = "curvature constraint function of joints 1 and 2", ("component", *angles_of(field.axes))
+    return Variable(name, dims, field.values, units, label, None if error is None else error.values, error_label=what)
 
 
 def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
-    """The CCF of all pairs of joints, its error, and the pairs."""
+    """Return the CCF of all pairs of joints, its error, and the pairs."""
     units = f"{unit_name(form.field.unit)} rad-2 (x, y), rad rad-2 (theta)"
     pairs, over = np.array(form.pairs) + 1.0, ("pair", "component", *angles_of(form.field.axes))
-    told = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
-    said = f"curvature constraint function of joints {told}, in this order"
+    order = ", ".join(f"{i:g} {j:g}" for i, j in pairs)
+    label = f"curvature constraint function of joints {order}, in this order"
     return [
         Variable("pair_joints", ("pair", "first_and_second"), pairs, "1", "joints i < j of each pair"),
         Variable(
@@ -166,7 +168,7 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
             over,
             form.field.values,
             units,
-            said,
+            label,
             error.field.values,
             error_label=ERROR_OF_CCF.replace("ccf", "ccf_pairs", 1),
         ),
@@ -174,26 +176,27 @@ def of_pairs(form: TwoForm, error: TwoForm) -> list[Variable]:
 
 
 def of_frame(pose: Field) -> Variable:
-    """The pose of a minimum-perturbation frame in the frame that it was made from."""
+    """Return the pose of a minimum-perturbation frame in the original frame."""
     units = f"{unit_name(pose.unit)} (x, y), rad (theta)"
     name = "pose of this frame in the mean frame of the body, h with g_this = g_mean h"
     return Variable("frame_pose", ("component", *angles_of(pose.axes)), pose.values, units, name)
 
 
 def of_harmonics(table: Harmonics, unit: str) -> list[Variable]:
-    """Coefficients of the odd harmonics of xi, and what they leave."""
+    """Return the coefficients of the odd harmonics of xi, and their residual."""
     angles = angles_of(table.axes)
     units = f"{unit_name(unit)} rad-1 (x, y), rad rad-1 (theta)"
     name = "coefficients of cos(k beta), sin(k beta), k = 1, 3, 5 ..., of xi for alphadot = (cos beta, sin beta)"
-    left = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
+    residual = "rms over directions of alphadot of what the harmonics leave of xi, |alphadot| = 1"
     return [
         Variable("harmonics", ("component", "coefficient", *angles), table.coefficients, units, name),
-        Variable("harmonics_residual", ("component", *angles), table.residual, units, left),
+        Variable("harmonics_residual", ("component", *angles), table.residual, units, residual),
     ]
 
 
 def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
-    """M, or the coefficients of a norm and what they leave. power: it is that of drag, not the system's own."""
+    """Return M, or the coefficients of a norm and their residual. power: it is the power of drag, not the system's own
+    metric."""
     angles, size = angles_of(metric.axes), "drag that of the whole body along itself, lengths those of the body"
     if isinstance(metric, Metric):
         if not power:
@@ -204,31 +207,31 @@ def of_metric(metric: Metric | Finsler, power: bool = True) -> list[Variable]:
         return [Variable("metric", ("joint", "other_joint", *angles), metric.M, units, name)]
     name = "coefficients of 1, cos(k beta), sin(k beta), k = 2, 4 ..., of F = power^(1 / power_degree) for alphadot = "
     units = "(axial drag x body length)^(1 / power_degree) rad-1"
-    left = "rms over directions of alphadot of what the coefficients leave of F, |alphadot| = 1"
+    residual = "rms over directions of alphadot of what the coefficients leave of F, |alphadot| = 1"
     return [
         Variable(
             "norm", ("norm_coefficient", *angles), metric.coefficients, units, f"{name}(cos beta, sin beta); {size}"
         ),
-        Variable("norm_residual", angles, metric.residual, units, left),
+        Variable("norm_residual", angles, metric.residual, units, residual),
     ]
 
 
 def angles_of(axes) -> tuple[str, ...]:
-    """Names of the axes of shape space."""
+    """Return the names of the axes of shape space."""
     return tuple(f"alpha_{k + 1}" for k in range(len(axes)))
 
 
 def coordinates(axes: Sequence[np.ndarray], labels: Sequence[tuple[str, str]]) -> list[Variable]:
     """Return components, joints and the axes of shape space; labels: (name, unit) of each shape variable, alpha_k for an
     angle between links."""
-    found = [
+    variables = [
         Variable("component", ("component",), np.array(COMPONENTS)),
         Variable("joint", ("joint",), np.arange(1, len(axes) + 1, dtype="i4")),
     ]
     for k, (name, axis, (label, unit)) in enumerate(zip(angles_of(axes), axes, labels)):
         joint = f"angle of joint {k + 1}, heading of link {k + 2} minus link {k + 1}"
-        found.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
-    return found
+        variables.append(Variable(name, (name,), axis, unit, joint if label == name else f"{SHAPE}{label}"))
+    return variables
 
 
 def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
@@ -236,8 +239,8 @@ def of_fitted(fitted: Connection, shapes: Sequence[str] = ()) -> Result:
     sized = (
         {} if fitted.length is None else {"body_length": float(fitted.length), "length_unit": unit_name(fitted.unit)}
     )
-    found = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
-    return Result("connection", found, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
+    variables = (*coordinates(fitted.axes, _labels(fitted.axes, shapes)), *of_connection(fitted))
+    return Result("connection", variables, {"sign_of_A": "xi = + A alphadot", **sized}, fitted)
 
 
 def of_field(values: Field, name: str, shapes: Sequence[str] = ()) -> Result:
@@ -253,13 +256,13 @@ def _labels(axes, names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def recorded(system: System) -> dict:
-    """Return what a system says of itself in the files of its connection."""
+    """Return the system's own attributes for files of its connection."""
     recorded = capability(system, Recorded)
     return {} if recorded is None else dict(recorded.about())
 
 
 def about(scene: Scene) -> dict:
-    """What the numbers of a connection rest on, as attributes of a file: frame, length, forces and signs."""
+    """Return the conventions of a connection as attributes of a file: frame, length, forces and signs."""
     system = scene.system
     meanings = {"mean": "centre of mass, length-weighted mean heading", "that of the table": "not told by its file"}
     meanings["minimum-perturbation"] = "the one in which the squares of A, integrated over the grid, are least"

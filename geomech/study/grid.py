@@ -1,4 +1,4 @@
-"""A grid of a scene's own parameters: its points, and the scene at each."""
+"""A grid over parameters of a scene: its points, and the scene at each."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from rft.checks import real_array
 from rft.refusal import Refusal
 
 LARGEST = 100_000_000  # points
-MOST = 200  # values of a parameter, each of which is seen to make a scene, which takes some 0.5 ms
+MOST = 200  # values of a parameter for which a scene is built as a test, some 0.5 ms each
 
 
 @dataclass(frozen=True)
 class Grid:
-    """The values of some parameters of a scene, and tables of a scene file that say what it is.
+    """Values of some parameters of a scene, and the tables of its file.
 
-    inner: the parameter, or "", whose values stand side by side in a batch: it runs fastest, and no scene is read for it.
-    idle: parameters that change no row, of which the points have the first value."""
+    inner: the parameter, or "", whose values make up a batch: it varies fastest, and no scene is read for it. idle:
+    parameters that change no row; all points have their first value."""
 
     scene: Any
     over: Mapping[str, list[float]]
@@ -34,7 +34,7 @@ class Grid:
 
     @property
     def names(self) -> list[str]:
-        """The parameters, the inner one last."""
+        """Names of the parameters, the inner one last."""
         return [k for k in self.over if k != self.inner] + [k for k in self.over if k == self.inner]
 
     @property
@@ -42,8 +42,8 @@ class Grid:
         return {name: self.over[name] for name in self.names}
 
     @property
-    def beside(self) -> list[float] | None:
-        """The values of the inner parameter, if it is one of the grid's."""
+    def inner_values(self) -> list[float] | None:
+        """Values of the inner parameter, if it is one of the grid's."""
         return self.over.get(self.inner)
 
     @property
@@ -52,12 +52,12 @@ class Grid:
 
     @property
     def total(self) -> int:
-        """How many rows there are to compute."""
-        return self.points.total * len(self.beside or [0])
+        """Number of rows to compute."""
+        return self.points.total * len(self.inner_values or [0])
 
     @cached_property
     def points(self) -> Points:
-        """The points of the parameters other than the inner one."""
+        """Points of the parameters other than the inner one."""
         outer = [name for name in self.names if name != self.inner]
         return Points([self.over[name][:1] if name in self.idle else self.over[name] for name in outer])
 
@@ -71,8 +71,8 @@ class Grid:
         outer = [self.over[name] for name in self.names if name != self.inner]
         yield from itertools.product(*([v[0], v[-1]] for v in outer))
         for k, values in enumerate(outer):
-            some = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
-            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in some)
+            tested = values if len(values) <= MOST else [min(values), max(values), *values[:: -(-len(values) // MOST)]]
+            yield from ((*(v[0] for v in outer[:k]), x, *(v[0] for v in outer[k + 1 :])) for x in tested)
 
     def arranged(self, rows: np.ndarray) -> np.ndarray:
         """Return rows (`total`, width) as an array (N_1, ..., width) over the parameters in the order given."""
@@ -84,7 +84,7 @@ class Grid:
 
 
 def listed(over: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the values by parameter; Refusal unless they make a grid."""
+    """Return the values by parameter; Refusal unless they form a grid."""
     if not (isinstance(over, Mapping) and all(isinstance(k, str) for k in over)):
         raise Refusal("over must be values by parameter, such as {'gait.amplitude': [0.5, 1.0]}", value=over)
     values = {name: _listed(name, x) for name, x in over.items()}
@@ -116,7 +116,7 @@ class At(NamedTuple):
 
 
 class Points:
-    """The points of a grid, the last parameter running fastest, none of them held: there may be millions."""
+    """Points of a grid, the last parameter varying fastest. None is stored, as there may be millions."""
 
     def __init__(self, axes: list[list[float]]):
         self.axes, self.sizes = axes, tuple(map(len, axes))
@@ -161,13 +161,13 @@ def changed(tables: dict, parameter: str, value: float) -> dict:
 
 
 def _twin(key: str) -> str:
-    """Return the key that gives the same in degrees, or in rad."""
+    """Return the name of the same key in degrees, or in rad."""
     return key.removesuffix("_deg") if key.endswith("_deg") else f"{key}_deg"
 
 
 def at_points(over: Mapping[str, list[float]], names: tuple[str, ...], value):
-    """Return the number (N_1, ...) that the points of a sweep have for what goes by one of these names: that
-    parameter's where it is swept, else ``value``, None for nothing."""
+    """Return a number (N_1, ...) at the points of a sweep: the swept parameter with one of these names, else ``value``,
+    or None."""
     for axis, (name, values) in enumerate(over.items()):
         if name.partition(".")[0] in names and name.rpartition(".")[2] == names[-1]:
             values = np.reshape(values, [-1 if k == axis else 1 for k in range(len(over))])

@@ -1,4 +1,4 @@
-"""What is asked of a scene: a frozen dataclass of all that its answer follows from."""
+"""Questions about a scene: frozen dataclasses of all data that their answers depend on."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ Allow = Callable[[Cost], None]
 
 
 class Question(ABC):
-    """A request. Its members are in the order in which `geomech.commands.pipeline` asks for them.
+    """A request. `geomech.commands.pipeline` uses its members in this order.
 
-    less: what to ask for instead where it costs too much. worth_saying: s of computing from which on a command says what is
-    to come."""
+    less: advice where it costs too much. worth_saying: seconds of computing from which on a command prints the cost."""
 
     scene: Any
     less: ClassVar[str] = "ask for less"
@@ -26,30 +25,30 @@ class Question(ABC):
 
     @property
     def title(self) -> str:
-        """What is under way, while it is answered."""
+        """Name of the computation, shown during it."""
         return f"{type(self).__name__.lower()} of {self.scene.name}"
 
     def inputs(self) -> list[Path]:
-        """Return the files that it rests on, which no output may replace."""
+        """Return the files that it reads, which no output may replace."""
         from geomech.scene import inputs
 
         return inputs(self.scene)
 
     def check(self) -> None:  # noqa: B027  most have nothing more to refuse
-        """Refusal for what makes no sense, before anything is computed."""
+        """Refuse a question that makes no sense, before anything is computed."""
 
     def cost(self) -> Cost | None:
-        """Return what answering takes; None for what takes no time to speak of and is not worth storing."""
+        """Return the cost of the answer; None where it takes almost no time and is not worth storing."""
         return None
 
     @abstractmethod
     def answer(self, progress: Progress, allow: Allow) -> Result:
         """Return the answer.
 
-        progress: called with the fraction done. allow: called with the cost of what nobody knew to be needed; it refuses
-        what is too much."""
+        progress: called with the fraction done. allow: called with a cost that was not known beforehand; raises where
+        it is too much."""
 
     def ask(self) -> Result:
-        """Return the answer, as Python asks for it: whatever it costs."""
+        """Return the answer without limits of cost, as from Python."""
         self.check()
         return self.answer(lambda done: None, lambda cost: None)

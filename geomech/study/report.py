@@ -1,4 +1,4 @@
-"""Everything of a scene: its connection, and the displacement of its gait, and of those it is compared with, by all tiers."""
+"""The report of a scene: its connection, and displacements of its gait and of those it is compared with, by all tiers."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import effort
-from geomech.study.bench import Study
 from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
+from geomech.study.study import Study
 from geomech.systems import Swimmer
 from geomech.systems.base import System, refuse_singular
 from geomech.systems.capabilities import near_gait
@@ -27,15 +27,15 @@ from geomech.tiers.fitted import is_too_large
 from geomech.tiers.path import PATH
 from rft.refusal import Refusal, located
 
-AMPLITUDES = 10  # or so, in the study that is made of each gait
+AMPLITUDES = 10  # or so, for each gait
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round amplitudes, times a power of ten
 ADDED = "not in the scene: added because Fig. 11(e) compares the two gaits of the three-link swimmer"
 
 
 @dataclass(frozen=True)
 class Reported:
-    """What a report shows. tables: displacements by the gait's kind, each with its ``gaits``. mapped: there are maps, of three
-    joints planes of every pair."""
+    """Contents of a report. tables: displacements by the gait's kind, each with its ``gaits``. mapped: whether there
+    are maps; for three joints, planes of every pair."""
 
     study: Study
     gaits: list[Gait]
@@ -46,7 +46,7 @@ class Reported:
 
 @dataclass(frozen=True)
 class Report(Question):
-    """Everything of a scene."""
+    """The report of a scene."""
 
     scene: Scene
 
@@ -68,11 +68,11 @@ class Report(Question):
         if mapped:
             study.compute_field(progress)
         tables = {}
-        for gait, some in zip(gaits, amplitudes):
-            found = study.study(some, study.methods, gait).result
+        for gait, values in zip(gaits, amplitudes):
+            result = study.study(values, study.methods, gait).result
             if gait is not scene.gait:
-                found = replace(found, attributes={**found.attributes, "note": ADDED})
-            tables[type(gait).__name__.lower()] = found
+                result = replace(result, attributes={**result.attributes, "note": ADDED})
+            tables[type(gait).__name__.lower()] = result
         pairs = combinations(range(3), 2) if mapped and scene.system.joints == 3 else ()
         planes = [study.plane(pair) for pair in pairs]
         first = next(iter(tables.values()))
@@ -80,36 +80,37 @@ class Report(Question):
 
 
 def is_mapped(system: System) -> bool:
-    """Return whether there are pictures of all of shape space: of more joints there is `geomech ccf --pair`."""
+    """Return whether all of shape space is drawn; for more joints there is `geomech ccf --pair`."""
     return {2: PATH, 3: AREA}[system.joints].is_offered(system) if system.joints in (2, 3) else False
 
 
 def cost(scene: Scene) -> Cost:
-    """Return the cost of a report; Refusal for what it refuses."""
+    """Return the cost of a report; Refusal as in the report itself."""
     study, system = Study(scene), scene.system
-    found: list[Job] = []
+    parts: list[Job] = []
     for k, gait in enumerate(_gaits(scene)):
         amplitudes = reachable(scene, gait)
         plans = {m: study.plan(m, gait, amplitudes) for m in study.methods}
-        found += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
+        parts += jobs(scene, plans, len(amplitudes), gait, tables=k == 0)
     if is_mapped(system):
         pairs = [*combinations(range(3), 2)] if system.joints == 3 else []
-        found += of_even_part(scene) + of_planes(scene, pairs, [scene.gait.middle] * len(pairs))
-        found += [] if effort.why_none(system) or effort.shared(system) else of_metric(scene)
-    return price(found)
+        parts += of_even_part(scene) + of_planes(scene, pairs, [scene.gait.middle] * len(pairs))
+        parts += [] if effort.why_none(system) or effort.shared(system) else of_metric(scene)
+    return price(parts)
 
 
 def _gaits(scene: Scene) -> list[Gait]:
-    """The scene's own and, for the three-link swimmer, those of Fig. 11(e) beside it, at the same frequency."""
+    """Return the scene's gait and, for the three-link swimmer, those of Fig. 11(e), at the same frequency."""
     three_link = isinstance(scene.system, Swimmer) and scene.system.three_link
     more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency)) if three_link else ()
     return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:
-    """Round amplitudes (`steps`), of the sign of the gait's own, up to the largest that keeps it inside the field; where there
-    is no field, or one with singular shapes, up to its own, which is the last.
-    Refusal for a gait that does not move or lies outside."""
+    """Return round amplitudes (`steps`), with the sign of the gait's own, up to the largest that lies inside the field.
+
+    Without a field, or with singular shapes, the last is the gait's own. Refusal for a gait that does not move or lies
+    outside."""
     system, n = scene.system, scene.numerics
     own = not PATH.is_offered(system) or system.traits.singularity is not None or is_too_large(system, n)
     unit = gait.unit(np.linspace(0, 2 * np.pi, 721))
@@ -119,8 +120,8 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
         size = abs(gait.amplitude)
         if near_gait(scene.system):
             return _near(scene, gait)
-        found = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
-        return [float(np.copysign(a, gait.amplitude)) for a in found]
+        amplitudes = [a for a in steps(size) if a < size * (1 - 1e-9)] + [size]
+        return [float(np.copysign(a, gait.amplitude)) for a in amplitudes]
     room = min(min(a[-1] - x, x - a[0]) for a, x in zip(field_axes(scene.system, scene.numerics), gait.middle))
     if room <= 0:
         raise Refusal("the gait's centre lies outside the field", where=scene.name, instead="raise [numerics] extent")
@@ -128,18 +129,18 @@ def reachable(scene: Scene, gait: Gait) -> list[float]:
 
 
 def _near(scene: Scene, gait: Gait) -> list[float]:
-    """Amplitudes about the gait's own, as far as what is known of the system reaches; Refusal where that is nowhere."""
-    found = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
+    """Return amplitudes about the gait's own for which the system is known; Refusal where there are none."""
+    amplitudes = [round(1 + 0.05 * k, 2) * gait.amplitude for k in range(-AMPLITUDES, AMPLITUDES + 1)]
     with located(scene.name):
         refuse_singular(scene.system, gait.cycle(scene.numerics.phases)[0])
     reached = lambda a: (scene.system.traits.singularity(gait.cycle(scene.numerics.phases, a)[0]) >= 0).all()
-    return [a for a in found if reached(a)]
+    return [a for a in amplitudes if reached(a)]
 
 
 def steps(top: float) -> list[float]:
-    """Multiples of a round number, about AMPLITUDES of them, up to ``top``."""
-    wanted = top / AMPLITUDES
-    power = 10.0 ** np.floor(np.log10(wanted))
-    step = min(STEPS, key=lambda s: abs(np.log(s * power / wanted))) * power
+    """Return multiples of a round number, about AMPLITUDES of them, up to ``top``."""
+    exact = top / AMPLITUDES
+    power = 10.0 ** np.floor(np.log10(exact))
+    step = min(STEPS, key=lambda s: abs(np.log(s * power / exact))) * power
     count = int(top / step * (1 + 1e-12))
     return [float(f"{k * step:.10g}") for k in range(1, count + 1)]

@@ -1,4 +1,5 @@
-"""Results of a study as tables that users index: dicts, as JSON takes them, that a notebook shows and that xarray takes."""
+"""Results of a study as tables that users index: dicts, ready for JSON, with a view in notebooks and a conversion to
+xarray."""
 
 from __future__ import annotations
 
@@ -10,9 +11,8 @@ from geomech.study import tables
 
 
 class Displacements(Extensible, dict):
-    """Net displacement per cycle by amplitude and tier (`tables.table`) of a gait of a scene.
-
-    result: the numbers with their units and errors (`tables.result`), of which this is one rendering."""
+    """Net displacement per cycle by amplitude and tier (`tables.table`) of a gait of a scene. result: the numbers with
+    their units and errors (`tables.result`), which this dict renders."""
 
     def __init__(self, result: Result):
         super().__init__(tables.table(result))
@@ -28,5 +28,5 @@ class Displacements(Extensible, dict):
 
     @property
     def tiers(self) -> list[str]:
-        """Names of the tiers that it has."""
+        """Names of the tiers, in the order given."""
         return self.result["tier"].values.tolist()

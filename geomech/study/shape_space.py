@@ -1,4 +1,4 @@
-"""What a scene's connection and its CCF are over shape space: on the scene's grid, or on planes where two joints move."""
+"""The connection and the CCF of a scene over shape space: on the scene's grid, or on planes where two joints move."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from geomech.geometry.plane import Plane
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import fields
-from geomech.study.bench import Study
 from geomech.study.cost import Job, frame, harmonics, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
+from geomech.study.study import Study
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored_table
 from geomech.tiers.fitted import finest_grid
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
-MOST_PAIRS = 10  # of joints in a figure: those of five
+MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
 class Space(NamedTuple):
-    """What pictures of shape space are drawn from. beside, planes_beside: the same in another body frame."""
+    """Subject of pictures of shape space. other, other_planes: the study and its planes in another body frame."""
 
     study: Study
-    beside: Study | None = None
+    other: Study | None = None
     planes: tuple[Plane, ...] = ()
-    planes_beside: tuple[Plane, ...] = ()
+    other_planes: tuple[Plane, ...] = ()
 
 
 @dataclass(frozen=True)
 class ShapeSpace(Question):
     """The connection or the CCF of a scene.
 
-    file: with all that a file has, metric and harmonics included; else the CCF alone. field: it is computed on the scene's
-    grid. map: that is drawn. planes: those where two joints move are drawn, of ``pair``, such as "1,3", or of all pairs;
-    held: angles of the other joints, rad, the gait's middle if None. metric: what a change of shape costs, too. gait: the
-    scene's is drawn, and must lie within. beside: another body frame, in which it is drawn, too."""
+    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's
+    grid. map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs;
+    slice_angles: angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape.
+    gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame, drawn beside it."""
 
     scene: Scene
     file: bool = False
@@ -53,10 +53,10 @@ class ShapeSpace(Question):
     map: bool = False
     planes: bool = False
     pair: str | None = None
-    held: tuple[float, ...] | None = None
+    slice_angles: tuple[float, ...] | None = None
     metric: bool = False
     gait: bool = False
-    beside: str | None = None
+    other_frame: str | None = None
 
     worth_saying: ClassVar[float] = 1.0
 
@@ -75,8 +75,8 @@ class ShapeSpace(Question):
 
     @cached_property
     def other(self) -> Study | None:
-        """The study in the other frame."""
-        return None if self.beside is None else self.study.in_frame(self.beside)
+        """Study in the other frame."""
+        return None if self.other_frame is None else self.study.in_frame(self.other_frame)
 
     @property
     def _costed(self) -> bool:
@@ -89,7 +89,7 @@ class ShapeSpace(Question):
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
-        """The pairs of joints of planes, from 0, and the shape through which each goes."""
+        """Pairs of joints of the planes, from 0, and the shape through which each plane goes."""
         if not self.planes:
             return []
         joints = self.scene.system.joints
@@ -99,7 +99,7 @@ class ShapeSpace(Question):
                 f"{joints} joints have {len(pairs)} pairs",
                 instead=f"say which, such as --pair 1,{joints}, or give a chain [body] modes",
             )
-        return [(one, through(self.scene, one, self.held, self.pair is not None)) for one in pairs]
+        return [(one, through(self.scene, one, self.slice_angles, self.pair is not None)) for one in pairs]
 
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
@@ -111,7 +111,7 @@ class ShapeSpace(Question):
                 self.study.refuse_outside()
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
-            if self.beside is not None and len(self._at) > 1:
+            if self.other_frame is not None and len(self._at) > 1:
                 raise Refusal("--beside draws one pair of joints", instead="say which with --pair")
         _ = self.other
 
@@ -133,19 +133,19 @@ class ShapeSpace(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         study, parts = self.study, self._parts()
-        found = [part(lambda done, k=k: progress((k + done) / len(parts))) for k, part in enumerate(parts)]
+        values = [part(lambda done, k=k: progress((k + done) / len(parts))) for k, part in enumerate(parts)]
         count = len(self._at)
-        space = Space(study, self.other, tuple(found[:count]), tuple(found[count : 2 * count]) if self.other else ())
+        space = Space(study, self.other, tuple(values[:count]), tuple(values[count : 2 * count]) if self.other else ())
         if self.file:
-            whole = fields.of_study(study)
-            return Result(whole.kind, whole.variables, whole.attributes, space)
+            file = fields.of_study(study)
+            return Result(file.kind, file.variables, file.attributes, space)
         if not self.field:
             return Result("shape_space", tuple(_of_plane(*x) for x in zip(self._at, space.planes)), {}, space)
         axes = fields.coordinates(study.fitted.axes, shape_labels(self.scene.system))
         return Result("shape_space", (*axes, fields.of_ccf(study.curvature, study.curvature_error)), {}, space)
 
     def _parts(self) -> list[Callable[[Progress], Any]]:
-        """Return what is computed one after the other: planes first."""
+        """Return the parts of the computation, in order: planes first."""
         studies = [self.study, *filter(None, [self.other])]
         parts: list[Callable] = [
             lambda progress, s=s, pair=pair, at=at: s.plane(pair, at, progress=progress)
@@ -169,21 +169,21 @@ def _of_plane(at: tuple[tuple[int, int], np.ndarray], plane: Plane) -> Variable:
 
 
 def _pair(text: str, joints: int) -> tuple[int, int]:
-    """Return joints from 0 of 1,3."""
-    found = text.split(",")
-    if len(found) != 2 or not all(x.strip().isdecimal() for x in found):
+    """Return the joints, counted from 0, of a text such as 1,3."""
+    names = text.split(",")
+    if len(names) != 2 or not all(x.strip().isdecimal() for x in names):
         raise Refusal(f"{text!r} is not two joints such as 1,{joints}", where="--pair")
-    i, j = (int(x) - 1 for x in found)
+    i, j = (int(x) - 1 for x in names)
     if i == j or not all(0 <= k < joints for k in (i, j)):
         raise Refusal(f"{text!r} must be two different joints from 1 to {joints}", where="--pair")
     return i, j
 
 
 def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | None, alone: bool) -> np.ndarray:
-    """Return the shape through which the plane of a pair of joints goes. alone: angles may be those of the joints that it
-    holds."""
-    at, held = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
-    if angles is not None and not held:
+    """Return the shape through which the plane of a pair of joints goes. alone: angles may be those of the fixed joints
+    only."""
+    at, fixed = scene.gait.middle.copy(), [k for k in range(scene.system.joints) if k not in pair]
+    if angles is not None and not fixed:
         raise Refusal("--slice says where other joints are held, and this body has but two", instead="drop it")
     if angles is None:
         return at
@@ -196,42 +196,60 @@ def through(scene: Scene, pair: tuple[int, int], angles: tuple[float, ...] | Non
         )
     if len(angles) == len(at) > 1:
         return np.array(angles)
-    if len(angles) != 1 and not (alone and len(angles) == len(held)):
-        ways = f"{len(held)} one by one, " * (alone and len(held) > 1) + "or "
+    if len(angles) != 1 and not (alone and len(angles) == len(fixed)):
+        choices = f"{len(fixed)} one by one, " * (alone and len(fixed) > 1) + "or "
         raise Refusal(
-            f"--slice takes one angle for all joints that are held, {ways}{len(at)} for a shape", value=len(angles)
+            f"--slice takes one angle for all joints that are held, {choices}{len(at)} for a shape", value=len(angles)
         )
-    at[held] = angles
+    at[fixed] = angles
     return at
 
 
 def ccf(
-    scene: Scene, pair: str | None, held: tuple[float, ...] | None, beside: str | None, metric: bool, stretch: bool
+    scene: Scene,
+    pair: str | None,
+    slice_angles: tuple[float, ...] | None,
+    other_frame: str | None,
+    metric: bool,
+    stretch: bool,
 ) -> ShapeSpace:
-    """Return the question of the CCF's picture. metric, stretch: it takes what a change of shape costs."""
-    sliced = scene.system.joints > 2 or pair is not None or held is not None
+    """Return the question of the CCF's picture. metric, stretch: the picture needs the metric."""
+    sliced = scene.system.joints > 2 or pair is not None or slice_angles is not None
     if sliced and (metric or stretch):
         raise Refusal("--metric and --stretch are those of two joints", instead="drop them for slices")
     if sliced:
-        return ShapeSpace(scene, field=False, planes=True, pair=pair, held=held, beside=beside)
-    return ShapeSpace(scene, map=True, gait=True, metric=metric or stretch, beside=beside)
+        return ShapeSpace(
+            scene, field=False, planes=True, pair=pair, slice_angles=slice_angles, other_frame=other_frame
+        )
+    return ShapeSpace(scene, map=True, gait=True, metric=metric or stretch, other_frame=other_frame)
 
 
 def connection(
-    scene: Scene, matlab: bool, drawn: bool, pair: str | None, held: tuple[float, ...] | None, beside: str | None
+    scene: Scene,
+    matlab: bool,
+    drawn: bool,
+    pair: str | None,
+    slice_angles: tuple[float, ...] | None,
+    other_frame: str | None,
 ) -> ShapeSpace:
     """Return the question of a connection's file, a .mat file if ``matlab``, and of its picture, if it is ``drawn``."""
     if matlab:
         check_two_joints(scene)
-    sliced = drawn and (scene.system.joints > 2 or pair is not None or held is not None)
-    if sliced and beside is not None:
+    sliced = drawn and (scene.system.joints > 2 or pair is not None or slice_angles is not None)
+    if sliced and other_frame is not None:
         raise Refusal("--beside draws maps of two joints", instead="drop it, or see 'geomech ccf --pair'")
-    picture = {"map": drawn and not sliced, "planes": sliced, "pair": pair, "held": held, "beside": beside}
+    picture = {
+        "map": drawn and not sliced,
+        "planes": sliced,
+        "pair": pair,
+        "slice_angles": slice_angles,
+        "other_frame": other_frame,
+    }
     return ShapeSpace(scene, file=not matlab, **picture)
 
 
 def check_two_joints(scene: Scene) -> None:
-    """Refusal for other than the two joints that sysplotter's layout has arrays for."""
+    """Refuse a body without exactly two joints, as in sysplotter's layout of arrays."""
     if (joints := scene.system.joints) != 2:
         why = f"a .mat file has sysplotter's layout, which is of two joints, and this body has {joints}"
         raise Refusal(why, where=scene.name, instead="write a .nc file, which takes any number of joints")

@@ -1,4 +1,4 @@
-"""The body velocity for one shape and its rate of change, with how well it is known."""
+"""The body velocity for one shape and its rate of change, with its residual."""
 
 from __future__ import annotations
 

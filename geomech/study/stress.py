@@ -1,4 +1,4 @@
-"""The stress of the grains on a plate, by a stress map."""
+"""Stress of the grains on a plate, by a stress map."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LARGEST_ANGLE = 1e6  # degrees
 
 @dataclass(frozen=True)
 class Stress(Question):
-    """Stress per unit depth at one tilt and direction, degrees, or, to be drawn, of the whole plane of them."""
+    """Stress per unit depth at one tilt and direction, degrees, or, for a picture, over all of them."""
 
     medium: str
     beta: float | None = None
@@ -37,15 +37,15 @@ class Stress(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         law = load_medium(self.medium)
-        whole = survey(law)
-        told = f"{self.medium} {whole.description()}" + (", which is cut" if law.tension == "cut" else "")
-        facts, angles = {"told": told, "notes": [told] if whole.pushing else []}, None
+        overview = survey(law)
+        description = f"{self.medium} {overview.description()}" + (", which is cut" if law.tension == "cut" else "")
+        facts, angles = {"told": description, "notes": [description] if overview.pushing else []}, None
         if self.beta is None:
-            found = [Variable(name, (), getattr(whole, name), "1") for name in ("pulling", "pushing")]
+            variables = [Variable(name, (), getattr(overview, name), "1") for name in ("pulling", "pushing")]
         else:
             angles = self.beta, self.gamma
             values = [np.round(float(x), 12) + 0.0 for x in law(*map(math.radians, angles))]
             labels = "against the motion's x", "upwards"
             names = "alpha_x", "alpha_z"
-            found = [Variable(*x, "N/cm^3", label) for *x, label in zip(names, ((), ()), values, labels)]
-        return Result("stress", tuple(found), facts, (whole, angles))
+            variables = [Variable(*x, "N/cm^3", label) for *x, label in zip(names, ((), ()), values, labels)]
+        return Result("stress", tuple(variables), facts, (overview, angles))

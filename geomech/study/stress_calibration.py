@@ -17,15 +17,16 @@ from rft.plates.calibrate import COEFFICIENTS, GENERIC, StressFit, ZetaFit, fit_
 from rft.plates.survey import survey
 from rft.refusal import Refusal, located
 
-KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # as files have them: B-11 for Bm11
+KEYS = tuple(name.replace("m", "-") for name in COEFFICIENTS)  # in files: B-11 for Bm11
 MOST_LINES = 60  # of a table of residuals
-SEEN = 3.0  # standard errors from which on a depth of zero that is off is told
+SEEN = 3.0  # standard errors of a wrong zero of depth from which on it is noted
 GIVEN = "give a CSV file with columns depth_m,force_N"
 
 
 @dataclass(frozen=True, eq=False)
 class OfPlates:
-    """Nine coefficients fitted to plate drags. beta_deg, gamma_deg, alpha_x, alpha_z: (N,), as measured. name: of the file."""
+    """Nine coefficients fitted to plate drags. beta_deg, gamma_deg, alpha_x, alpha_z: (N,), as measured. name: of the
+    file."""
 
     fit: StressFit
     beta_deg: np.ndarray
@@ -36,7 +37,7 @@ class OfPlates:
     picture, scene = "plates_figure", "an intruder scene"
 
     def numbers(self) -> dict:
-        """What `geomech calibrate --json` prints; intervals with 95 %, resolution: the share that comes from the data."""
+        """Return the JSON of `geomech calibrate`; intervals with 95 %, resolution: the share that comes from the data."""
         f = self.fit
         by_key = lambda values: dict(zip(KEYS, values.tolist()))
         return {
@@ -66,8 +67,8 @@ class OfPlates:
         return [KEYS[COEFFICIENTS.index(name)] for name in self.fit.undetermined]
 
     def notes(self) -> list[str]:
-        """What one who uses the medium should know."""
-        out, whole = [], survey(self.fit.stress)
+        """Return notes for users of the medium."""
+        out, overview = [], survey(self.fit.stress)
         if self.undetermined:
             beta, gamma = (round(np.degrees(x)) for x in self.fit.least_known())
             lacking = f"{self.name}: these drags do not determine {', '.join(self.undetermined)}"
@@ -75,22 +76,22 @@ class OfPlates:
                 f"{lacking}: what they lack is taken from the shape of the generic set; drag plates at other angles, least is "
                 f"known at beta = {beta}, gamma = {gamma} degrees"
             )
-        if whole.pushing:
-            out.append(f"{self.name}: the fitted map {whole.description()}")
+        if overview.pushing:
+            out.append(f"{self.name}: the fitted map {overview.description()}")
         return out
 
     def toml(self) -> str:
-        """A file for `geomech stress` and the [medium] of intruder scenes."""
+        """Return the text of a file for `geomech stress` and the [medium] of intruder scenes."""
         f = self.fit
         about = f"# Fitted to {json.dumps(self.name)}: {self.beta_deg.size} plate drags, rms residual {self.rms:.3g} N/cm^3.\n"
         lines = ["[medium]  # N/cm^3; within, with 95 %:"]
         for key, value, (low, high), share in zip(KEYS, f.values.tolist(), f.intervals, f.resolution):
-            held = "" if key not in self.undetermined else f"; {100 * (1 - share):.0f} % of it from the generic shape"
-            lines.append(f"{key} = {value!r}  # {low:.4g} to {high:.4g}{held}")
+            note = "" if key not in self.undetermined else f"; {100 * (1 - share):.0f} % of it from the generic shape"
+            lines.append(f"{key} = {value!r}  # {low:.4g} to {high:.4g}{note}")
         return about + "\n".join(lines) + "\n"
 
     def text(self) -> str:
-        """All of it in words and a table of residuals."""
+        """Return the numbers in words, and a table of residuals."""
         f = self.fit
         lines = [
             f"stress map fitted to {self.name}: {self.beta_deg.size} plate drags",
@@ -104,12 +105,12 @@ class OfPlates:
             return "\n".join([*lines, "residuals: with --json"])
         lines.append("    beta   gamma   alpha_x       map   alpha_z       map")
         for row in zip(self.beta_deg, self.gamma_deg, self.alpha_x, self.alpha_z, *f.residuals):
-            b, g, x, z, left_x, left_z = row
-            lines.append(f"{b:8.4g}{g:8.4g}{x:10.4f}{x - left_x:10.4f}{z:10.4f}{z - left_z:10.4f}")
+            b, g, x, z, residual_x, residual_z = row
+            lines.append(f"{b:8.4g}{g:8.4g}{x:10.4f}{x - residual_x:10.4f}{z:10.4f}{z - residual_z:10.4f}")
         return "\n".join(lines)
 
     def curves(self) -> dict:
-        """Numbers of its picture (`plots.plates_figure`)."""
+        """Return the numbers of the picture (`plots.plates_figure`)."""
         f = self.fit
         return {
             "beta_deg": self.beta_deg, "gamma_deg": self.gamma_deg, "residuals": f.residuals, "rms": self.rms, "names": KEYS,
@@ -120,7 +121,8 @@ class OfPlates:
 
 @dataclass(frozen=True, eq=False)
 class OfPenetration:
-    """zeta fitted to a plate that was pushed straight down. area: of the plate, m^2, (1,) or one a row. name: of the file."""
+    """zeta fitted to a plate that was pushed straight down. area: of the plate, m^2, (1,) or one per row. name: of the
+    file."""
 
     fit: ZetaFit
     area: np.ndarray
@@ -128,7 +130,7 @@ class OfPenetration:
     picture, scene = "penetration_figure", "an intruder scene"
 
     def numbers(self) -> dict:
-        """What `geomech calibrate --json` prints; interval with 95 %."""
+        """Return the JSON of `geomech calibrate`; interval with 95 %."""
         f = self.fit
         return {
             "law": "zeta",
@@ -146,11 +148,11 @@ class OfPenetration:
 
     @property
     def rms(self) -> float:
-        """N."""
+        """Root mean square residual, N."""
         return float(np.sqrt(np.mean((self.fit.force - self.fit.law) ** 2)))
 
     def notes(self) -> list[str]:
-        """Whether the depth is counted from elsewhere."""
+        """Return a note where the zero of the depth looks wrong."""
         f = self.fit
         if not (abs(f.zero) > SEEN * f.zero_error and abs(f.zero) > 0.02 * f.depth[-1]):
             return []
@@ -161,7 +163,7 @@ class OfPenetration:
         ]
 
     def toml(self) -> str:
-        """A file for `geomech stress` and the [medium] of intruder scenes."""
+        """Return the text of a file for `geomech stress` and the [medium] of intruder scenes."""
         low, high = self.fit.interval
         about = f"# Fitted to {json.dumps(self.name)}: {self.fit.depth.size} depths, rms residual {self.rms:.3g} N.\n"
         return (
@@ -178,7 +180,7 @@ class OfPenetration:
         )
 
     def curves(self) -> dict:
-        """Numbers of its picture (`plots.penetration_figure`)."""
+        """Return the numbers of the picture (`plots.penetration_figure`)."""
         f = self.fit
         low, high = f.interval / f.zeta
         return {
@@ -192,7 +194,7 @@ class OfPenetration:
 
 
 def of_plates(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfPlates:
-    """The nine coefficients from a CSV file of plate drags. Refusal, one line that names the file, for bad ones."""
+    """Fit the nine coefficients to a CSV file of plate drags. Refusal, with the file's name, for bad data."""
     _refuse(law, sizes, end_caps, ())
     beta, gamma, a_x, a_z = plate_rows("plate drags", source)
     with located(_name(source)):
@@ -200,7 +202,7 @@ def of_plates(law: str, source: str, sizes: Mapping[str, float], end_caps: float
 
 
 def of_penetration(law: str, source: str, sizes: Mapping[str, float], end_caps: float | str) -> OfPenetration:
-    """zeta from a CSV file of a penetration test. sizes: "area", m^2, which overrules the file's. Refusal for bad ones."""
+    """Fit zeta to a CSV file of a penetration test. sizes: "area", m^2, overruling the file's. Refusal for bad data."""
     _refuse(law, sizes, end_caps, ("area",))
     test = penetration.read(read_rows(source, LARGEST_FILE, GIVEN))
     area = np.array([sizes["area"]]) if "area" in sizes else test.area
@@ -214,7 +216,7 @@ def of_penetration(law: str, source: str, sizes: Mapping[str, float], end_caps: 
 
 
 def _refuse(law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ...]) -> None:
-    """Refusal for options that are of a rod."""
+    """Refuse options that belong to a rod."""
     for name in (*sizes, *(["end-caps"] if end_caps else [])):
         if name not in known:
             raise Refusal(f"--{name} belongs to another measurement", instead=f"leave it out for --law {law}")
@@ -225,15 +227,15 @@ def _name(source: str) -> str:
 
 
 def law_of(source: str) -> str:
-    """The law that a file's columns are of: granular for drag on a rod, or what cannot be read."""
+    """Return the law that the columns of a file suit; granular for drag on a rod, and for a file that cannot be read."""
     try:
-        there = read_rows(source, LARGEST_FILE, "").header[1]
+        header = read_rows(source, LARGEST_FILE, "").header[1]
     except ValueError:
         return "granular"
-    begins = lambda *words: any(word.startswith(words) for word in there)
+    begins = lambda *words: any(word.startswith(words) for word in header)
     if begins("psi"):
         return "granular"
     if begins("alpha_", "beta"):
         return "stress-map"
-    found = {named[0] for word in there if (named := penetration.quantity(word))}
-    return "zeta" if begins("depth") or {"depth", "force"} <= found else "granular"
+    quantities = {named[0] for word in header if (named := penetration.quantity(word))}
+    return "zeta" if begins("depth") or {"depth", "force"} <= quantities else "granular"

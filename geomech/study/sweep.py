@@ -1,4 +1,5 @@
-"""Any question to a scene over a grid of the scene's own parameters: points side by side in batches, stored as it goes."""
+"""Sweeps: a question over a grid of the scene's own parameters, in batches of points that are stored one after the
+other."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ from rft.refusal import Refusal, printable
 
 
 class Swept(Extensible, dict):
-    """The result of a sweep as a table that users index: {"over": {parameter: values}, name: array (N_1, ...)}."""
+    """Result of a sweep as a table that users index: {"over": {parameter: values}, name: array (N_1, ...)}."""
 
     def __init__(self, result: Result):
         self.result, self.scene = result, result.subject
@@ -37,32 +38,32 @@ class Swept(Extensible, dict):
 
 
 def as_stored(result: Result) -> Result:
-    """Return the result of a sweep as its file has it."""
+    """Return the result of a sweep as data for a file."""
     return batched(result.subject).as_stored(result)
 
 
 class Batched(Protocol):
-    """A question to many scenes at once: what a sweep is made of.
+    """A question about many scenes at once: the subject of a sweep.
 
-    It knows its scenes and says how they are put side by side; the sweep knows the grid, the order and who computes."""
+    It knows its scenes and how to batch them; the sweep knows the grid, the order and the runner."""
 
     def grid(self, scene: Any, over: Mapping[str, list[float]]) -> Grid:
         """Return the grid of these parameters; Refusal if a point of it makes no scene."""
 
     def cost(self, grid: Grid) -> Cost:
-        """Return what all points take."""
+        """Return the cost of all points."""
 
     def together(self, scene: Any) -> int:
-        """Return how many rows of scenes like this one make a batch."""
+        """Return the number of rows of such scenes in a batch."""
 
-    def rows(self, scenes: list, beside: list[float] | None) -> np.ndarray:
-        """Return the numbers (N, width) of every scene, for each value of the inner parameter or its own one."""
+    def rows(self, scenes: list, inner_values: list[float] | None) -> np.ndarray:
+        """Return the numbers (N, width) of every scene, for each value of the inner parameter or the scene's own."""
 
     def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
-        """Return the answer by rows (N_1, ..., width) as variables, and attributes that hold of all."""
+        """Return the answer from rows (N_1, ..., width) as variables, and attributes of the whole sweep."""
 
     def as_stored(self, result: Result) -> Result:
-        """Return the result of a sweep as its file has it."""
+        """Return the result of a sweep as data for a file."""
 
     def table(self, result: Result) -> dict:
         """Return the result of a sweep as arrays by name."""
@@ -72,74 +73,75 @@ class Batched(Protocol):
 
 
 def batched(scene: Any) -> Batched:
-    """Return what a sweep asks of a scene: how far a gait goes, or how fast a robot walks."""
+    """Return the question of sweeps over a scene: the displacement of a gait, or the speed of a robot."""
     kind, module = ("Walks", "walking") if hasattr(scene, "robot") else ("Cycles", "cycles")
-    return getattr(import_module(f"geomech.study.{module}"), kind)()  # robots take as long to load as all else
+    return getattr(
+        import_module(f"geomech.study.{module}"), kind
+    )()  # loaded only where needed: robots take as long to load as all else
 
 
 @dataclass(frozen=True)
 class Sweep(Question):
-    """A question over a grid: its result is that of the question with the parameters as leading dimensions.
-
-    seconds: of computing that it takes, if known: others then begin sooner."""
+    """A question over a grid. Its result has the parameters as leading dimensions. seconds: of computing, if known, so
+    that other processes start sooner."""
 
     scene: Any
     over: Mapping[str, list[float]]
     seconds: float | None = field(default=None, compare=False)
 
     @cached_property
-    def asked(self) -> Batched:
+    def question(self) -> Batched:
         return batched(self.scene)
 
     @cached_property
     def grid(self) -> Grid:
-        return self.asked.grid(self.scene, listed(self.over))
+        return self.question.grid(self.scene, listed(self.over))
 
     @cached_property
     def _cost(self) -> Cost:
-        return self.asked.cost(self.grid)
+        return self.question.cost(self.grid)
 
     def check(self) -> None:
-        _ = self.grid  # every point makes a scene
+        _ = self.grid  # refuses points that make no scene
 
     def cost(self) -> Cost:
         return self._cost
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        grid, done, found = self.grid, 0, []
+        grid, completed, parts_ = self.grid, 0, []
         seconds = self.seconds if "_cost" not in vars(self) else self._cost.seconds
-        parts = -(-grid.total // self.asked.together(self.scene))
-        for rows in runner().map(answered, (self.asked, grid.at), batches(self.asked, grid), parts, seconds):
-            found.append(rows)
-            done += len(rows)
-            progress(done / grid.total)
+        parts = -(-grid.total // self.question.together(self.scene))
+        for rows in runner().map(answered, (self.question, grid.at), batches(self.question, grid), parts, seconds):
+            parts_.append(rows)
+            completed += len(rows)
+            progress(completed / grid.total)
         names = {name: name.replace(".", "_").replace("-", "_") for name in grid.over}
         axes = [Variable(names[p], (names[p],), np.array(v, float), "", p) for p, v in grid.over.items()]
-        rows = grid.arranged(np.concatenate(found))
-        variables, attributes = self.asked.variables(grid, rows, tuple(names.values()))
+        rows = grid.arranged(np.concatenate(parts_))
+        variables, attributes = self.question.variables(grid, rows, tuple(names.values()))
         return Result("sweep", (*axes, *variables), attributes, self.scene)
 
 
-def batches(asked: Batched, grid: Grid) -> Iterator[tuple]:
-    """Yield what is solved together, in order: (scenes, or their points, values of the inner parameter)."""
-    points, beside = grid.points, grid.beside
-    count, done = len(beside or [0]), 0
-    while done < grid.total:
-        k, j = divmod(done, count)  # points, of which the inner values run fastest
-        most = asked.together(grid.at(points[k]))
-        here = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
-        some = beside[j : j + most] if beside else None
-        batch = [points[i] for i in here]
-        # Files need not be where it is computed.
-        yield [grid.at(p) for p in batch] if grid.scene.files else batch, some
-        done += len(here) * len(some or [0])
+def batches(question: Batched, grid: Grid) -> Iterator[tuple]:
+    """Yield the batches in order: (scenes, or their points, values of the inner parameter)."""
+    points, inner_values = grid.points, grid.inner_values
+    count, completed = len(inner_values or [0]), 0
+    while completed < grid.total:
+        k, j = divmod(completed, count)  # inner values vary fastest
+        most = question.together(grid.at(points[k]))
+        indices = range(k, min(k + max(1, most // count), points.total) if j == 0 else k + 1)
+        values = inner_values[j : j + most] if inner_values else None
+        batch = [points[i] for i in indices]
+        # Workers may lack the files, so they receive scenes.
+        yield [grid.at(p) for p in batch] if grid.scene.files else batch, values
+        completed += len(indices) * len(values or [0])
 
 
 def answered(common: tuple, part: tuple) -> np.ndarray:
     """Return the rows of a batch."""
-    (asked, at), (batch, beside) = common, part
+    (question, at), (batch, inner_values) = common, part
     scenes = [at(p) if isinstance(p, tuple) else p for p in batch]
-    return np.array(asked.rows(scenes, beside), float)
+    return np.array(question.rows(scenes, inner_values), float)
 
 
 def sweep(
@@ -148,13 +150,12 @@ def sweep(
     partial: Path | None = None,
     progress: Callable | None = None,
 ) -> Swept:
-    """Return the displacement of a scene's gait by the direct tier, or the speed of its robot, over a grid of parameters: a
-    table {"over": {parameter: values}, ...} of arrays (N_1, ...) with their "units".
+    """Return the displacement of a scene's gait by the direct tier, or the speed of its robot, over a grid of
+    parameters: a table {"over": {parameter: values}, ...} of arrays (N_1, ...) with their "units".
 
-    Points that differ in the gait or in what effects let differ within a batch (`batched` in rft/effects), and robots, go
-    through the solver together. partial: a file in which what is done is stored, so that the same sweep resumes; it is the
-    caller's to remove, once the results are saved. Who computes: `geomech.run.workers`. Refusal if a point of the grid
-    makes no scene."""
+    Points that differ only in the gait or in batched fields of effects (`batched` in rft/effects), and robots, are
+    solved in batches. partial: a file that stores finished batches, so that the same sweep resumes; the caller removes
+    it after saving the results. Executors: see `geomech.run.workers`. Refusal if a point of the grid makes no scene."""
     question = Sweep(scene, over)
     question.check()
     with _stored_in(partial, scene):
@@ -162,7 +163,7 @@ def sweep(
 
 
 def _stored_in(partial: Path | None, scene: Any) -> contextlib.AbstractContextManager:
-    """Store what is done in a file, if one is given; it stays until the caller removes it."""
+    """Store finished batches in a file, if one is given; it stays until the caller removes it."""
     if partial is None:
         return contextlib.nullcontext()
     if not (isinstance(partial, (str, Path)) and str(partial)):

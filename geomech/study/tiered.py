@@ -1,8 +1,7 @@
-"""The displacement of a gait by every tier, at settings from coarse to fine: what accuracy costs in a scene with a gait.
+"""Accuracy study of a scene with a gait: the displacement by every tier, at settings from coarse to fine.
 
-Errors are distances between net positions in body lengths, rms over a few amplitudes up to the gait's own; the truth is the
-direct tier, far finer.
-"""
+Errors are distances between net positions in body lengths, rms over a few amplitudes up to the gait's own; the truth is
+the direct tier, far finer."""
 
 from __future__ import annotations
 
@@ -16,8 +15,8 @@ from geomech.run.cost import Cost
 from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
-from geomech.study.bench import Study
-from geomech.study.offer import tiers
+from geomech.study.available import tiers
+from geomech.study.study import Study
 from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
@@ -26,19 +25,19 @@ from rft.refusal import Refusal, located
 
 FRACTIONS = np.array([0.4, 0.55, 0.7, 0.85, 1.0])  # of the gait's amplitude
 TRUTH_PHASES = 4096
-TRUTH_STEPS = 1024  # of time stepping, which takes them one by one
+TRUTH_STEPS = 1024  # of time stepping, which is sequential
 FINE_PIECES = 320  # of body, where effects cut it
 FINEST = {"loads": "exact", "regularisation": 1e-9, "directions": 192, "pieces": FINE_PIECES}
 KNOBS = tuple(
     replace(knob, tier=tier.name)
     for tier in sorted(TIERS.values(), key=lambda tier: (tier is not DIRECT, tier.common, -[*TIERS].index(tier.name)))
     for knob in tier.knobs
-)  # of the truth first, then of one gait's family, then of fields
+)  # the direct tier's first, then those of one gait's family, then those of fields
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A gait at fractions of its amplitude. runs: of each setting; of time stepping one, it is long enough to tell."""
+    """A gait at fractions of its amplitude. runs: of each setting; time stepping takes long enough to be timed in one."""
 
     scene: Scene
     runs: int = 2
@@ -56,7 +55,7 @@ class Settings:
         return self.scene.gait.amplitude * FRACTIONS
 
     def check(self) -> None:
-        """Refusal for a gait that does not move, or leaves the field that a knob turns."""
+        """Refuse a gait that does not move, or leaves a field that a knob changes."""
         scene = self.scene
         if np.ptp(scene.gait.cycle(_truth_phases(scene))[0], axis=0).max() == 0:
             raise Refusal("[gait] does not move", where=scene.name, instead="give it a size")
@@ -74,7 +73,7 @@ class Settings:
         return foretold.price(jobs)
 
     def _jobs(self, knob: Knob, value: Any) -> list[foretold.Job]:
-        """Return those of a displacement at a setting."""
+        """Return the jobs of a displacement at a setting."""
         scene = self.at(knob, value)
         plan = _plan(scene, knob.tier)
         if not plan.exact:
@@ -88,7 +87,8 @@ class Settings:
         return [k for k in KNOBS if applies(k, self.scene) and not (k.rule and not is_closed(self.scene.system))]
 
     def at(self, knob: Knob | None, value: Any) -> Scene:
-        """Return the scene at a setting; of a knob at None as far as it goes, without a knob as the truth has it."""
+        """Return the scene at a setting; for a value of None at the limit of the knob, without a knob at the settings
+        of the truth."""
         scene = self.scene
         if knob is None:
             finest = scene.with_numerics(loads="exact", regularisation=1e-9) if is_closed(scene.system) else scene
@@ -97,7 +97,7 @@ class Settings:
         setting = knob.setting or knob.name
         if value is not None:
             return scene.with_numerics(**{setting: f"{knob.rule}:{value}" if knob.rule else value})
-        if setting == "interpolation":  # the fit at the gait's own shapes would cost more than a far finer grid
+        if setting == "interpolation":  # an exact fit at the gait's own shapes would cost more than a far finer grid
             return scene.with_numerics(interpolation=5, grid=4 * scene.numerics.grid - 3)
         return scene.with_numerics(**{setting: FINEST[setting]})
 
@@ -106,11 +106,11 @@ class Settings:
         tier = knob.tier if knob else DIRECT.name
         return [Study(self.at(knob, value)).displacement(tier, None, self.amplitudes)]
 
-    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
-        off = estimate.distance(found[0], truth[0]) / self.scene.system.length
-        return {"error": float(np.sqrt(np.mean(off**2)))}
+    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        distances = estimate.distance(numbers[0], truth[0]) / self.scene.system.length
+        return {"error": float(np.sqrt(np.mean(distances**2)))}
 
-    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
         entry = {
             "label": knob.label,
             "tier": knob.tier,
@@ -122,7 +122,7 @@ class Settings:
 
     @property
     def own_error(self) -> float:
-        """The largest error of the system's own, body lengths, that no setting takes away: those of the cheapest include it."""
+        """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         return float(table_error(self.scene.system, *shapes)[..., 0].max())
 
@@ -132,19 +132,19 @@ class Settings:
     def facts(self) -> dict[str, Any]:
         own = self.own_error
         units = {"error": "BL", "tolerance": "BL", "own_error": "BL", "seconds": "s"}
-        told = {"scene": self.scene.name, "amplitudes": self.amplitudes.tolist(), "units": units}
-        return {**told, **({"own_error": own} if own else {})}
+        facts = {"scene": self.scene.name, "amplitudes": self.amplitudes.tolist(), "units": units}
+        return {**facts, **({"own_error": own} if own else {})}
 
 
 def applies(knob: Knob, scene: Scene) -> bool:
-    """Return whether a knob is one of a scene's."""
+    """Return whether a knob applies to a scene."""
     system, setting = scene.system, knob.setting or knob.name
     if system.traits.linear and setting in ("regularisation", "directions"):
         return False
     if setting == "regularisation" and solver_of(system) is None:
         return False
     of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (stored_table(system, "connection") or system.joints > 2):  # from 7 to 61 points a joint: hours
+    if of_a_field and (stored_table(system, "connection") or system.joints > 2):  # from 7 to 61 points per joint: hours
         return False
     if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
         return False
@@ -152,7 +152,7 @@ def applies(knob: Knob, scene: Scene) -> bool:
 
 
 def _plan(scene: Scene, tier: str) -> Plan:
-    """Return how a tier predicts what a knob of it is swept for."""
+    """Return the plan of a tier for the amplitudes of the study."""
     return TIERS[tier].plan(scene.system, scene.numerics, scene.gait, scene.gait.amplitude * FRACTIONS)
 
 
@@ -161,18 +161,18 @@ def _truth_phases(scene: Scene) -> int:
 
 
 def cheapest(lines: list[dict], tol: float, own: float = 0.0) -> dict[str, Any]:
-    """Return the quickest measured setting whose error against the truth, with the system's own, is at most ``tol``; no tier if
-    there is none."""
-    found = [
+    """Return the quickest measured setting whose error against the truth, with the system's own, is at most ``tol``; no
+    tier if there is none."""
+    choices = [
         (t, line, v, e + own)
         for line in lines
         if line["against"] == "truth"
         for v, e, t in zip(line["value"], line["error"], line["seconds"])
         if e + own <= tol
     ]
-    if not found:
+    if not choices:
         return {"tolerance": float(tol), "tier": None}
-    seconds, line, value, error = min(found, key=lambda f: f[0])
+    seconds, line, value, error = min(choices, key=lambda f: f[0])
     return {
         "tolerance": float(tol),
         "tier": line["tier"],

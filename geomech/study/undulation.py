@@ -1,5 +1,5 @@
-"""Undulatory swimmers: what a wave along the body achieves (paper Sec. III B, Fig. 9), closed cases to check it, and
-which muscles must work for it (Sec. III C, Fig. 10)."""
+"""Undulatory swimmers: performance of a wave along the body (paper Sec. III B, Fig. 9), closed cases as checks, and
+activation of the muscles (Sec. III C, Fig. 10)."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ MIDDLE = (0.1, 0.9)  # share of the body over which speeds of waves are fitted: 
 
 
 def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
-    """Over a cycle of the scene's travelling wave, a `Sine` for amplitudes A / lambda (B,) or a `Wave` of the joint angles of
-    a chain of equal links for amplitudes in rad (B,), each (B,) but the velocity:
+    """Return the performance of the scene's travelling wave over a cycle: a `Sine` for amplitudes A / lambda (B,) or a
+    `Wave` of the joint angles of a chain of equal links for amplitudes in rad (B,). Each entry is (B,) but the
+    velocity:
 
-    progress: net distance, body lengths. efficiency: that over the wavelength. Sec. III B and the caption of Fig. 9(c)
-    define it so and show an optimum near the animal; here it has none, it grows with the amplitude. arc_efficiency:
-    progress over the arc length of a wave, lambda_s, which has one. wavelength: body lengths. relative_curvature: mean
-    |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole body's axial drag x distance), the
-    drag being the plain medium's, without skin or ends. slip: mean angle between body and velocity, rad. velocity:
-    (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per rad. Where the swimmer has a
-    frequency, in the scene's own unit, body lengths or m, besides: distance, net, per cycle; speed, a second;
-    speed_body_lengths, body lengths a second; velocity_per_second: (B, N, 3), unit/s and rad/s.
-    ValueError if the gait is no such wave.
+    progress: net distance, body lengths. efficiency: progress over the wavelength. Sec. III B and the caption of Fig.
+    9(c) define it so and show an optimum near the animal; here it has none, it grows with the amplitude.
+    arc_efficiency: progress over the arc length of a wave, lambda_s, which has one. wavelength: body lengths.
+    relative_curvature: mean |curvature| x lambda_s. cost_of_transport: work against the medium over (the whole body's
+    axial drag x distance), the drag being the plain medium's, without skin or ends. slip: mean angle between body and
+    velocity, rad. velocity: (B, N, 3), body velocity at the scene's N phases, body lengths per rad of phase and rad per
+    rad. Where the swimmer has a frequency, in the scene's own unit, body lengths or m, besides: distance, net, per
+    cycle; speed, per second; speed_body_lengths, body lengths per second; velocity_per_second: (B, N, 3), unit/s and
+    rad/s. Refusal if the gait is no such wave.
 
-    The elements are chords of the wave: 40 of them a wave leave errors of 2 % at A / lambda = 0.2, but above 0.4 enough
-    to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`.
-    """
+    The elements are chords of the wave: 40 elements per wave cause errors of 2 % at A / lambda = 0.2, but above 0.4
+    enough to feign an optimum of efficiency and slip. Use `refined` before believing an `optimum`."""
     gait = _travelling(scene)
     amplitudes = real_array("amplitudes", amplitudes)
     if amplitudes.ndim != 1:
@@ -64,7 +64,7 @@ def performance(scene: Scene, amplitudes) -> dict[str, np.ndarray]:
 
 
 def _travelling(scene: Scene) -> Sine | Wave:
-    """The scene's gait, which has a wavelength."""
+    """Return the scene's gait, which must have a wavelength."""
     gait, body = getattr(scene, "gait", None), getattr(getattr(scene, "system", None), "body", None)
     if not isinstance(gait, Wave):
         return _sine(scene, "performance")
@@ -87,18 +87,18 @@ KINEMATICS = ("sliding", "sideways")
 
 
 def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str = "sliding") -> float:
-    """Efficiency, progress over wavelength, of an endless wave by the balance of force along it alone: no yaw.
+    """Return the efficiency, progress over wavelength, of an endless wave by the balance of force along it alone: no
+    yaw.
 
-    headings: (N,) of pieces of equal arc length over one wave, rad. cap: an `rft.EndCaps` whose ends' drag, averaged over
-    the cycle, joins the balance of a body of these headings. kinematics, of the points of the body in a frame that goes
-    with the swimmer, the wave passing backwards at the mean cosine of the headings:
+    headings: (N,) of pieces of equal arc length over one wave, rad. cap: an `rft.EndCaps` whose ends' drag, averaged
+    over the cycle, joins the balance of a body of these headings. kinematics, of the points of the body in a frame that
+    moves with the swimmer, the wave passing backwards at the mean cosine of the headings:
 
     sliding   an inextensible body that slides along its own curve at speed 1, as in a tube; the animal's, and `Sine`'s
-    sideways  points that move across the way only, at the curve's slope times the speed of the wave: the textbook model
-              of small waves, in which a body of finite waves is stretched and pressed together
+    sideways  points that move across the direction of motion only, at the curve's slope times the speed of the wave: the
+              textbook model of small waves, in which a body of finite waves is stretched and compressed
 
-    ValueError for other kinematics.
-    """
+    Refusal for other kinematics."""
     from scipy.optimize import brentq
 
     if kinematics not in KINEMATICS:
@@ -121,13 +121,12 @@ def endless_efficiency(medium, headings: np.ndarray, cap=None, kinematics: str =
 
 
 def endless_sine(medium, amplitude: float, cap=None, elements: int = 2000, kinematics: str = "sliding") -> float:
-    """`endless_efficiency` of a sine of that A / lambda, of one wave on the body where ends count. Sliding, that is the
-    endless limit of the gait `Sine`.
+    """Return `endless_efficiency` of a sine of this A / lambda, with one wave on the body where ends count. Sliding, it
+    is the endless limit of the gait `Sine`.
 
     Progress over the wavelength has no optimum in either kinematics. Progress over the arc length of a wave, this times
     `Sine.wavelength`, is largest at A / lambda = 0.211 (0.530) in loose glass and 0.243 (0.476) in close; sideways at
-    0.212 (0.515) and 0.245 (0.460).
-    """
+    0.212 (0.515) and 0.245 (0.460)."""
     gait = Sine(amplitude=amplitude, waves=1.0, elements=elements)
     return endless_efficiency(medium, gait.headings(0.0), cap, kinematics)
 
@@ -155,22 +154,21 @@ def refined(scene: Scene, finer: int) -> Scene:
 
 
 def activation(scene: Scene) -> dict[str, np.ndarray | float]:
-    """When the muscles of the right side work, over a cycle of the scene's sine wave of amplitude > 0.
+    """Return when the muscles of the right side work, over a cycle of the scene's sine wave of amplitude > 0.
 
-    The internal moment that holds against the medium is taken for the muscles', and its sign for the side that works:
+    The internal moment against the medium is taken for that of the muscles, and its sign for the side that works:
     negative, the right (paper Sec. III C, Fig. 10; the left works for the other half of the cycle). At the S points
     between elements and the scene's N phases, angles of phase in rad:
 
-    s: (S,), tail 0 to head 1. t: (N,). moment: (N, S), axial drag x length. bend, bend_rate: (N, S), rad and rad per rad
-    of phase, positive to the left. onset, offset: (S,), the moment's falls and rises through zero, interpolated between
-    phases; continuous along the body, at its middle onset lies from 0 to 2 pi and offset after it. nan where the moment
-    changes sign other than twice a cycle, so that there is no one onset. changes: (S,), how often it does.
-    lag: (S,), phase by which the curvature's zeros come after the moment's: positive where activation is ahead of
+    s: (S,), tail 0 to head 1. t: (N,). moment: (N, S), axial drag x length. bend, bend_rate: (N, S), rad and rad per
+    rad of phase, positive to the left. onset, offset: (S,), the moment's falls and rises through zero, interpolated
+    between phases; continuous along the body, at its middle onset lies from 0 to 2 pi and offset after it; nan where
+    the moment changes sign other than twice a cycle, so that onset is not unique. changes: (S,), number of changes of
+    sign. lag: (S,), phase by which the curvature's zeros come after the moment's: positive where activation is ahead of
     bending, pi / 2 where the side that works is the one that shortens, 0 where it is the one that is short.
-    fundamental_lag: (S,), the same between the two waves' first harmonics. speed_ratio, fundamental_speed_ratio: speed of
-    the moment's wave over that of the curvature's, from straight lines through onset and offset, or through the phase of
-    the first harmonic, over the MIDDLE of the body; nan if there is a place without an onset there.
-    """
+    fundamental_lag: (S,), the lag between the two waves' first harmonics. speed_ratio, fundamental_speed_ratio: speed
+    of the moment's wave over that of the curvature's, from straight lines through onset and offset, or through the
+    phase of the first harmonic, over the MIDDLE of the body; nan if there is a place without an onset there."""
     gait = _sine(scene, "activation")
     if gait.amplitude == 0:
         raise Refusal("activation takes a wave of amplitude > 0", because="a straight body at rest needs no muscles")
@@ -178,11 +176,11 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
     moment = scene.system.run(bend, rate, work=True).work.bending_moment
     s = np.arange(1, gait.elements) / gait.elements
     onset, offset, changes = _zeros(moment)
-    right, left, _ = _zeros(bend)
-    onset, right, left = _continuous(onset), _continuous(right), _continuous(left)
+    to_right, to_left, _ = _zeros(bend)
+    onset, to_right, to_left = _continuous(onset), _continuous(to_right), _continuous(to_left)
     offset = onset + _continuous(offset - onset)
     waves = [np.fft.fft(x, axis=0)[1] for x in (moment, bend)]
-    slopes = [_slope(s, x) for x in (onset, offset, right, left)]
+    slopes = [_slope(s, x) for x in (onset, offset, to_right, to_left)]
     harmonics = [_slope(s, np.unwrap(np.angle(x))) for x in waves]
     return {
         "s": s,
@@ -193,7 +191,7 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
         "onset": onset,
         "offset": offset,
         "changes": changes,
-        "lag": (_continuous(right - onset, -np.pi) + _continuous(left - offset, -np.pi)) / 2,
+        "lag": (_continuous(to_right - onset, -np.pi) + _continuous(to_left - offset, -np.pi)) / 2,
         "fundamental_lag": _continuous(np.angle(waves[0] / waves[1]), -np.pi),
         "speed_ratio": (slopes[2] + slopes[3]) / (slopes[0] + slopes[1]),
         "fundamental_speed_ratio": harmonics[1] / harmonics[0],
@@ -201,21 +199,24 @@ def activation(scene: Scene) -> dict[str, np.ndarray | float]:
 
 
 def _zeros(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Phases (rad) at which the columns of x (N, S), equally spaced over a cycle, fall and rise through zero, by straight
-    lines between samples, nan for a column that does so other than once; and the number of sign changes: each (S,)."""
+    """Return the phases (rad) at which the columns of x (N, S), equally spaced over a cycle, fall and rise through
+    zero, and the number of sign changes: each (S,).
+
+    Phases are interpolated linearly between samples; nan for a column that does not fall, or rise, exactly once."""
     after, columns = np.roll(x, -1, 0), np.arange(x.shape[1])
-    found, changes = [], 0
-    for crossed in ((x > 0) & (after <= 0), (x <= 0) & (after > 0)):
-        k, count = crossed.argmax(0), crossed.sum(0)
+    zeros, changes = [], 0
+    for sign_changes in ((x > 0) & (after <= 0), (x <= 0) & (after > 0)):
+        k, count = sign_changes.argmax(0), sign_changes.sum(0)
         before, step = x[k, columns], (x - after)[k, columns]
         share = before / np.where(step == 0, 1.0, step)
-        found.append(np.where(count == 1, (k + share) * 2 * np.pi / len(x), np.nan))
+        zeros.append(np.where(count == 1, (k + share) * 2 * np.pi / len(x), np.nan))
         changes = changes + count
-    return *found, changes
+    return *zeros, changes
 
 
 def _continuous(phase: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """Phases (S,) without jumps of 2 pi along the body, at its middle from ``least`` to ``least`` + 2 pi; nan stays."""
+    """Return phases (S,) without jumps of 2 pi along the body, at its middle from ``least`` to ``least`` + 2 pi; nan
+    stays."""
     out, known = np.array(phase), np.flatnonzero(np.isfinite(phase))
     if len(known):
         out[known] = np.unwrap(out[known])
@@ -225,8 +226,8 @@ def _continuous(phase: np.ndarray, least: float = 0.0) -> np.ndarray:
 
 
 def _slope(s: np.ndarray, phase: np.ndarray) -> float:
-    """Slope of the straight line through phase (S,) over the MIDDLE; nan if some of it is unknown. Taken at places of its
-    own, not the joints, so that it converges with the joints at their own order."""
+    """Return the slope of the straight line through phase (S,) over the MIDDLE; nan if some of it is unknown. The line
+    is fitted at fixed places, not at the joints, so that it converges with the joints at their own order."""
     places = np.linspace(*MIDDLE, 81)
     line = np.interp(places, s, phase)
     return float(np.polyfit(places, line, 1)[0]) if np.isfinite(line).all() else np.nan

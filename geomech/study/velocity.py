@@ -16,7 +16,7 @@ from rft.refusal import located
 
 @dataclass(frozen=True)
 class Velocity(Question):
-    """xi at a shape, with its residual and status."""
+    """Body velocity xi at a shape, with its residual and status."""
 
     scene: Scene
     alpha: tuple[float, ...]
@@ -24,7 +24,7 @@ class Velocity(Question):
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         with located(self.scene.name):
-            found = single(self.scene.system, self.alpha, self.alphadot)
+            solution = single(self.scene.system, self.alpha, self.alphadot)
         unit = length_unit(self.scene.system)
-        xi = Variable("xi", ("component",), np.array(found["xi"]), f"{unit}, {unit}, rad", "per unit time")
-        return Result("velocity", (xi,), {"found": found, "units": {"xi": [unit, unit, "rad"]}}, self.scene)
+        xi = Variable("xi", ("component",), np.array(solution["xi"]), f"{unit}, {unit}, rad", "per unit time")
+        return Result("velocity", (xi,), {"found": solution, "units": {"xi": [unit, unit, "rad"]}}, self.scene)

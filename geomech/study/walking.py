@@ -1,5 +1,5 @@
-"""Questions to scenes of walking robots: how they walk, with the error of the speed, and what a sweep and an accuracy study
-ask of them."""
+"""Questions about scenes of walking robots: a walk with the error of its speed, and the sweeps and accuracy studies of
+walks."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ from rft.walking import Mjcf, Rhex, Roller, Walk, engine
 from rft.walking.stride import MOST_STRIDES
 from rft.walking.stride import NEAR as NEAR
 
-PILOT = 0.05  # s of time steps that tell how long others take
+PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
-TOGETHER = 32  # robots side by side
+TOGETHER = 32  # robots in a batch
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
 PER_STEP = {"numpy": 2.2e-3, "numba": 2e-4}  # s of computing, for a robot by itself,
-MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each beside it, measured
-STEP = 200.0  # balances, of time by NumPy
+MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each further one of a batch, measured
+STEP = 200.0  # balances that take NumPy as long as a time step
 ALONE = 5e-3  # s, in three dimensions,
-OWN = 3e-2  # and of a machine of one's own, whose wheels stick and slip: 5e-3 to 5e-2 measured
+OWN = 3e-2  # and of a custom machine, whose wheels stick and slip: 5e-3 to 5e-2 measured
 HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
-PUSHED = 0.2  # of gravity, by which legs that are much faster than the body speed it up, measured
-IN_VAIN = 40  # cycles that a search for a limit cycle and its errors take where there is none, many at once
-TO_COME = 1.5  # times what twice the elements change: all that more would; up to 1.49 measured, 4/3 of order 2
-WALKING = 0.7  # of the time, before the errors are asked for
+PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
+IN_VAIN = 40  # cycles of a failing search for a limit cycle with its errors, many at once
+TO_COME = 1.5  # error over the change with twice the elements; up to 1.49 measured, 4/3 for order 2
+WALKING = 0.7  # share of the time before the errors are computed
 UNITS = {  # of a walk's table; a positive pitch is nose down
     "t": "s", "x": "m", "z": "m", "pitch": "rad", "v_x": "m/s", "v_z": "m/s", "rate": "rad/s", "work": "J", "loss": "J",
     "energy": "J", "y": "m", "roll": "rad", "yaw": "rad",
 }  # fmt: skip
-LIMIT = 3  # cycles on the way to the limit cycle, and half as many for each of two errors
+LIMIT = 3  # cycles up to the limit cycle, and half as many for each of two errors
 KNOBS = (
     Knob("steps", (12, 16, 24, 32, 48, 64, 96), 2, against="limit"),
     Knob("elements", (6, 8, 12, 16, 24, 32), 2, against="limit"),
@@ -57,14 +57,17 @@ FINEST = {"steps": 256, "elements": 96, "rounding": 6.25e-5}
 
 
 class Walked(NamedTuple):
-    """walk: as rft has it. estimate: error of its speed, m/s: what half or three quarters of the steps change, the larger, for
-    one alone may be small by chance; `TO_COME` times what twice the elements change; what is left to the limit, and what
-    steps that are not solved move. aside, turning: errors of those of the walk, m/s and rad/s, by the changes alone.
-    elements: m/s, what of the estimate comes from twice the elements."""
+    """A walk with the errors of its means.
+
+    walk: as computed by rft. estimate: error of its speed, m/s: the larger of the changes with half and with three
+    quarters of the steps, as one alone may be small by chance; `TO_COME` times the change with twice the elements; the
+    distance from the limit cycle; and the effect of unsolved steps. lateral, turning: errors of the lateral speed, m/s,
+    and of the yaw rate, rad/s, by the changes alone. elements: m/s, the part of the estimate that comes from twice the
+    elements."""
 
     walk: Walk
     estimate: float
-    aside: float = 0.0
+    lateral: float = 0.0
     turning: float = 0.0
     elements: float = 0.0
 
@@ -72,18 +75,18 @@ class Walked(NamedTuple):
 def walked(
     scenes: Sequence[WalkerScene], by: str | None = None, settling: bool = False, progress: Callable | None = None
 ) -> list[Walked]:
-    """Scenes of equal numerics and engines, side by side. settling: a few cycles from rest are enough. progress: told the
-    fraction done."""
+    """Return the walks of scenes with equal numerics and engines, computed in batches. settling: a few cycles from rest
+    suffice. progress: called with the fraction done."""
     numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
-    told = {"progress": lambda done: progress(WALKING * done)} if progress else {}
-    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **told)
+    callback = {"progress": lambda done: progress(WALKING * done)} if progress else {}
+    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
     others = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
     others += [("elements", min(1000, 2 * numerics.elements))]
     changes = []
     for k, (name, other) in enumerate(others):
         finer = dataclasses.replace(numerics, **{name: other})
-        there = how.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
-        changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(there, walks)]))
+        rerun = how.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
+        changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)]))
         if progress:
             progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
     half, most, finer = changes
@@ -93,27 +96,29 @@ def walked(
 
 
 def _means(walk: Walk) -> tuple[float, float, float]:
-    """What is told of a walk with an error."""
+    """Return the means of a walk that have an error: speed, lateral speed, yaw rate."""
     return walk.speed, walk.lateral_speed, walk.yaw_rate
 
 
 def cost_of_transport(scene: WalkerScene, walk: Walk) -> float:
-    """Work of the motors over weight times way, from rest to the end; the way is in the chords of the cycles. inf of one that
-    makes none."""
+    """Return the work of the motors over weight times distance, from rest to the end; the distance is the sum of the
+    chords of the cycles. inf for a robot that does not move."""
     at = np.append(np.arange(0.0, walk.t[-1], 1 / scene.gait.frequency), walk.t[-1])
     y = walk.spatial["y"] if walk.spatial else np.zeros_like(walk.t)
-    way = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
-    return float(walk.work[-1] / (scene.robot.mass * GRAVITY * way)) if way > 0.0 else math.inf
+    path = np.hypot(*(np.diff(np.interp(at, walk.t, x)) for x in (walk.pose[:, 0], y))).sum()
+    return float(walk.work[-1] / (scene.robot.mass * GRAVITY * path)) if path > 0.0 else math.inf
 
 
 def run(
     scene: WalkerScene, by: str | None = None, progress: Callable | None = None, longest: float = math.inf
 ) -> Walked:
-    """One scene. longest: s of computing, after which Refusal where the way from rest is not yet done: how long that takes
-    hangs on whether a cycle repeats itself, which nobody knows before."""
+    """Return the walk of one scene.
+
+    longest: seconds of computing, after which it is refused if the start from rest is not done yet: that time depends
+    on whether a cycle repeats itself, which is not known beforehand."""
     begin = time.process_time()
 
-    def told(done: float) -> None:
+    def report(done: float) -> None:
         if time.process_time() - begin > longest and done < WALKING:
             cure = "lower [numerics] duration, or say --yes"
             raise Refusal(
@@ -123,12 +128,12 @@ def run(
             progress(done)
 
     with located(scene.name):
-        return walked([scene], by, progress=told)[0]
+        return walked([scene], by, progress=report)[0]
 
 
 @dataclass(frozen=True)
 class Walking(Question):
-    """How a robot walks. engine: what computes it, in place of the scene's. longest: s, as of `run`."""
+    """The walk of a robot. engine: in place of the scene's. longest: seconds, see `run`."""
 
     scene: WalkerScene
     engine: str | None = None
@@ -148,26 +153,26 @@ class Walking(Question):
         return of_walk(self.scene, run(self.scene, self.engine, progress, self.longest))
 
 
-def of_walk(scene: WalkerScene, found: Walked) -> Result:
+def of_walk(scene: WalkerScene, run: Walked) -> Result:
     """Return the table of a walk, and its speed, drift and turning with their errors."""
-    w, over = found.walk, ("t",)
+    w, over = run.walk, ("t",)
     more = {name: values for name, values in (w.spatial or {}).items() if values.ndim == 1}
     columns = dict(zip(UNITS, (w.t, *w.pose.T, *w.twist.T, w.work, w.loss, w.energy))) | more
     table = [Variable(name, over, values, UNITS.get(name, "")) for name, values in columns.items()]
     table += [
-        Variable("speed", (), w.speed, "m/s", "mean speed", found.estimate),
-        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", found.aside),
-        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", found.turning),
+        Variable("speed", (), w.speed, "m/s", "mean speed", run.estimate),
+        Variable("aside", (), w.lateral_speed, "m/s", "to the left of its heading", run.lateral),
+        Variable("turning", (), w.yaw_rate, "rad/s", "to the left", run.turning),
     ]
-    return Result("walk", tuple(table), {"name": scene.name}, (scene, found))
+    return Result("walk", tuple(table), {"name": scene.name}, (scene, run))
 
 
 class Steps(Cost):
-    """What walking costs; balances counts the time steps."""
+    """Cost of walking; balances counts the time steps."""
 
     @property
     def as_balances(self) -> float:
-        """A time step takes NumPy as long as some 200 balances."""
+        """Number of balances that take NumPy as long: some 200 for each time step."""
         return STEP * self.balances
 
     def __str__(self) -> str:
@@ -175,87 +180,90 @@ class Steps(Cost):
 
 
 def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
-    """Of ``count`` scenes like this one, from its first time steps. Where these are many times as hard as others, of robots
-    that are so light that they bounce or stick at every step, the search for a limit cycle is taken to be in vain."""
+    """Return the cost of ``count`` scenes like this one, estimated from its first time steps.
+
+    Where these take many times as many evaluations as usual, as for robots so light that they bounce or stick at every
+    step, the search for a limit cycle is assumed to fail."""
     numerics, how = scene.numerics, by or scene.engine
     planar = how == "planar"
     together = TOGETHER if planar else 1
-    own = isinstance(scene.robot, Mjcf)  # which may never come to a limit cycle
+    own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
     with located(scene.name), suiting(STEP * least if planar else 0.0):
         per_step, more = PER_STEP[preferred()], MORE[preferred()]
         usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
-        pace, tries = engine(how).step_cost(scene.walker, numerics, PILOT)
+        step_seconds, tries = engine(how).step_cost(scene.walker, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
-    each = usual if together > 1 and tries <= HARD else max(pace, usual)
+    each = usual if together > 1 and tries <= HARD else max(step_seconds, usual)
     seconds = each * steps * (batches + (count - batches) * more)
     return Steps(round(steps * count), seconds, BASE, seconds)
 
 
 def _speeding_up(scene: WalkerScene) -> float:
-    """Cycles till legs have brought a body to their speed, at a fraction of gravity."""
+    """Return the number of cycles in which legs bring a body to their speed, at a fraction of gravity."""
     if not isinstance(scene.robot, Rhex | Roller):
         return 0.0
-    reach, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
-    return float(2 * np.pi * reach * f**2 / (PUSHED * 9.81))
+    radius, f = np.abs(scene.robot.leg(scene.numerics.elements).points).max(), scene.gait.frequency
+    return float(2 * np.pi * radius * f**2 / (PUSHED * 9.81))
 
 
 @dataclass(frozen=True)
 class Walks:
-    """How fast robots walk, side by side: what a sweep over scenes of robots asks."""
+    """Speed of robots, as a question of sweeps."""
 
     def grid(self, scene: WalkerScene, over: Mapping[str, list[float]]) -> Grid:
-        """Return the grid; Refusal if one of some 200 of its points makes no scene, or one that nothing here computes."""
+        """Return the grid; Refusal if one of some 200 of its points makes no scene, or one that no engine here
+        computes."""
         grid = Grid(scene, over, written.tables(scene))
         last = grid.total - 1
         for k in {*range(0, grid.total, max(1, grid.total // 200)), last}:
-            there = grid.at(grid.points[k])
+            scene_ = grid.at(grid.points[k])
             if k in (0, last):
-                refuse_engine(there)
+                refuse_engine(scene_)
         return grid
 
     def together(self, scene: WalkerScene) -> int:
-        # Engines other than the planar one walk one robot after the other: each tells how far it is.
+        # Other engines walk one robot after the other, which also shows progress.
         return TOGETHER if scene.engine == "planar" else 1
 
-    def rows(self, scenes: list[WalkerScene], beside: None) -> np.ndarray:
+    def rows(self, scenes: list[WalkerScene], inner_values: None) -> np.ndarray:
         """Return speed, its error, status and cycles."""
-        alike = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
-        found = [one for _, some in alike for one in walked(list(some), settling=True)]
-        return np.array([[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in found])
+        groups = itertools.groupby(scenes, key=lambda s: (s.numerics, s.engine))
+        walks = [one for _, group in groups for one in walked(list(group), settling=True)]
+        return np.array([[w.walk.speed, w.estimate, STATUSES.index(w.walk.status), w.walk.cycles] for w in walks])
 
     def cost(self, grid: Grid) -> Steps:
-        some = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
-        return max((price(s, grid.total, settling=True) for s in some), key=lambda c: c.seconds)
+        ends = (grid.at(grid.points[k]) for k in (0, grid.total - 1))
+        return max((price(s, grid.total, settling=True) for s in ends), key=lambda c: c.seconds)
 
     def variables(self, grid: Grid, rows: np.ndarray, dims: tuple[str, ...]) -> tuple[list[Variable], dict]:
         speed, estimate, kinds, cycles = np.moveaxis(rows, -1, 0)
-        found = [
+        variables = [
             Variable("speed", dims, speed, "m/s", "mean speed", estimate),
             Variable("status", dims, np.array(STATUSES)[kinds.astype(int)]),
             Variable("cycles", dims, cycles, "1"),
         ]
         title = f"Mean speed of the walking robot {grid.scene.name}"
-        return found, {"title": title, "scene": written.toml(grid.scene)}
+        return variables, {"title": title, "scene": written.toml(grid.scene)}
 
     def as_stored(self, result: Result) -> Result:
-        """Return a sweep as its file has it: the error as estimate, the status as a number that its label tells."""
+        """Return a sweep as data for a file: the error as estimate, the status as a number explained by its label."""
         speed, status = result["speed"], result["status"]
-        told = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
+        meanings = ", ".join(f"{k}: {name}" for k, name in enumerate(STATUSES))
         index = np.argmax(np.array(STATUSES) == status.values[..., None], -1).astype(float)
-        found = [v for v in result.variables if v.is_coordinate]
-        found += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
-        found += [result["cycles"], Variable("status", speed.dims, index, "1", told)]
-        return dataclasses.replace(result, variables=tuple(found))
+        stored = [v for v in result.variables if v.is_coordinate]
+        stored += [dataclasses.replace(speed, error=None), Variable("estimate", speed.dims, speed.error, "m/s")]
+        stored += [result["cycles"], Variable("status", speed.dims, index, "1", meanings)]
+        return dataclasses.replace(result, variables=tuple(stored))
 
     def table(self, result: Result) -> dict:
         """Return {"speed", "estimate": (N_1, ...), m/s, "status": (N_1, ...), "cycles": (N_1, ...)}."""
-        told = {name: result[name].values for name in ("speed", "status", "cycles")}
-        return {"speed": told["speed"], "estimate": result["speed"].error, **told}
+        arrays = {name: result[name].values for name in ("speed", "status", "cycles")}
+        return {"speed": arrays["speed"], "estimate": result["speed"].error, **arrays}
 
     def summary(self, table: Mapping) -> str:
         worst = np.max(table["estimate"], initial=0.0)
@@ -264,7 +272,7 @@ class Walks:
 
 @dataclass(frozen=True)
 class Settings:
-    """The speed of a robot, m/s, near a walk of its scene, for every knob against one as far refined as `FINEST`."""
+    """The speed of a robot, m/s, near a walk of its scene. For every knob the reference has that knob at `FINEST`."""
 
     scene: WalkerScene
     runs: int = 1
@@ -296,35 +304,35 @@ class Settings:
         """Return the speed with one knob at another value."""
         value = FINEST[knob.name] if value is None else value
         numerics = dataclasses.replace(self.scene.numerics, **{knob.name: value})
-        (found,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
-        return [np.array(found.speed)]
+        (walk,) = engine(self.scene.engine).rerun([self.scene.walker], numerics, [self.near], SETTLING)
+        return [np.array(walk.speed)]
 
-    def errors(self, found: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
-        return {"error": float(abs(found[0] - truth[0]))}
+    def errors(self, numbers: list[np.ndarray], truth: list[np.ndarray]) -> dict[str, float]:
+        return {"error": float(abs(numbers[0] - truth[0]))}
 
-    def told(self, knob: Knob, measure: str) -> dict[str, Any]:
+    def describe(self, knob: Knob, measure: str) -> dict[str, Any]:
         return {"label": knob.name, "order": knob.order}
 
     def cheapest(self, lines: list[dict], tolerance: float) -> dict[str, Any]:
         """Return for each knob the coarsest setting from which on the error is within the tolerance; None if there is none."""
-        found: dict[str, Any] = {"tolerance": tolerance}
+        out: dict[str, Any] = {"tolerance": tolerance}
         for line in lines:
             good = [v for k, v in enumerate(line["value"]) if max(line["error"][k:]) <= tolerance]
-            found[line["label"]] = good[0] if good else None
-        return found
+            out[line["label"]] = good[0] if good else None
+        return out
 
     def facts(self) -> dict[str, Any]:
         return {"scene": self.scene.name, "speed": self.near.speed}
 
 
 def refuse_engine(scene: WalkerScene, by: str | None = None) -> None:
-    """Refusal unless there is such an engine here, and it takes the scene."""
+    """Refuse an engine that is not available, or does not take the scene."""
     with located(scene.name):
         engine(by or scene.engine).refuse(scene.walker)
 
 
 def view(scene: WalkerScene):
-    """What draws a walk of three dimensions (`rft.walking.view.View`)."""
+    """Return the view that draws a walk of three dimensions (`rft.walking.view.View`)."""
     from rft.walking.view import View
 
     return View(scene.walker, scene.numerics)

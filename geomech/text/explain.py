@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
-from geomech.study.offer import tiers
+from geomech.study.available import tiers
 from geomech.systems.premises import listed
 from geomech.text.system import described, engine
 from geomech.tiers import TIERS

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from geomech.core.variables import Result
-from geomech.measured.fit import SHOWN, Fitted
+from geomech.measured.fit import PRINTED_PHASES, Fitted
 from geomech.measured.results import status
 from geomech.scene.write import gait_table
 
@@ -20,7 +20,7 @@ def told(fit: Fitted) -> dict[str, Any]:
     """What `geomech fit --json` prints. Triples are x, y and theta; intervals are (low, high) of each; A, its interval's half
     width and the half width of the data at SHOWN phases of the gait."""
     (net, off), (mean, mean_off) = fit.displacement, fit.mean
-    t = 2 * np.pi * np.arange(SHOWN) / SHOWN
+    t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
     A, error = fit.along(t)
     apart, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
     return {
@@ -61,7 +61,7 @@ def reach(fit: Fitted) -> np.ndarray:
     """Half width, rad, of what the data reach across the gait, in the direction in which that is least, at SHOWN phases."""
     spread = fit.known.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
-    return least[np.arange(SHOWN) * spread.shape[-1] // SHOWN]
+    return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
 
 
 def text(result: Result) -> str:

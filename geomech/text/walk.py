@@ -22,7 +22,7 @@ def numbers(result: Result) -> dict[str, Any]:
     told |= {"residual": w.residual, "unaccounted": w.unaccounted}
     told |= {"settled": w.settling_time if np.isfinite(w.settling_time) else None}
     told |= {"aside": w.lateral_speed, "turning": w.yaw_rate}
-    told |= {"estimate_aside": found.aside, "estimate_turning": found.turning, "estimate_elements": found.elements}
+    told |= {"estimate_aside": found.lateral, "estimate_turning": found.turning, "estimate_elements": found.elements}
     return {"speed": w.speed, "status": w.status, **series, **told}
 
 
@@ -71,7 +71,7 @@ def _turning(found: Walked) -> list[str]:
     if not w.spatial:
         return []
     turning, error = np.degrees([w.yaw_rate, found.turning])
-    aside = f"drifting aside at {w.lateral_speed:.2g} +- {found.aside:.1g} m/s"
+    aside = f"drifting aside at {w.lateral_speed:.2g} +- {found.lateral:.1g} m/s"
     return [f"turning at {turning:.2g} +- {error:.1g} degrees/s, {aside} (positive: to the left of its heading)"]
 
 

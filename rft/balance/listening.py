@@ -1,4 +1,5 @@
-"""Who is told of force balances as they are solved: to count them, to time them, or to stop by what is raised."""
+"""Listeners to the solver: functions called whenever force balances are solved, to count or time them, or to stop by
+raising."""
 
 from __future__ import annotations
 
@@ -17,19 +18,19 @@ _listener: ContextVar[Listener] = ContextVar("listener", default=nobody)
 
 
 def listener() -> Listener:
-    """Return who is told; threads of the solver do not know it by themselves."""
+    """Return the listener; threads of the solver do not inherit it."""
     return _listener.get()
 
 
-def listen(some: Listener) -> None:
-    """Let ``some`` be told from here on, in whatever thread balances are solved; each is told of once."""
-    _listener.set(some)
+def listen(new: Listener) -> None:
+    """Call ``new`` from here on, in whatever thread balances are solved, once for each batch."""
+    _listener.set(new)
 
 
 @contextlib.contextmanager
-def listening(some: Listener) -> Iterator[None]:
-    """Let ``some`` be told in the body of the statement."""
-    token = _listener.set(some)
+def listening(new: Listener) -> Iterator[None]:
+    """Call ``new`` in the body of the statement."""
+    token = _listener.set(new)
     try:
         yield
     finally:

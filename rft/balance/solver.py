@@ -71,7 +71,7 @@ def solve(
 
     problem_at(index): the `Problem` of the samples ``index``. scale: (B,), its scale of speed. backend: as in
     `rft.balance.backend`. guess: (3, B), tried first except where it is nan, or beyond FASTEST."""
-    size, tell, linear = scale.size, listener(), assembly.linear
+    size, report, linear = scale.size, listener(), assembly.linear
     batch = max(1, ELEMENTS_TOGETHER // assembly.n_law_points)
     driver, worth = arrays, 2 * batch  # samples that pay for a thread
     if compiles(backend, assembly.law):
@@ -94,7 +94,7 @@ def solve(
             n_new = problem.n_samples - np.count_nonzero(results[EVALUATIONS, index])
             store(index, driver.solve(problem, _begin(method, linear, limits), limits, first), limits)
             if n_new:
-                tell(n_new, assembly.n_law_points, linear)
+                report(n_new, assembly.n_law_points, linear)
 
     def walk(share) -> None:
         for index in split(share, math.ceil(share.size / batch)):

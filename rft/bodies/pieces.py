@@ -34,6 +34,7 @@ class Pieces(WrappedBody):
 
 
 def subdivide(body: Body, pieces: int) -> Body:
-    """Return the body with at least so many ``pieces`` to its length; itself where its elements are short enough."""
+    """Return the body with at least ``pieces`` elements to its length; the body itself where its elements are short
+    enough."""
     longest = 1 / pieces
     return Pieces(body, longest) if (2 * half_lengths(body) > longest * (1 + 1e-9)).any() else body

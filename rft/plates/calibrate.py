@@ -111,7 +111,7 @@ def fit_stress(beta, gamma, alpha_x, alpha_z) -> StressFit:
     rows = _drags(beta, gamma, alpha_x, alpha_z)
     design, y = _design(*rows[:2]), rows[2:].ravel()
     zeta, misfit = _generic(design, y)
-    _check_slips(rows, misfit)
+    _check_mistakes(rows, misfit)
     check_strength(zeta, "angles in degrees, stresses in N/cm^3 (1e-6 of those in N/m^3)")
     unit = GENERIC / np.linalg.norm(GENERIC)
     prior = (np.eye(len(unit)) - np.outer(unit, unit)) / (SPREAD * zeta)
@@ -184,7 +184,7 @@ def _generic(design, y) -> tuple[float, float]:
     return zeta, float(np.sqrt(np.mean((y - max(zeta, 0.0) * shape) ** 2) / np.mean(y * y)))
 
 
-SLIPS = {
+MISTAKES = {
     "alpha_x and alpha_z are swapped": lambda b, g, x, z: (b, g, z, x),
     "beta and gamma are swapped": lambda b, g, x, z: (g, b, x, z),
     "alpha_x has the other sign: positive is against the motion's x": lambda b, g, x, z: (b, g, -x, z),
@@ -197,14 +197,14 @@ SLIPS = {
 }
 
 
-def _check_slips(rows, misfit: float) -> None:
+def _check_mistakes(rows, misfit: float) -> None:
     """Raise ValueError if the drags are far from the shape that all grains have (Fig. 7), and a slip explains it."""
     if misfit < STRAY:
         return
     misfits = {}
-    for slip, undo in SLIPS.items():
+    for mistake, undo in MISTAKES.items():
         b, g, x, z = undo(*rows)
-        misfits[slip] = _generic(_design(b, g), np.concatenate([x, z]))[1]
+        misfits[mistake] = _generic(_design(b, g), np.concatenate([x, z]))[1]
     best = min(misfits, key=misfits.get)
     require(misfits[best] > misfit / 2, f"these drags are like those of no grains, but would be if {best}")
 

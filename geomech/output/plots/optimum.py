@@ -16,7 +16,7 @@ from geomech.optimise.loops import TOUCHING
 from geomech.output.plots.maps import ccf_map, drawable, shape_space
 from geomech.output.plots.stretched import stretched_map
 from geomech.output.plots.style import axes_of, figure, quantity, styled
-from geomech.study.bench import Study
+from geomech.study.study import Study
 from geomech.systems.base import shape_labels
 
 NEAR_ZERO = 0.15  # of the CCF's largest value inside the loop's box: below it a loop runs along the line of zeros

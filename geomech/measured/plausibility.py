@@ -1,4 +1,4 @@
-"""Slips of a log that its numbers betray: a heading in degrees, positions in mm, times in ms, a left-handed frame."""
+"""Plausibility of a log: a heading in degrees, positions in mm, times in ms, a left-handed frame."""
 
 from __future__ import annotations
 
@@ -17,42 +17,46 @@ TURNS = (
 )
 MOVES = 2.0  # body lengths per rad of the joints, rms, at most: 0.02 to 0.07 in sand and fluid
 SLOWEST = 300.0  # s of a cycle
-HARMONICS = 3  # of the body velocity over the phase, by which hands are told
-MIRRORED = 0.5  # of what is left of the velocity, that is left of its mirror image where the frame is left-handed
+HARMONICS = 3  # of the body velocity over the phase, for the test of handedness
+MIRRORED = 0.5  # residual of the mirror image over that of the velocity in a left-handed frame, at most
 
 
 def note_units(log: Log, joints: Smoothed, pose: Smoothed, period: float, length: float) -> None:
-    """Warn of numbers that would make more sense in another unit. length: of the body, in the unit of x and y."""
+    """Warn of numbers that are likely in another unit. length: of the body, in the unit of x and y."""
     rms = lambda rates: float(np.sqrt((rates**2).sum(-1).mean()))
-    pace, speed, turning = rms(joints.rates), rms(pose.rates[:, :2]) / length, rms(pose.rates[:, 2:])
-    said = []
-    if turning > TURNS * pace:
+    joint_speed, speed, turning = rms(joints.rates), rms(pose.rates[:, :2]) / length, rms(pose.rates[:, 2:])
+    notes = []
+    if turning > TURNS * joint_speed:
         cure = "end the name of its column in _deg if it is in degrees"
-        said.append(f"the heading turns {turning / pace:.3g} times as fast as the joints: {cure}")
-    if speed > MOVES * pace:
+        notes.append(f"the heading turns {turning / joint_speed:.3g} times as fast as the joints: {cure}")
+    if speed > MOVES * joint_speed:
         cure = "give them in body lengths, or in m with --body-length"
-        said.append(f"x and y move by {speed / pace:.3g} body lengths where the joints turn by 1 rad: {cure}")
+        notes.append(f"x and y move by {speed / joint_speed:.3g} body lengths where the joints turn by 1 rad: {cure}")
     if length == 1.0 and log.metres:
-        said.append("x and y are in m by the names of their columns, and are taken for body lengths: say --body-length")
+        notes.append(
+            "x and y are in m by the names of their columns, and are taken for body lengths: say --body-length"
+        )
     if log.seconds and period > SLOWEST:
-        said.append(
+        notes.append(
             f"the joints repeat every {period:.4g}, and t is taken for s: convert it if it is in ms, or counts frames"
         )
-    for line in said:
+    for line in notes:
         warnings.warn(f"{log.name}: {line}", UnitWarning, stacklevel=3)
 
 
 def check_right_handed(log: Log, loop: Loop, phase: np.ndarray, joints: Smoothed, pose: Smoothed, count) -> None:
-    """Refusal for a pose of which the mirror image makes far more sense. In the body's frame the velocity follows from phase
-    and pace; where y or the heading has the other sign, that holds for what is turned by the heading the wrong way."""
+    """Refuse a pose whose mirror image fits much better.
+
+    In the body frame the velocity follows from phase and rate. If y or the heading has the wrong sign, that holds for
+    velocities rotated by the heading in the wrong sense."""
     rows = np.flatnonzero(count >= 0)
     known = regression.columns(
         loop, phase[rows], joints.values[rows], joints.rates[rows], HARMONICS, regression.NOTHING
     )
-    way, turn = pose.rates[rows, 0] + 1j * pose.rates[rows, 1], np.exp(-1j * pose.values[rows, 2])
-    both = np.stack([way * turn, way / turn], -1)
-    left = np.abs(both - known @ np.linalg.lstsq(known.astype(complex), both, rcond=None)[0])
-    plain, mirrored = (left**2).sum(0)
+    velocity, turn = pose.rates[rows, 0] + 1j * pose.rates[rows, 1], np.exp(-1j * pose.values[rows, 2])
+    both = np.stack([velocity * turn, velocity / turn], -1)
+    residual = np.abs(both - known @ np.linalg.lstsq(known.astype(complex), both, rcond=None)[0])
+    plain, mirrored = (residual**2).sum(0)
     if mirrored < MIRRORED * plain:
         raise log.wrong(
             f"x, y and heading do not fit each other, {plain / mirrored:.3g} times worse than mirrored",

@@ -1,4 +1,4 @@
-"""The study of a scene: displacements by every tier. The one thing that remembers what was computed."""
+"""The study of a scene: displacements by every tier, with a store of the tables computed so far."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from geomech.run.progress import progress as shown
 from geomech.scene.frames import framed
 from geomech.scene.model import Scene, frequency_of
 from geomech.study import cost, effort, estimate, tables, uncertainty
-from geomech.study.offer import METHODS as METHODS
-from geomech.study.offer import methods, tiers
+from geomech.study.available import METHODS as METHODS
+from geomech.study.available import methods, tiers
 from geomech.study.results import Displacements
 from geomech.systems.base import refuse_singular, shape_labels
 from geomech.systems.capabilities import gaits_per_batch, stored_table
@@ -39,12 +39,12 @@ from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
-LOOKED_AT = 64, 4096  # amplitudes and phases of a request whose cost is counted; all are where it is computed
+SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks all
 
 
 class Study(Extensible):
-    """A scene and the tables computed for it so far, each stored under its name, the system and all else that it depends
-    on. `turned` gives a study with other numerics that shares them."""
+    """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
+    depends on. `with_numerics` returns a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -52,20 +52,20 @@ class Study(Extensible):
         self.scene, self._tables = scene, {} if tables is None else tables
 
     def __repr__(self) -> str:
-        held = sorted({str(key[0]) for key in self.computed})
-        return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(held) or 'nothing yet'})"
+        names = sorted({str(key[0]) for key in self.computed})
+        return f"Study({self.scene!r}; tiers {', '.join(self.tiers)}; computed: {', '.join(names) or 'nothing yet'})"
 
     @property
     def computed(self) -> tuple:
-        """What tables there are, each (name, system, key), all that it depends on."""
+        """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def turned(self, **numerics) -> Study:
-        """The bench of the scene with some of its [numerics] changed; None keeps a value."""
+    def with_numerics(self, **numerics) -> Study:
+        """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
     def in_frame(self, frame: str) -> Study:
-        """The bench of the scene in another body frame; Refusal for one of no such name, or the scene's own."""
+        """Return the study in another body frame; Refusal for an unknown one, or the scene's own."""
         s = self.scene
         with located(s.name):
             if frame == s.frame:
@@ -78,21 +78,21 @@ class Study(Extensible):
 
     @property
     def lookups(self) -> tuple[str, ...]:
-        """Tiers that approximate the system's velocity, of those that say something of it."""
+        """Tiers that approximate the system's velocity, of those available."""
         s = self.scene
         return tuple(m for m in self.tiers if not TIERS[m].plan(s.system, s.numerics, s.gait, None).exact)
 
     def _stored(self, name: str, key: tuple, build: Callable):
-        """Return (what is built, the seconds that took, whether it was there before)."""
+        """Return the value of build(), the seconds that it took, and whether it was stored before."""
         key = name, self.scene.system, key
-        if not (there := key in self._tables):
-            import scipy.interpolate  # noqa: F401  which every look-up needs: loading it is no part of any
+        if not (exists := key in self._tables):
+            import scipy.interpolate  # noqa: F401  loaded here, so that no look-up is charged for it
 
             self._tables[key] = timed(build)
-        return *self._tables[key], there
+        return *self._tables[key], exists
 
     def _built(self, table: Table, progress: Callable | None = None):
-        """Return what `_stored` does of a table; how far it is, if nobody wants to be told, is shown where it takes long."""
+        """Return what `_stored` returns, for a table. Without ``progress`` a line shows it where it takes long."""
 
         def build():
             if progress:
@@ -106,7 +106,7 @@ class Study(Extensible):
         return fitted.table(self.scene.system, self.scene.numerics)
 
     def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
-        """How a tier predicts displacements of a gait, or of the scene's own; Refusal if it says nothing of the system."""
+        """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
         with located(self.scene.name):
             how = _tier(tier)
             how.refuse(self.scene.system)
@@ -116,31 +116,31 @@ class Study(Extensible):
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)
 
     def table(self, tier: str, gait: Gait | None = None, amplitudes=None, progress: Callable | None = None) -> Any:
-        """What a tier looks up, computed once: a Connection, Harmonics or a Family; None for nothing. Refusal if it says
-        nothing of the system."""
-        return self._looked_up(self.plan(tier, gait, amplitudes), progress)
+        """Return the table of a tier, computed once: a Connection, Harmonics or a Family; None for a tier without one.
+        Refusal if the tier is not available."""
+        return self._table_of(self.plan(tier, gait, amplitudes), progress)
 
-    def _looked_up(self, plan: Plan, progress: Callable | None = None) -> Any:
+    def _table_of(self, plan: Plan, progress: Callable | None = None) -> Any:
         with located(self.scene.name):
             return self._built(plan.table, progress)[0] if plan.table else None
 
     def refuse_connection(self) -> None:
-        """Refusal if the system has no connection."""
+        """Refuse a system without connection."""
         with located(self.scene.name):
             fitted.refuse(self.scene.system)
 
     @property
     def has_connection(self) -> bool:
-        """Whether the system has a connection, and joints so few that a plain study fits it."""
+        """Whether the system has a connection, and few enough joints for a plain study to fit it."""
         return PATH.is_offered(self.scene.system)
 
     def compute_field(self, progress: Callable | None = None) -> None:
-        """Fill `fitted` now, telling ``progress`` the fraction done."""
+        """Compute `fitted` now. progress: called with the fraction done."""
         self._fitted(progress)
 
     @property
     def fitted(self) -> Connection:
-        """The least-squares connection on the scene's grid."""
+        """Least-squares connection on the scene's grid."""
         return self._fitted()
 
     def _fitted(self, progress: Callable | None = None) -> Connection:
@@ -149,14 +149,13 @@ class Study(Extensible):
             return self._built(self._connection(), progress)[0]
 
     def compute_harmonics(self, progress: Callable | None = None) -> Harmonics:
-        """The odd harmonics of the velocity on the scene's grid, telling ``progress`` the fraction done."""
+        """Return the odd harmonics of the velocity on the scene's grid. progress: called with the fraction done."""
         with located(self.scene.name):
             return self._built(harmonic.table(self.scene.system, self.scene.numerics), progress)[0]
 
     @property
     def harmonics(self) -> Harmonics | None:
-        """What of the velocity a plain study knows beyond its linear part; None where it has no such part, or too many
-        joints."""
+        """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
         return self.compute_harmonics() if self.has_harmonics else None
 
     @property
@@ -166,8 +165,8 @@ class Study(Extensible):
         return not system.traits.linear and HARMONIC.is_offered(system)
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
-        """Shape space where two joints move, from 0, and the others are those of a shape, or of the gait's middle: the CCF of
-        that pair, without a field of all joints (`geomech.geometry.plane`)."""
+        """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
+        the CCF of that pair, without a field of all joints (`geomech.geometry.plane`)."""
         s, at = self.scene, self.scene.gait.middle if at is None else at
         with located(s.name):
             build = lambda: fitted.plane(s.system, s.numerics, tuple(pair), at, progress)
@@ -175,12 +174,12 @@ class Study(Extensible):
 
     @property
     def two_form(self) -> TwoForm:
-        """The CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
+        """CCF of all pairs of joints, of any number (`geomech.geometry.two_form`)."""
         return self._stored("two-form", self._connection().key, lambda: two_form(self.fitted))[0]
 
     def compute_metric(self, progress: Callable | None = None) -> Metric | Finsler:
-        """`metric`, telling ``progress`` the fraction done. Where it takes the velocities of the harmonic table, that is
-        made beside it, if it is not there yet."""
+        """Return `metric`. progress: called with the fraction done. Where it needs the velocities of the harmonic
+        table, that table is stored, too."""
         s = self.scene
         with located(s.name):
             key = fitted.key(s.numerics, effort.DEPENDS_ON)
@@ -188,28 +187,30 @@ class Study(Extensible):
 
     def _new_metric(self, progress: Callable | None) -> Metric | Finsler:
         system, n = self.scene.system, self.scene.numerics
-        beside = harmonic.table(system, n)
-        if not effort.shared(system) or (beside.name, system, beside.key) in self._tables:
+        shared = harmonic.table(system, n)
+        if not effort.shared(system) or (shared.name, system, shared.key) in self._tables:
             return effort.table(system, n, progress)
         (harmonics, norm), took = timed(lambda: effort.with_harmonics(system, n, progress))
-        self._tables[beside.name, system, beside.key] = harmonics, took
+        self._tables[shared.name, system, shared.key] = harmonics, took
         return norm
 
     @property
     def metric(self) -> Metric | Finsler:
-        """What a change of shape costs, on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
+        """Cost of changes of shape on the field's grid (`geomech.geometry.metric`): a quadratic form where xi = A
         alphadot, else a norm. Refusal if the system has none."""
         return self.compute_metric()
 
     def effort(self, gait: Gait | None = None, amplitudes=None) -> dict[str, np.ndarray]:
-        """Path length and work of a gait, or the scene's own, with their errors: `geomech.study.effort.effort`."""
+        """Return path length and work of a gait, or the scene's own, with their errors: see
+        `geomech.study.effort.effort`."""
         with located(self.scene.name):
             self.scene.note_turns(self.scene.gait if gait is None else checked_gait(gait), amplitudes)
             return effort.effort(self.scene, gait, amplitudes)
 
     @property
     def even_part(self) -> np.ndarray | None:
-        """What of the velocity is even in alphadot, as skin friction makes it (`connection.even_part`): None if nothing."""
+        """Part of the velocity that is even in alphadot, as with skin friction (`connection.even_part`); None if there
+        is none."""
         system = self.scene.system
         if stored_table(system, "connection"):
             return stored_table(system, "even part")
@@ -218,39 +219,40 @@ class Study(Extensible):
 
     @property
     def curvature(self) -> Field:
-        """The CCF of `fitted`, for joints 1 and 2."""
+        """CCF of `fitted`, for joints 1 and 2."""
         return self._stored("ccf", self._connection().key, lambda: ccf(self.fitted))[0]
 
     @property
     def curvature_error(self) -> Field:
-        """The estimated error of `curvature`."""
+        """Estimated error of `curvature`."""
         return self._stored("error of the ccf", self._connection().key, lambda: ccf_error(self.fitted))[0]
 
     def displacement(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray:
-        """Net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's own."""
+        """Return the net pose per cycle (..., 3) by one tier of TIERS for amplitudes (...,), of a gait or the scene's
+        own."""
         scene, gait = self.scene, self.scene.gait if gait is None else checked_gait(gait)
         with located(scene.name):
             plan = self.plan(method, gait, amplitudes)
             scene.note_turns(gait, amplitudes)
             self._refuse_singular(plan, gait, amplitudes)
-            return plan.predict(self._looked_up(plan), amplitudes)
+            return plan.predict(self._table_of(plan), amplitudes)
 
     def spread(self, method: str, gait: Gait | None = None, amplitudes=None) -> np.ndarray | None:
-        """(B, 2), the system's unit and rad: how far `displacement` depends on a choice of the tier's own, such as a surface
-        that the loop spans; None without one. Part of every estimate."""
+        """Return how far `displacement` depends on an arbitrary choice of the tier, such as a surface spanned by the
+        loop: (B, 2), in the system's unit and rad; None without one. Estimates include it."""
         plan = self.plan(method, gait, amplitudes)
-        return plan.spread(self._looked_up(plan), amplitudes)
+        return plan.spread(self._table_of(plan), amplitudes)
 
     def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
-        """ValueError if the gait, or the scene's own, leaves the field that is looked up. phases: those of the scene."""
+        """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
         system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
-        field, every = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+        field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
         names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
-        shapes = lambda some: inside(field, gait.cycle(phases, some)[0], names)[:, 0]
-        in_groups(shapes, every, gaits_per_batch(system, phases))
+        shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
+        in_groups(shapes, chosen, gaits_per_batch(system, phases))
 
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
-        """ValueError if the gait, or a curve of the family that is looked up, meets a singular shape."""
+        """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
         system, phases = self.scene.system, phases or self.scene.numerics.phases
         if system.traits.singularity is not None:
             a = real_array("amplitudes", gait.amplitude if amplitudes is None else amplitudes)
@@ -261,17 +263,17 @@ class Study(Extensible):
     def study(
         self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, progress=None
     ) -> dict:
-        """A table (`geomech.study.tables.table`) of the net poses by tiers of TIERS, with their errors, and besides
-        {"seconds": {...}, "kept": [...]}.
+        """Return a table (`geomech.study.tables.table`) of the net poses by tiers of TIERS, with their errors, and
+        {"seconds": {...}, "kept": [...]} besides.
 
-        estimate, estimate_heading: errors (`geomech.study.estimate`), in the unit of the poses, and rad.
-        seconds: what building each table took, by its name ("field", "harmonic table" ...), whenever that was, and what each
-        tier took from there, the direct one with its errors; "errors" of the others, where it is not asked for; "medium" of
-        the errors of an uncertain one. kept: the tables that were there before, whose seconds are not of this call.
-        """
-        gait, amplitudes, chosen = self._asked(gait, amplitudes, methods)
-        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # refuses, before the rest
-        seconds, kept = self._build_all(chosen, progress)
+        estimate, estimate_heading: errors (`geomech.study.estimate`), in the unit of the poses, and rad. seconds: time
+        to build each table, by its name ("field", "harmonic table" ...), even if it was built before, and time of each
+        tier from there, of the direct one with its errors; "errors" of the others, without the direct tier; "medium" of
+        the errors of an uncertain one. kept: the tables that were stored before, whose seconds are not part of this
+        call."""
+        gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
+        medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
+        seconds, stored = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
@@ -279,7 +281,7 @@ class Study(Extensible):
         order = [*TIERS]
         for method in sorted(
             chosen, key=lambda m: (not chosen[m].exact, -order.index(m))
-        ):  # others are checked with direct
+        ):  # the direct tier first, as the reference of others
             if chosen[method].exact:
                 direct = lambda: estimate.direct(self.scene, gait, amplitudes, self.scene.numerics.phases)
                 reference, seconds[method] = timed(direct)
@@ -293,33 +295,35 @@ class Study(Extensible):
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        told = {"seconds": seconds, "kept": kept}
-        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **told))
+        facts = {"seconds": seconds, "kept": stored}
+        return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
 
     def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
-        """Build the tables of tiers; return the seconds that each took, whenever that was, and the names of those that were
-        there."""
-        field, seconds, kept = self._connection(), {}, []
+        """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
+        were stored."""
+        field, seconds, stored = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
-        for method in sorted(tables, key=of_field, reverse=True):  # the field is the picture, too
+        for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
             name = "field" if of_field(method) else f"{method} table"
             if name not in seconds:
                 with located(self.scene.name):
-                    _, seconds[name], there = self._built(tables[method], progress)
-                kept += [name] * there
-        return seconds, kept
+                    _, seconds[name], exists = self._built(tables[method], progress)
+                stored += [name] * exists
+        return seconds, stored
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
-        """What `study` would take, and ``more`` jobs: force balances, seconds on this machine and memory; see
+        """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
         `geomech.study.cost`."""
-        gait, amplitudes, plans = self._asked(gait, amplitudes, methods, *LOOKED_AT)
+        gait, amplitudes, plans = self._checked(gait, amplitudes, methods, *SAMPLES)
         with located(self.scene.name):
             return cost.price([*cost.study(self.scene, plans, len(amplitudes), gait), *more])
 
-    def _asked(self, gait, amplitudes, methods, looked_at: int = sys.maxsize, phases: int = sys.maxsize):
-        """(gait, or the scene's own, amplitudes (B,), plans by tier) of a request; Refusal for what makes none, such as a
-        gait that leaves the field at one of so many amplitudes and phases."""
+    def _checked(self, gait, amplitudes, methods, samples: int = sys.maxsize, phases: int = sys.maxsize):
+        """Return the gait, or the scene's own, amplitudes (B,) and plans by tier of a request.
+
+        Refusal for one that makes no sense, such as a gait that leaves the field at one of ``samples`` amplitudes, at so
+        many phases."""
         scene = self.scene
         gait, amplitudes = checked_gait(scene.gait if gait is None else gait), real_array("amplitudes", amplitudes)
         if amplitudes.ndim != 1:
@@ -329,14 +333,16 @@ class Study(Extensible):
         with located(scene.name):
             frequency_of(scene.system, gait)
             scene.note_turns(gait, amplitudes)
-            some = np.sort(amplitudes)[np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), looked_at)).astype(int)]
+            sampled = np.sort(amplitudes)[
+                np.linspace(0, len(amplitudes) - 1, min(len(amplitudes), samples)).astype(int)
+            ]
             phases, chosen = min(scene.numerics.phases, max(phases, 4 * gait.harmonics)), {}
             for tier in [_tier(m) for m in methods]:
                 tier.refuse(scene.system)
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
-                self._refuse_singular(plan, gait, some, phases)
+                self._refuse_singular(plan, gait, sampled, phases)
             if any(plan.table and plan.table.axes for plan in chosen.values()):
-                self.refuse_outside(gait, some, phases)
+                self.refuse_outside(gait, sampled, phases)
         return gait, amplitudes, chosen
 
 
@@ -345,7 +351,7 @@ def _tier(name: str) -> Tier:
 
 
 def timed(f: Callable) -> tuple[Any, float]:
-    """(value, seconds)."""
+    """Return (value, seconds)."""
     start = time.perf_counter()
     value = f()
     return value, time.perf_counter() - start

@@ -1,4 +1,4 @@
-"""How far from the mean gait the data of a log reach."""
+"""Extent of the data of a log about its mean gait."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import numpy as np
 from geomech.geometry.tube import Loop
 from geomech.measured.regression import Samples
 
-REACH = 2.5  # standard deviations of the samples about the mean gait
-PLACES = 64  # phases at which their spread is told
+DEVIATIONS = 2.5  # standard deviations of the samples about the mean gait
+PLACES = 64  # phases of the spread
 WIDTH = 0.3  # rad of phase, over which it is averaged
-LEAST = 0.02  # of the gait's size: as far from it A is that of the gait, where its cycles do not vary
+LEAST = 0.02  # of the gait's size: range of A at the gait where cycles do not vary
 
 
 def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> np.ndarray:
-    """(d, d, P) of `tube.TaylorSeries`: at phases, REACH^2 times the covariance of deviations, without their noise; or the
-    square of ``within``, rad, in all directions. Along the gait, where nothing deviates, it is the mean of what it is
-    across."""
+    """Return the spread (d, d, P) of `tube.TaylorSeries`: DEVIATIONS^2 times the covariance of deviations without noise, by
+    phase; or the square of ``within``, rad, in all directions.
+
+    Along the gait, where nothing deviates, it is the mean of the spread across it."""
     d = samples.alpha.shape[1]
     least = LEAST * np.sqrt((loop.coefficients[:, 1:] ** 2).sum() / 2)
     if within is not None or not varied:
@@ -24,12 +25,12 @@ def spread(loop: Loop, samples: Samples, within: float | None, varied: bool) -> 
     (one, _), (other, _) = samples.halves
     theta, normal = loop.shape(samples.phase), loop.normals(samples.phase)
     one, other = (np.einsum("nik,ni->nk", normal, x - theta) for x in (one, other))
-    found = []
+    matrices = []
     for t in 2 * np.pi * np.arange(PLACES) / PLACES:
         weight = np.exp((np.cos(samples.phase - t) - 1) / WIDTH**2)
         square = np.einsum("n,ni,nj->ij", weight / weight.sum(), one, other)
         sizes, axes = np.linalg.eigh((square + square.T) / 2)
-        sizes = np.maximum(REACH**2 * sizes, least**2)
+        sizes = np.maximum(DEVIATIONS**2 * sizes, least**2)
         N = loop.normals(np.array(t)) @ axes
-        found.append((N * sizes) @ N.T + sizes.mean() * (np.eye(d) - N @ N.T))
-    return np.moveaxis(np.array(found), 0, -1)
+        matrices.append((N * sizes) @ N.T + sizes.mean() * (np.eye(d) - N @ N.T))
+    return np.moveaxis(np.array(matrices), 0, -1)

@@ -1,4 +1,4 @@
-"""Which tiers a system allows."""
+"""The tiers that a system allows."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ METHODS = TIERS  # cheapest look-up first
 
 
 def tiers(system: System) -> tuple[str, ...]:
-    """All that say something of this system."""
+    """Return the names of all tiers that can predict displacements of the system."""
     return tuple(name for name, tier in TIERS.items() if tier.is_offered(system))
 
 
 def methods(system: System) -> tuple[str, ...]:
-    """Those of a plain study: without tables that serve one family of gaits only."""
+    """Return the names of the tiers of a plain study: without those whose tables serve one family of gaits only."""
     return tuple(name for name in tiers(system) if TIERS[name].common)

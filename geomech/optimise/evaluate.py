@@ -1,4 +1,4 @@
-"""What a gait brings and costs, by the direct tier, with its error."""
+"""Evaluation of a gait by the direct tier, with an estimate of the error."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from geomech.gaits import Gait
 from geomech.optimise import loops as series
-from geomech.optimise.cycles import Brought, brought
-from geomech.optimise.optimum import Told
+from geomech.optimise.cycles import CycleValues, cycle_values
+from geomech.optimise.optimum import Evaluation
 from geomech.optimise.request import Request
 from geomech.study import estimate
 from geomech.systems.capabilities import OwnMetric, capability
 
 
-def told(r: Request, gait: Gait) -> Told:
-    """A gait at its own amplitude."""
+def evaluate_gait(r: Request, gait: Gait) -> Evaluation:
+    """Return the evaluation of a gait at its own amplitude."""
     system, aim = r.scene.system, r.aim
     phases = max(r.phases, 4 * gait.harmonics)
     (net,), (errors,) = estimate.direct(r.scene, gait, np.array([gait.amplitude]), phases)
@@ -22,7 +22,7 @@ def told(r: Request, gait: Gait) -> Told:
     degree = r.degree if r.power else 1.0
     run = system.run(alpha, alphadot, r.power is not None)
     P = _power(r, run, alpha, alphadot)
-    b = _without_slopes(net, *brought(run, P, degree)[1:])
+    b = _without_slopes(net, *cycle_values(run, P, degree)[1:])
     period, limits = 1.0, []
     if aim.timed:
         period, limits = aim.time(np.abs(gait.cycle(series.DENSE)[1]).max(), b.power and b.power[0], degree)
@@ -35,16 +35,18 @@ def told(r: Request, gait: Gait) -> Told:
     if aim.timed:
         error = error / (2 * np.pi * (period or 1.0))
     work = 2 * np.pi * b.power[0] if b.power and capability(system, OwnMetric) is None else None
-    return Told(gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits))
+    return Evaluation(
+        gait, float(value), float(error), float(errors[1]), net, length, work, float(period), tuple(limits)
+    )
 
 
 def _power(r: Request, run, alpha, alphadot) -> np.ndarray | None:
-    """(N,) of a gait that was run, body drag x body length / time; None where nothing tells it."""
+    """Return the power (N,) of a gait that was run, in body drag x body length / time; None where it is not known."""
     if run.work is not None:
         return np.maximum(run.work.power / r.system.length, 0.0)
     return None if r.power is None else np.maximum(r.power(alpha, alphadot, run.xi), 0.0)
 
 
-def _without_slopes(*numbers) -> Brought:
+def _without_slopes(*numbers) -> CycleValues:
     flat = lambda x: None if x is None else (x if np.ndim(x) else float(x), np.zeros((*np.shape(x), 1)))
-    return Brought(*map(flat, numbers))
+    return CycleValues(*map(flat, numbers))

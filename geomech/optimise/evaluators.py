@@ -1,4 +1,4 @@
-"""What gives the cycles of a search: the balance of forces, or tables of what it gave on a grid."""
+"""Evaluators of cycles: the balance of forces, or tables of its results on a grid."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ import numpy as np
 from geomech.geometry import metric
 from geomech.optimise.cycles import Phases, Runs
 from geomech.optimise.request import Request
-from geomech.study.bench import Study
+from geomech.study.study import Study
 
 
 def direct(r: Request, phases: int | None = None) -> Phases | Runs:
-    """Cycles by the direct tier, at the phases of the loops or at others."""
+    """Return cycles by the direct tier, at the phases of the loops or at others."""
     degree = r.degree if r.aim.costs else 1.0
     loops = r.loops if phases is None else dataclasses.replace(r.loops, phases=phases)
-    if r.whole:
+    if r.by_runs:
         return Runs(loops, r.system.run, r.aim.costs, degree, r.system.length)
     velocity = _inside(r.system.velocity, r.loops.box) if r.stored else r.system.velocity
     return Phases(loops, velocity, r.power if r.aim.costs else None, degree)
 
 
-def looked_up(r: Request) -> tuple:
-    """(harmonics of the velocity, and the norm of what moving costs if that is asked for), on a grid."""
-    study = Study(r.scene.changed(system=r.system)).turned(extent=r.extent)
-    found = study.compute_harmonics()
+def build_tables(r: Request) -> tuple:
+    """Return the harmonics of the velocity on a grid, and the norm of the cost of moving; None if the aim has no cost."""
+    study = Study(r.scene.changed(system=r.system)).with_numerics(extent=r.extent)
+    harmonics = study.compute_harmonics()
     if not r.aim.costs:
-        return found, None
+        return harmonics, None
     run = lambda alpha, alphadot: r.power(alpha, alphadot, r.system.velocity(alpha, alphadot)) ** (1 / r.degree)
-    return found, metric.fit_norm(run, found.axes)
+    return harmonics, metric.fit_norm(run, harmonics.axes)
 
 
-def table(r: Request, harmonics, norm) -> Phases:
-    """Cycles by what is `looked_up`."""
+def from_tables(r: Request, harmonics, norm) -> Phases:
+    """Return cycles by interpolation in the tables of `build_tables`."""
     power, box = None, (-r.extent, r.extent)
     if norm is not None:
         cost = _inside(norm.norm, box)
@@ -43,5 +43,5 @@ def table(r: Request, harmonics, norm) -> Phases:
 
 
 def _inside(look_up: Callable, box) -> Callable:
-    """A look-up that takes shapes beyond its field for those at its edge."""
+    """Return a look-up that moves shapes outside its field to the edge of the field."""
     return lambda alpha, alphadot: look_up(np.clip(alpha, *box), alphadot)
