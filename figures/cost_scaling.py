@@ -1,4 +1,4 @@
-"""What a balance of forces costs: microseconds a sample against the size of a batch, by both back ends, on one core and on
+"""The cost of a balance of forces: microseconds a sample against the size of a batch, by both back ends, on one core and on
 all, beside the usual loop of SciPy's; and time against links, directions and phases, with fitted exponents."""
 
 from __future__ import annotations
@@ -84,8 +84,12 @@ def batches(scale: int) -> dict:
             velocity = solver(how, threads)
             velocity(*random_samples(3, 2))  # loads what is loaded once
             series[f"{NAMES[how]}, {cores}"] = [quickest(lambda n=n: velocity(*random_samples(3, n))) for n in sizes]
-    some = list(zip(*random_samples(3, 40 // scale + 1)))
-    return {"x": sizes, "seconds": series, "loop": quickest(lambda: [one_scipy_solve(*s) for s in some]) / len(some)}
+    samples = list(zip(*random_samples(3, 40 // scale + 1)))
+    return {
+        "x": sizes,
+        "seconds": series,
+        "loop": quickest(lambda: [one_scipy_solve(*s) for s in samples]) / len(samples),
+    }
 
 
 def compute(scale: int = 1) -> dict:
@@ -126,8 +130,8 @@ def draw(numbers: dict):
             ax.set_ylim(top=1e7 * loop)
         else:
             ax.set(xlabel=axis, ylabel="seconds", title=f"exponent {found['exponent']:.2f}")
-        shown = x[:: 1 if len(x) < 5 else 2]
-        style.named_ticks(ax, shown, [f"{v:,.0f}" for v in shown])
+        ticks = x[:: 1 if len(x) < 5 else 2]
+        style.named_ticks(ax, ticks, [f"{v:,.0f}" for v in ticks])
         style.grid(ax)
     axes[0, 0].legend(loc="center right", bbox_to_anchor=(1.0, 0.56))
     return fig

@@ -1,7 +1,7 @@
-"""What effects cost: time of one cycle of the sandfish with effects switched on one at a time, over that with none.
+"""The cost of effects: time of one cycle of the sandfish with effects switched on one at a time, over that with none.
 
 All from one run, seven amplitudes side by side. Effects that remember, or that give the body mass, take the phases one
-after the other and the cycle several times over until it repeats: that is what the engine costs, not the effect.
+after the other and the cycle several times over until it repeats: that is the cost of the engine, not of the effect.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ def compute(phases: int = 64, repeats: int = 5, cycles: int | None = None) -> di
     fish = load("sandfish-loose").with_numerics(cycles=cycles)
     scenes = {name: fish.changed(effects=effects) for name, effects in SETS.items()}
     amplitudes, seconds, runs = np.linspace(0.1, 0.4, 7), {name: [] for name in SETS}, {}
-    for again in range(repeats + 1):  # the first round warms up
+    for repeat in range(repeats + 1):  # the first round warms up
         for name, scene in scenes.items():
-            if again != 1 and rft.effects.engine(scene.system.effects) != "algebraic":
+            if repeat != 1 and rft.effects.engine(scene.system.effects) != "algebraic":
                 continue  # long enough for one timing to tell, and nothing to warm up that the others have not
             start = time.perf_counter()
             runs[name] = scene.cycle(amplitudes=amplitudes, phases=phases)
-            if again:
+            if repeat:
                 seconds[name].append(time.perf_counter() - start)
-    plain = np.array(seconds["none"])
+    without = np.array(seconds["none"])
     return {
         name: {
-            "ratio": float(np.median(np.array(taken) / plain[: len(taken)])),
+            "ratio": float(np.median(np.array(taken) / without[: len(taken)])),
             "engine": rft.effects.engine(scenes[name].system.effects),
             "cycles": runs[name].cycles,
         }

@@ -10,7 +10,7 @@ import numpy as np
 
 from figures import main, style
 from geomech.output import plots
-from geomech.study.calibration import of_drag
+from geomech.study.calibration import Calibration
 from rft import CATALOGUE, Viscous
 
 
@@ -23,7 +23,7 @@ def compute(angles: int = 181) -> dict:
         "viscous": Viscous(2.0),
     }
     curves = {name: np.array(law.traction(np.cos(psi), np.sin(psi))) for name, law in laws.items()}
-    fit = of_drag("granular", "dem-rod-drag", {}, 0.0).fit
+    fit = Calibration("dem-rod-drag", "granular").ask().subject
     bed = {"psi": fit.data.psi, "parallel": fit.data.forces[0], "perpendicular": fit.data.forces[1]}
     values = dict(zip(fit.names, fit.values.tolist()))
     return {"psi": psi, **curves, "bed": bed, "fit": {**values, "axial_N": fit.axial_force, "rms_N": fit.rms}}
@@ -50,7 +50,7 @@ def draw(numbers: dict):
     ax.plot(np.degrees(bed["psi"]), bed["parallel"] / scale, "o", mfc="white", **dots)
     ax.set(xlabel="attack angle $\\psi$ (degrees)", ylabel="drag / axial drag", xlim=(-2, 92), ylim=(0, None))
     ax.set_xticks(range(0, 91, 15))
-    style.legend_beside(ax, title="solid, filled: across\ndashed, open: along")
+    style.legend_right(ax, title="solid, filled: across\ndashed, open: along")
     return fig
 
 

@@ -62,7 +62,7 @@ def draw(numbers: dict):
         ax.set(xlabel="depth |z| of the plate's middle (cm)", ylabel=rf"{stress} $\sigma_{name}$ (kPa)")
         ax.set(xlim=(0, depth[-1]))
     axes[0, 0].text(1e2 * numbers["under"] + 0.1, axes[0, 0].get_ylim()[1], "all plates under", va="top", **style.NOTE)
-    style.legend_beside(axes[0, 1], title="tilt, direction (degrees)")
+    style.legend_right(axes[0, 1], title="tilt, direction (degrees)")
     return fig
 
 

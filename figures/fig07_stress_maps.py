@@ -15,7 +15,7 @@ from geomech.output import plots
 from rft.plates import VERTICAL, survey
 from rft.plates.stress import COEFFICIENTS
 
-OWN = {"poppy-seeds-loose": "poppy seeds, loose", "poppy-seeds-close": "poppy seeds, close"}
+SCALED = {"poppy-seeds-loose": "poppy seeds, loose", "poppy-seeds-close": "poppy seeds, close"}
 
 
 def compute(cells: int = 180) -> dict:
@@ -26,13 +26,13 @@ def compute(cells: int = 180) -> dict:
     """
     values = lambda name: np.array([getattr(VERTICAL[name].stress, c) for c in COEFFICIENTS])
     generic, media = values("generic"), {}
-    for name in OWN:
+    for name in SCALED:
         zeta = VERTICAL[f"{name}-scaled"].stress.zeta
         scaled = values(name) / zeta
-        off = float(np.sqrt(np.mean((scaled - generic) ** 2) / np.mean(generic**2)))
-        media[name] = {"zeta": zeta, "coefficients": scaled, "off": off}
-    whole = survey(VERTICAL["generic"].stress, cells)
-    return {"names": COEFFICIENTS, "generic": generic, "media": media, "survey": whole}
+        difference = float(np.sqrt(np.mean((scaled - generic) ** 2) / np.mean(generic**2)))
+        media[name] = {"zeta": zeta, "coefficients": scaled, "off": difference}
+    generic_map = survey(VERTICAL["generic"].stress, cells)
+    return {"names": COEFFICIENTS, "generic": generic, "media": media, "survey": generic_map}
 
 
 @plots.styled
@@ -87,7 +87,7 @@ def draw_coefficients(ax, numbers: dict) -> None:
     style.zero_line(ax)
     ax.plot(at, numbers["generic"], color=style.BLACK, lw=1.5, marker="*", ms=8, label="generic, $M_0$")
     for (name, medium), colour, mark in zip(numbers["media"].items(), (style.LOOSE, style.CLOSE), "os"):
-        label = rf"{OWN[name]}, $\zeta$ = {medium['zeta']:.3f}"
+        label = rf"{SCALED[name]}, $\zeta$ = {medium['zeta']:.3f}"
         ax.plot(at, medium["coefficients"], mark, color=colour, mfc="none", ms=5, label=label)
     labels = [f"${c[0]}_{{{c[1:].replace('m', '-')}}}$" for c in numbers["names"]]
     ax.set(ylabel=r"coefficient / $\zeta$ (N/cm$^3$)", xticks=at, xticklabels=labels, ylim=(-0.16, 0.62))

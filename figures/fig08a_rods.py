@@ -44,19 +44,19 @@ def compute(medium: str = "glass-3mm", elements: int = 400, depths: int = 61) ->
     elements. "pulled": beta from which on the grains pull. "depth": (D,) of the axis, m. "rods": by name and tension
     {"drag", "lift": (D,), N, "ratio": lift over drag deep down}. "measured": sign by name, 0 where it is not known.
     """
-    keep = VERTICAL[medium].stress
+    stress = VERTICAL[medium].stress
     beta = np.linspace(0.0, np.pi, 361)
-    normal, tangent = on_face(keep, beta)
-    here = parts(RODS["round"][0].outline(48), (0, -1, 0), LEVEL)
-    leads = (here.depth > 0).ravel()
-    around = np.mod(np.arctan2(here.n[0].ravel(), -here.n[1].ravel())[leads], np.pi)
-    a_x, a_z = (a.ravel()[leads] for a in keep.alpha(here.n, here.v))
+    normal, tangent = on_face(stress, beta)
+    faces = parts(RODS["round"][0].outline(48), (0, -1, 0), LEVEL)
+    leads = (faces.depth > 0).ravel()
+    around = np.mod(np.arctan2(faces.n[0].ravel(), -faces.n[1].ravel())[leads], np.pi)
+    a_x, a_z = (a.ravel()[leads] for a in stress.alpha(faces.n, faces.v))
     sin, cos = np.sin(around), np.cos(around)
     cylinder = {"beta": around, "normal": cos * a_z + sin * a_x, "tangent": sin * a_z - cos * a_x}
     return {
         "beta": beta, "normal": normal, "tangent": tangent, "cylinder": cylinder,
         "pulled": float(beta[(normal < 0) & (beta > np.pi / 2)].min()), "depth": np.linspace(RADIUS, DEEPEST, depths),
-        "rods": {name: {tension: rod_forces(replace(keep, tension=tension), rod.outline(elements), depths)
+        "rods": {name: {tension: rod_forces(replace(stress, tension=tension), rod.outline(elements), depths)
                         for tension in ("keep", "cut")} for name, (rod, _) in RODS.items()},
         "measured": {name: {"up": 1, "down": -1, None: 0}[sign] for name, (_, sign) in RODS.items()},
     }  # fmt: skip
@@ -131,8 +131,8 @@ def draw_ratios(ax, numbers: dict) -> None:
         ax.plot(k, rod["cut"]["ratio"], "o", ms=9, mfc="none", color=COLOURS[name])
         if sign := numbers["measured"][name]:
             ax.annotate("", (k + 0.3, 0.3 * sign), (k + 0.3, 0.0), arrowprops=arrow)
-            way, side = ("up", "bottom") if sign > 0 else ("down", "top")
-            ax.text(k + 0.3, 0.34 * sign, f"measured:\n{way}", fontsize=7, ha="center", va=side)
+            direction, side = ("up", "bottom") if sign > 0 else ("down", "top")
+            ax.text(k + 0.3, 0.34 * sign, f"measured:\n{direction}", fontsize=7, ha="center", va=side)
     style.entry(ax, "map as it is", ls="", marker="o", ms=5)
     style.entry(ax, "tension cut", ls="", marker="o", ms=9, mfc="none")
     style.zero_line(ax)

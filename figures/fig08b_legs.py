@@ -91,8 +91,8 @@ def draw(numbers: dict):
         for name, leg in numbers["legs"].items():
             angle, (colour, marker) = np.degrees(leg["angle"]), LOOKS[name]
             ax.plot(angle, leg["force"][:, :, k].T, ":", color=colour, lw=0.8)
-            own = leg["force"][numbers["own"], :, k]
-            ax.plot(angle, own, color=colour, lw=1.4, marker=marker, ms=4, markevery=[own.argmax()])
+            reference = leg["force"][numbers["own"], :, k]
+            ax.plot(angle, reference, color=colour, lw=1.4, marker=marker, ms=4, markevery=[reference.argmax()])
         style.zero_line(ax)
         ax.axvline(0.0, **style.GUIDE)
         ax.set(xlabel=r"angle $\theta$ (degrees), 0: straight down", ylabel=label, xlim=(-135, 135))

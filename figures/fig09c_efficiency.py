@@ -100,11 +100,11 @@ def draw_measure(ax, numbers: dict, key: str, against: str):
     place = Sine().relative_curvature if against == "relative_curvature" else np.asarray
     for name, found in numbers.items():
         x, colour = found[against], COLOURS[name]
-        shown = np.degrees if key == "slip" else np.asarray
-        ax.plot(x, shown(found[key]), color=colour, label=name.replace("-", " "))
+        convert = np.degrees if key == "slip" else np.asarray
+        ax.plot(x, convert(found[key]), color=colour, label=name.replace("-", " "))
         if key in found["best"]:
             a, top = found["best"][key]
-            ax.plot(place(a), shown(top), "o", color=colour, ms=5)
+            ax.plot(place(a), convert(top), "o", color=colour, ms=5)
         unit = {"efficiency": 1.0, "arc_efficiency": Sine().wavelength(found["amplitude"])}.get(key)
         for endless, (_, _, dashes, _) in ENDLESS.items():
             if unit is not None and endless in found:

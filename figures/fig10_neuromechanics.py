@@ -31,7 +31,7 @@ from geomech.study import undulation
 from rft import Backbone
 
 WAVES = np.linspace(0.5, 1.8, 27)
-SHOWN = (0.5, 0.75, 1.0, 1.25, 1.5, 1.8)  # of the lags and the table
+SELECTED = (0.5, 0.75, 1.0, 1.25, 1.5, 1.8)  # of the lags and the table
 PLACE = 0.3  # of the trace in time: 70 % of the way from head to tail
 PLACES = (0.25, 0.5, 0.75)  # of the table
 
@@ -51,15 +51,15 @@ def compute(waves=WAVES, elements: int = 100, phases: int = 128) -> dict:
         return undulation.activation(fish.changed(body=Backbone(elements), effects=effects, gait=gait))
 
     keys = {"lag": "lag", "speed": "speed_ratio", "fundamental_speed": "fundamental_speed_ratio"}
-    plain, head = ([run(w, effects) for w in waves] for effects in ((), fish.system.effects))
-    plain, head = ({k: np.array([r[old] for r in runs]) for k, old in keys.items()} for runs in (plain, head))
+    headless, head = ([run(w, effects) for w in waves] for effects in ((), fish.system.effects))
+    headless, head = ({k: np.array([r[old] for r in runs]) for k, old in keys.items()} for runs in (headless, head))
     one = run(1.0)
-    return {"waves": np.array(waves), "s": one["s"], **plain, "one": one, "head": head}
+    return {"waves": np.array(waves), "s": one["s"], **headless, "one": one, "head": head}
 
 
-def shown(numbers: dict) -> list[int]:
-    """Return the rows of the waves in SHOWN."""
-    return [k for k, w in enumerate(numbers["waves"]) if np.isclose(w, SHOWN).any()]
+def selected(numbers: dict) -> list[int]:
+    """Return the rows of the waves in SELECTED."""
+    return [k for k, w in enumerate(numbers["waves"]) if np.isclose(w, SELECTED).any()]
 
 
 def table(numbers: dict) -> str:
@@ -67,7 +67,7 @@ def table(numbers: dict) -> str:
     heads = "waves", "speed ratio: lines", "harmonic", "lines, head drag", *(f"ahead at s = {s} (rad)" for s in PLACES)
     columns = numbers["waves"], numbers["speed"], numbers["fundamental_speed"], numbers["head"]["speed"]
     lags = np.array([np.interp(PLACES, numbers["s"], lag) for lag in numbers["lag"]])
-    rows = np.column_stack([*columns, lags])[shown(numbers)]
+    rows = np.column_stack([*columns, lags])[selected(numbers)]
     return style.table(heads, [[f"{x:.2f}" for x in row] for row in rows])
 
 
@@ -118,7 +118,7 @@ def draw_trace(ax, one: dict):
 
 
 def draw_lag(ax, numbers: dict):
-    rows = shown(numbers)
+    rows = selected(numbers)
     for k, colour in zip(rows, style.shades(len(rows))):
         ax.plot(numbers["s"], numbers["lag"][k], color=colour, label=f"{numbers['waves'][k]:g}")
     ax.axhline(np.pi / 2, **style.GUIDE)

@@ -34,8 +34,8 @@ def compute(curvatures=CURVATURES, frequencies=FREQUENCIES, rates=RATES, air=AIR
 def draw(numbers: dict):
     fig, axes = plots.figure(10.4, 3.1, 3)
     walk, (ax, legs, flow) = numbers["walk"].walk, axes[0]
-    shown = walk.t <= 3.0
-    ax.plot(walk.t[shown], walk.twist[shown, 0], color=style.BLACK, lw=0.9)
+    early = walk.t <= 3.0
+    ax.plot(walk.t[early], walk.twist[early, 0], color=style.BLACK, lw=0.9)
     ax.axhline(walk.speed, color=style.VERMILION, ls="--", lw=1.0)
     ax.set(xlabel="$t$ (s)", ylabel="forward speed (m/s)", xlim=(0, 3), title="(b) Xplorer, 2 Hz; dashed: mean")
     for ax, name, unit, scale in ((legs, "legs", "Hz", 1.0), (flow, "flow", "rad/s", 2 * np.pi)):

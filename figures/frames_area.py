@@ -1,9 +1,9 @@
-"""What the choice of body frame does to the area tier in loose glass: mean, middle-link and minimum-perturbation frame against
-the force balance.
+"""The effect of the body frame on the area tier in loose glass: mean, middle-link and minimum-perturbation frame against the
+force balance.
 
 Above: net distance per cycle, by the area under the CCF in each frame and by the force balance, which is the same in all.
 Below: how far the area tier is from the force balance in its own frame, and, dotted, the path tier, which integrates the same
-fitted connection along the gait: no frame takes away what that leaves.
+fitted connection along the gait: no frame removes its error.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What effects do to the force on the c-leg of Fig. 8(b) in loose poppy seeds.
+"""The effects of grains and ground on the force on the c-leg of Fig. 8(b) in loose poppy seeds.
 
-Left: what the inertia of grains adds, rms over the turn, over the rms force without it, against the rate of turning, for
+Left: the force that the inertia of grains adds, rms over the turn, over the rms force without it, against the rate, for
 lambda of 1 to 4; it is seen above some 230 rpm (dashed). Middle: peak lift over that in still, level ground against air
 speed over that of fluidisation, and against slope over the angle of repose, where the leg sweeps down the slope and where it
 sweeps up. Right: lift against angle with an earlier intrusion before the leg.
@@ -28,10 +28,10 @@ def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0,
     falling (N,): peaks of the lift over that without, on ground that rises or falls ahead of the robot by shares of
     REPOSE. angle (T,), rad; lift {place: (T,)}, N."""
     leg = load("c-leg")
-    plain = leg.run()
-    size = np.sqrt((plain.force**2).sum(-1).mean())
-    added = np.array([[_added(leg, plain, k, rpm) for rpm in rates] for k in strengths]) / size
-    peak = lambda effect: leg.changed(effects=(effect,)).run().force[:, 1].max() / plain.force[:, 1].max()
+    without = leg.run()
+    size = np.sqrt((without.force**2).sum(-1).mean())
+    added = np.array([[_added(leg, without, k, rpm) for rpm in rates] for k in strengths]) / size
+    peak = lambda effect: leg.changed(effects=(effect,)).run().force[:, 1].max() / without.force[:, 1].max()
     ground = lambda x: DisturbedGround(places=(x,), radius=0.02, weakening=0.5)
     return {
         "rates": np.array(rates),
@@ -42,16 +42,16 @@ def compute(rates=(30, 60, 115, 230, 460), strengths=(1.0, 2.0, 4.0), shares=(0,
         "aerated": np.array([peak(Aeration(x * 0.03, 0.03)) for x in shares]),
         "rising": np.array([peak(Slope(x * REPOSE)) for x in shares]),
         "falling": np.array([peak(Slope(-x * REPOSE)) for x in shares]),
-        "angle": plain.pose[:, 2],
-        "lift": {None: plain.force[:, 1]} | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
+        "angle": without.pose[:, 2],
+        "lift": {None: without.force[:, 1]} | {x: leg.changed(effects=(ground(x),)).run().force[:, 1] for x in PLACES},
     }
 
 
-def _added(leg, plain, strength: float, rpm: float) -> float:
+def _added(leg, without, strength: float, rpm: float) -> float:
     """Return the rms over the turn of the force that the inertia of grains adds, N."""
     fast = dataclasses.replace(leg.motion, rate=rpm * 2 * np.pi / 60)
     found = leg.changed(motion=fast, effects=(GrainInertia(strength),)).run()
-    return np.sqrt(((found.force - plain.force) ** 2).sum(-1).mean())
+    return np.sqrt(((found.force - without.force) ** 2).sum(-1).mean())
 
 
 def table(numbers: dict) -> str:

@@ -1,4 +1,4 @@
-"""Where kinks keep the linear connection and its odd harmonics from the truth: maps over shape space.
+"""The errors of the linear connection and of its odd harmonics near kinks of the velocity: maps over shape space.
 
 Left: the fraction of directions of alphadot for which some link stands still. Middle and right: the residual of the turning
 rate, rms over directions, by the first harmonic (the connection) and by all odd harmonics up to the 15th.

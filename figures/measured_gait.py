@@ -21,9 +21,9 @@ JOINTS = ("alpha_1", "alpha_2")
 
 
 def compute(scene: str = "three-link-viscous", cycles: int = 60, seed: int = 1) -> Fitted:
-    """Return what the log says of the gait."""
-    made = synthetic.made(load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed)
-    return fit_log(Log("log.csv", made.t, made.alpha, made.pose, JOINTS, np.arange(len(made.t)) + 2))
+    """Return the fit of a synthetic log."""
+    log = synthetic.made(load(scene).system.velocity, GAIT, cycles, spread=0.05, noise=1e-3, seed=seed)
+    return fit_log(Log("log.csv", log.t, log.alpha, log.pose, JOINTS, np.arange(len(log.t)) + 2))
 
 
 def draw(numbers: Fitted):
@@ -31,7 +31,7 @@ def draw(numbers: Fitted):
 
 
 def table(numbers: Fitted) -> str:
-    """Return displacements and what the connection explains."""
+    """Return displacements and the share of the velocity that the connection explains."""
     return measured.described(numbers)
 
 

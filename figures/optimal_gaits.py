@@ -18,8 +18,8 @@ import numpy as np
 
 from figures import main, style
 from geomech.optimise import optimise
+from geomech.optimise.gain import PHASES, gained_ccf
 from geomech.output import plots
-from geomech.output.plots.optimum import PHASES, along
 from geomech.scene import load
 
 SCENES = {"viscous fluid, ratio 2": "three-link-viscous", "loose 0.3 mm glass": "three-link-glass"}
@@ -32,7 +32,7 @@ def compute(harmonics: int = 5, starts: int | None = None, **numerics) -> dict:
     for medium, name in SCENES.items():
         scene = load(name).with_numerics(**numerics)
         out[medium] = {aim: optimise(scene, aim, harmonics=harmonics, starts=starts) for aim in AIMS}
-        out[medium]["ccf"] = along(out[medium]["displacement"])
+        out[medium]["ccf"] = gained_ccf(out[medium]["displacement"])
     return out
 
 

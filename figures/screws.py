@@ -45,8 +45,8 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
     for (pair, mass), turns in PATHS.items():
         robot = dataclasses.replace(scene.robot, pair=pair, mass=mass)
         one = walk(robot)
-        some = one.t * scene.gait.frequency <= turns + 1e-9
-        paths[pair, mass] = turns / scene.gait.frequency, one.pose[some, 0], one.spatial["y"][some], going(robot)
+        within = one.t * scene.gait.frequency <= turns + 1e-9
+        paths[pair, mass] = turns / scene.gait.frequency, one.pose[within, 0], one.spatial["y"][within], going(robot)
     return {
         "slip": slip, "pulled": pulled, "pitch": np.array(pitches), "advance": advance, "tried": np.array(tried),
         "found": found, "paths": paths,
@@ -56,8 +56,8 @@ def compute(slips: int = 49, pitches=PITCHES, tried=(0.03, 0.06, 0.12), fineness
 def table(numbers: dict) -> str:
     """Return what MuJoCo finds beside the balance."""
     lines, by_balance = [], np.interp(numbers["tried"], numbers["pitch"], numbers["advance"][1.0])
-    for p, found, wanted in zip(numbers["tried"], numbers["found"], by_balance):
-        lines.append(f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {wanted:.4g} by the balance")
+    for p, found, expected in zip(numbers["tried"], numbers["found"], by_balance):
+        lines.append(f"pitch {p:g} m: advance {found:.4g} m a turn by MuJoCo, {expected:.4g} by the balance")
     for (pair, mass), (time, x, y, steady) in numbers["paths"].items():
         lines.append(
             f"{pair}, {mass:g} kg, {time:g} s: to ({x[-1]:.4g}, {y[-1]:.4g}) m; {steady.velocity} m/s by balance"
@@ -88,8 +88,8 @@ def draw(numbers: dict):
     shades = style.shades(len(numbers["paths"]))
     for ((pair, mass), (time, x, y, steady)), colour in zip(numbers["paths"].items(), shades):
         path.plot(1e2 * x, 1e2 * y, color=colour, label=f"{pair}, {mass:g} kg, {time:g} s")
-        way = se2.exp(np.linspace(0.0, time, 200)[:, None] * [*steady.velocity, steady.yaw_rate])
-        path.plot(1e2 * way[:, 0], 1e2 * way[:, 1], "--", lw=0.8, color=colour)
+        arc = se2.exp(np.linspace(0.0, time, 200)[:, None] * [*steady.velocity, steady.yaw_rate])
+        path.plot(1e2 * arc[:, 0], 1e2 * arc[:, 1], "--", lw=0.8, color=colour)
     style.entry(path, "by balance", ls="--", lw=0.8)
     path.set(xlabel="$x$ (cm)", ylabel="$y$ (cm), to the left", aspect="equal")
     path.legend(loc="lower right")

@@ -48,7 +48,7 @@ def quarter_ticks(ax, which: str, count: int = 5) -> None:
 
 
 def phase_axis(ax, which: str = "x", label: str = "phase of the cycle (rad)") -> None:
-    """Make an axis, "x" or "y", that of the phase, over one cycle."""
+    """Set an axis, "x" or "y", to the phase over one cycle."""
     quarter_ticks(ax, which)
     ax.set(**{f"{which}lim": (0, 2 * np.pi), f"{which}label": label})
 
@@ -80,7 +80,7 @@ def legend_above(ax, columns: int = 1, **more) -> None:
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **more)
 
 
-def legend_beside(ax, **more) -> None:
+def legend_right(ax, **more) -> None:
     """Draw the legend to the right of the axes."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **more)
 

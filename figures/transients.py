@@ -1,4 +1,4 @@
-"""What the transient response of the ground costs a sandfish (paper Sec. IV A).
+"""The loss of a sandfish by the transient response of the ground (paper Sec. IV A).
 
 Resistive force theory takes the drag for steady at once. After a reversal the grains need some travel, about a fifth of
 the amplitude of an oscillating rod, and discrete-element simulation finds speeds up to 30 % lower. Left: net displacement

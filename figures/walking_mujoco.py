@@ -1,6 +1,6 @@
-"""The engine of three dimensions: its step-size study, and its speeds beside those of the planar engine. Needs MuJoCo.
+"""The engine of three dimensions: its step-size study, and its speeds against those of the planar engine. Needs MuJoCo.
 
-Xplorer's way in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
+Xplorer's progress in a stride of its limit cycle at 2 Hz by implicit steps (`rft.walking.multibody`), and by MuJoCo's own, with
 the grains' forces held as they are at the start of each: these are of order 1, and go astray below some 200 steps a cycle.
 """
 
@@ -17,7 +17,7 @@ from rft.walking import Tripod, Walker, engine
 
 STEPS = {"implicit": (12, 16, 24, 32, 48, 64, 96, 128), "held": (128, 256, 512, 1024, 2048, 4096)}
 FINEST, FREQUENCY = 768, 2.0
-SETTLED = 6  # strides, at most, to the limit cycle
+MOST_STRIDES = 6  # strides, at most, to the limit cycle
 HEAVY = 1e-4  # kg m^2, of a leg about its hip, where its forces are held: without, none of these steps stays finite
 FREQUENCIES = {"Xplorer": (1.0, 2.0, 3.0, 4.0), "SandBot": tuple(np.array([2.0, 4.0, 6.0, 8.0]) / (2 * np.pi))}
 
@@ -31,8 +31,8 @@ def _simulation(steps: int):
     return Simulation(walker, dataclasses.replace(scene.numerics, steps=steps))
 
 
-def way(start, steps: int, how: str) -> float:
-    """Return the way in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
+def stride_length(start, steps: int, how: str) -> float:
+    """Return the progress in one stride from a state, m. how: "implicit", or "held" for MuJoCo's own steps."""
     import mujoco
 
     body, h = _simulation(steps).body, 1 / (FREQUENCY * steps)
@@ -57,17 +57,17 @@ def way(start, steps: int, how: str) -> float:
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
     """Return {"steps": {how: (steps, error of the way over it)}, "speeds": {robot: (frequencies, planar, MuJoCo)}}, Hz, m/s."""
-    start = _simulation(64).walk(SETTLED).limit
-    truth = way(start, finest, "implicit")
-    study = {how: (n, np.array([abs(way(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
+    start = _simulation(64).walk(MOST_STRIDES).limit
+    truth = stride_length(start, finest, "implicit")
+    study = {how: (n, np.array([abs(stride_length(start, k, how) / truth - 1) for k in n])) for how, n in steps.items()}
     speeds = {}
-    for name, some in frequencies.items():
+    for name, chosen in frequencies.items():
         scene = load(name.lower())
         walkers = [
-            dataclasses.replace(scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))) for f in some
+            dataclasses.replace(scene.walker, gait=dataclasses.replace(scene.gait, frequency=float(f))) for f in chosen
         ]
         each = (engine(how).walk(walkers, scene.numerics, 3) for how in ("planar", "mujoco"))
-        speeds[name] = (some, *(np.array([w.speed for w in walks]) for walks in each))
+        speeds[name] = (chosen, *(np.array([w.speed for w in walks]) for walks in each))
     return {"steps": study, "speeds": speeds}
 
 

@@ -1,4 +1,4 @@
-"""What the speeds of walking robots hang on: every size that the paper does not give, one at a time, times 0.7 and
+"""The sensitivity of the speeds of walking robots: every size that the paper does not give, one at a time, times 0.7 and
 1.4, and two choices of the model: whether grains pull on faces, as their map has it, and whether the belly is a closed box,
 whose bottom and front feel grains where they lead, or an open sheet, its bottom alone, which feels them on either side.
 
@@ -75,9 +75,9 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
         },
     }
     out: dict = {}
-    for robot, some in curves.items():
-        jobs = [(curve, name, f) for curve in some for name in names for f in CHOICES.get(name, factors)]
-        scenes = [varied(some[curve], name, f) for curve, name, f in jobs]
+    for robot, scenes_of in curves.items():
+        jobs = [(curve, name, f) for curve in scenes_of for name in names for f in CHOICES.get(name, factors)]
+        scenes = [varied(scenes_of[curve], name, f) for curve, name, f in jobs]
         found = [w for k in range(0, len(scenes), 32) for w in walking.walked(scenes[k : k + 32], settling=True)]
         for (curve, name, f), one in zip(jobs, found):
             row = (f, one.walk.speed, one.estimate, one.walk.status)
@@ -87,17 +87,19 @@ def compute(factors=FACTORS, names=NAMES) -> dict:
 
 def table(numbers: dict) -> str:
     """Return by how many per cent each assumption moves each speed: the smaller size and the larger, or the other choice."""
-    curves = [found for some in numbers.values() for found in some.values()]
+    curves = [found for by_curve in numbers.values() for found in by_curve.values()]
     rows = [
-        "| assumed | " + " | ".join(f"{robot}: {curve}" for robot, some in numbers.items() for curve in some) + " |"
+        "| assumed | "
+        + " | ".join(f"{robot}: {curve}" for robot, by_curve in numbers.items() for curve in by_curve)
+        + " |"
     ]
     rows.append("|---|" + "---|" * len(curves))
     for name in curves[0]:
         cells = []
         for found in curves:
             as_is = CHOICES.get(name, (1.0,))[0]
-            (own,) = [speed for value, speed, *_ in found[name] if value == as_is]
-            others = [speed / own - 1 for value, speed, *_ in found[name] if value != as_is]
+            (unchanged,) = [speed for value, speed, *_ in found[name] if value == as_is]
+            others = [speed / unchanged - 1 for value, speed, *_ in found[name] if value != as_is]
             cells.append(", ".join(f"{100 * x:+.0f}" for x in others))
         rows.append(f"| {NAMES[name]} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
@@ -105,13 +107,13 @@ def table(numbers: dict) -> str:
 
 @plots.styled
 def draw(numbers: dict):
-    some = next(iter(next(iter(numbers.values())).values()))
-    fig, axes = plots.figure(1.2 * len(some), 4.8, len(some), len(numbers))
+    sizes = next(iter(next(iter(numbers.values())).values()))
+    fig, axes = plots.figure(1.2 * len(sizes), 4.8, len(sizes), len(numbers))
     for row, (robot, curves) in zip(axes, numbers.items()):
-        for ax, name in zip(row, some):
+        for ax, name in zip(row, sizes):
             for curve, colour, marker, dashes in zip(curves, style.SEQUENCE, style.MARKERS, ("-", "--", ":")):
                 f, speed, error, status = zip(*curves[curve][name])
-                f = (1.0, 2.0) if name in CHOICES else f  # one place beside the other
+                f = (1.0, 2.0) if name in CHOICES else f  # side by side
                 ax.errorbar(f, speed, yerr=error, color=colour, ls=dashes, lw=1.0, capsize=2, label=curve)
                 for x, y, kind in zip(f, speed, status):
                     ax.plot(x, y, marker, ms=4, color=colour, mfc=colour if kind == "walking" else "white")
@@ -124,7 +126,7 @@ def draw(numbers: dict):
         for ax in row[1:]:
             ax.tick_params(labelleft=False)
         row[0].set_ylabel(f"{robot}: speed (m/s)")
-        style.legend_beside(row[-1])
+        style.legend_right(row[-1])
     fig.supxlabel("times the size that is assumed; open: not walking", fontsize=9)
     return fig
 

@@ -1,7 +1,7 @@
-"""The step-size study of the planar engine: Xplorer's way from rest at 1 and 3 Hz by implicit and by explicit steps.
+"""The step-size study of the planar engine: Xplorer's progress from rest at 1 and 3 Hz by implicit and by explicit steps.
 
 The law of stress jumps at rest like dry friction and is rounded at a named speed. Explicit steps (Heun's, of order 2 as well)
-chatter across the jump until they resolve the rounding; implicit ones do not care. Below, what is left of the balance of
+chatter across the jump until they resolve the rounding; implicit ones need not. Below, the residual of the balance of
 energy: work of the motors - loss in the ground - change of the body's energy.
 """
 
@@ -37,8 +37,8 @@ def heun(robots, state: State, phase: float, of: float, dt: float) -> State:
     return State(*(x + dt * (y + z) / 2 for x, y, z in zip(state, first, second)))
 
 
-def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
-    """Return the progress, m, and what the balance of energy leaves of the work, after some cycles from rest."""
+def progress(frequency: float, steps: int, how: str, cycles: float = 1.5):
+    """Return the progress, m, and the residual of the balance of energy over the work, after some cycles from rest."""
     scene = load("xplorer")
     robots = _strides([Walker(scene.robot, Tripod(frequency), scene.medium)], scene.numerics).robots
     state = first = robots.start()
@@ -51,17 +51,17 @@ def way(frequency: float, steps: int, how: str, cycles: float = 1.5):
             state = heun(robots, state, phase, phase + 0.5 / steps, dt)
         if not np.isfinite(state.pose).all() or np.abs(state.pose[0, :2]).max() > 10.0:
             return np.inf, np.inf
-    left = state.work - state.loss - robots.energy(state) + robots.energy(first)
-    return state.pose[0, 0], abs(left[0] / state.work[0])
+    residual = state.work - state.loss - robots.energy(state) + robots.energy(first)
+    return state.pose[0, 0], abs(residual[0] / state.work[0])
 
 
 def compute(steps=STEPS, finest: int = FINEST, frequencies=FREQUENCIES) -> dict:
-    """Return {frequency: {how: (steps, error of the progress over it, what is left of the energy's balance)}}."""
+    """Return {frequency: {how: (steps, error of the progress over it, residual of the energy's balance)}}."""
     out = {}
     for f in frequencies:
-        truth = way(f, finest, "implicit")[0]
-        out[f] = {how: (n, *np.array([way(f, k, how) for k in n]).T) for how, n in steps.items()}
-        out[f] = {how: (n, np.abs(x / truth - 1), left) for how, (n, x, left) in out[f].items()}
+        truth = progress(f, finest, "implicit")[0]
+        out[f] = {how: (n, *np.array([progress(f, k, how) for k in n]).T) for how, n in steps.items()}
+        out[f] = {how: (n, np.abs(x / truth - 1), residual) for how, (n, x, residual) in out[f].items()}
     return out
 
 
@@ -77,7 +77,7 @@ def draw(numbers: dict):
             ax.set(xlabel="steps of a cycle", ylabel=label)
             style.grid(ax)
         column[0].set_title(f"{f:g} Hz")
-    style.legend_beside(axes[0, -1])
+    style.legend_right(axes[0, -1])
     return fig
 
 

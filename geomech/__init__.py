@@ -3,10 +3,10 @@
     study = geomech.Study(geomech.load("three-link-glass"))  # a built-in name, or a TOML file
     study.displacement("direct", amplitudes=[0.5, 1.0])
 
-load, Scene, Swimmer, Numerics, toml    what is simulated: read, made, written
-Study, tiers, workers                   connection, CCF, cost, displacements, errors; who computes
-media, bodies, gaits, effects, systems  what scenes are made of; `register` adds one's own
-connection, curvature, reconstruct      the geometry, of any velocity(alpha, alphadot)
+load, Scene, Swimmer, Numerics, toml    scenes: read, built and written
+Study, tiers, workers                   connection, CCF, cost, displacements, errors; processes
+media, bodies, gaits, effects, systems  the parts of scenes; `register` adds custom ones
+connection, curvature, reconstruct      the geometry of any velocity(alpha, alphadot)
 optimise, undulation, fit_log, plots    the best gait; swimmers that undulate; measured gaits; figures
 On the command line: `geomech --help`; every key of a scene file: `geomech keys`.
 """
@@ -16,10 +16,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from geomech import face as _face  # noqa: F401  it gives values their methods
+from geomech import face as _face  # noqa: F401  registers the methods of values
 from geomech.core import version as _version
 
-if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
+if TYPE_CHECKING:  # the names of `__getattr__`, for type checkers and editors
     from geomech import gaits as gaits
     from geomech import measured as measured
     from geomech import optimise as optimise
@@ -47,7 +47,7 @@ if TYPE_CHECKING:  # what `__getattr__` finds, for type checkers and editors
 
 __version__ = _version.VERSION
 
-_MODULES = {  # by the name they have here; none is imported before it is asked for
+_MODULES = {  # by their names here; none is imported before its first use
     **{name: f"geomech.geometry.{name}" for name in ("connection", "curvature", "reconstruct")},
     **{name: f"geomech.{name}" for name in ("gaits", "measured", "optimise", "systems", "tiers")},
     **{name: f"rft.{name}" for name in ("bodies", "effects")},
@@ -67,13 +67,13 @@ _OBJECTS = {
 
 def __getattr__(name: str) -> object:
     if name in _MODULES:
-        found = import_module(_MODULES[name])
+        value = import_module(_MODULES[name])
     elif name in _OBJECTS:
-        found = getattr(import_module(_OBJECTS[name]), name)
+        value = getattr(import_module(_OBJECTS[name]), name)
     else:
         raise AttributeError(f"module 'geomech' has no attribute {name!r}")
-    globals()[name] = found
-    return found
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

@@ -18,8 +18,8 @@ for name in COMMANDS:
     app.command()(with_plugins(getattr(import_module(f"geomech.commands.{name}"), name)))
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         print(f"geomech {__version__}")
         raise typer.Exit
 
@@ -39,7 +39,7 @@ def geomech(
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Entry point: one line on standard error and exit code 2 for what the user can mend, 128 + its number for a signal."""
-    terminal.calm()
+    """Run a command and exit: one line on standard error and code 2 for a mistake, 128 + its number for a signal."""
+    terminal.limit_threads()
     arguments = (sys.argv[1:] if argv is None else argv) or ["--help"]
-    sys.exit(copy_context().run(terminal.ended, app, arguments))  # what the command prefers ends with it
+    sys.exit(copy_context().run(terminal.exit_code, app, arguments))  # what the command prefers ends with it

@@ -1,4 +1,4 @@
-"""The Python face of values: what they do in a notebook, and to and from files."""
+"""Methods of values for Python and notebooks: how they are shown, saved and loaded."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Connection:
 
     @classmethod
     def load(cls, path: str | Path, sign: str = "", order: str = "") -> Any:
-        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter has
+        """Return the connection in a file that `geomech connection` wrote, .nc or .mat, or that sysplotter wrote
         (`geomech.io.tables`).
 
-        Refusal, one line, for any other. Its residual is nan where the file does not tell it."""
+        Refusal, one line, for any other. The residual is nan where the file has none."""
         from geomech.io.tables import load
 
         return load(path, sign, order).connection
@@ -43,7 +43,7 @@ class Field:
         return display.field(self)
 
     def to_xarray(self, name: str = "ccf", *, shapes: Sequence[str] = ()) -> Any:
-        """Return a DataArray; of three components it is taken for a CCF, with its units.
+        """Return a DataArray; with three components it is taken for a CCF, with its units.
 
         shapes: names of the shape variables, where these are no joint angles. ImportError without the package xarray."""
         from geomech.io.results import to_xarray

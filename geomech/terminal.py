@@ -1,4 +1,4 @@
-"""What a command owes its terminal: one line for what went wrong, a bar for what takes long, an ear for signals."""
+"""The terminal of a command: one line for an error, a bar for progress, handlers for signals."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from geomech.run import BELOW
 from geomech.run.progress import progress
 from rft.refusal import line, printable
 
-__all__ = ["Stopped", "ended", "progress", "stoppable", "tell"]
+__all__ = ["Stopped", "exit_code", "progress", "report", "stoppable"]
 
 LONGEST = 2000  # characters of an error
 PRINTING = "geomech.cli", "geomech.commands", "geomech.terminal", "click", "typer"  # modules that print; no files
-PATIENCE = 2.0  # s after a signal in which further ones are not heeded: what is done is being kept
+PATIENCE = 2.0  # s after a signal in which further ones are ignored: finished tasks are being stored
 
 
 class Stopped(BaseException):
@@ -41,13 +41,13 @@ class Stopped(BaseException):
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """INT, TERM and HUP raise `Stopped`, so that nothing half-written stays behind. Those that are ignored, as HUP is under
-    nohup, stay so."""
-    heard = [-math.inf]
+    """Raise `Stopped` on INT, TERM and HUP, so that no file stays half-written. Signals that are ignored, as HUP is under
+    nohup, stay ignored."""
+    last = [-math.inf]
 
     def stop(number, frame):
-        if time.monotonic() > heard[0] + PATIENCE:
-            heard[0] = time.monotonic()
+        if time.monotonic() > last[0] + PATIENCE:
+            last[0] = time.monotonic()
             raise Stopped(number)
 
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -62,21 +62,21 @@ def stoppable() -> Iterator[None]:
             signal.signal(n, handler)
 
 
-def calm() -> None:
+def limit_threads() -> None:
     """Let the libraries below NumPy, which loads later, take one thread: small matrices gain nothing from more, their threads
     wait by turning in circles, and sums that are shared out end in other digits."""
     os.environ.update(dict.fromkeys(BELOW, "1"))
 
 
-def ended(app: typer.Typer, argv: list[str]) -> int:
-    """The exit code of a command, after one line on standard error if it failed."""
-    with stoppable(), _plainly():
-        _any_letters()
+def exit_code(app: typer.Typer, argv: list[str]) -> int:
+    """Run a command and return its exit code, after one line on standard error if it failed."""
+    with stoppable(), _printable_output():
+        _escape_letters()
         return _run(app, argv)
 
 
-class _Plain:
-    """A stream of text, all of it `plain`."""
+class _PrintableStream:
+    """A stream of text, all of it `printable`."""
 
     def __init__(self, stream):
         self._stream = stream
@@ -89,10 +89,10 @@ class _Plain:
 
 
 @contextlib.contextmanager
-def _plainly() -> Iterator[None]:
-    """What is printed is `plain`, whatever files hold and are called."""
+def _printable_output() -> Iterator[None]:
+    """Make all that is printed `printable`, whatever files hold and are called."""
     before = sys.stdout
-    sys.stdout = before and _Plain(before)
+    sys.stdout = before and _PrintableStream(before)
     try:
         yield
     finally:
@@ -104,13 +104,13 @@ def _run(app: typer.Typer, argv: list[str]) -> int:
         code = _run_noting(app, argv, notes)
     if not code:
         for text in notes.values():
-            tell(f"note: {text}")
+            report(f"note: {text}")
     return code
 
 
 @contextlib.contextmanager
 def _notes():
-    """What is noted while a command runs: the first of each kind, by what it says before its first number."""
+    """Collect the notes of a command: the first of each kind, by its text before its first number."""
     notes: dict[str, str] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("always", Note)
@@ -135,32 +135,32 @@ def _run_noting(app: typer.Typer, argv: list[str], notes: dict[str, str]) -> int
         if sys.stdout:
             sys.stdout.flush()
         return code or 0
-    except SystemExit as ended:  # what typer makes of a closed pipe
-        return _unheard() if isinstance(ended.__context__, BrokenPipeError) else ended.code
+    except SystemExit as end:  # typer raises it for a closed pipe
+        return _pipe_closed() if isinstance(end.__context__, BrokenPipeError) else end.code
     except (Stopped, KeyboardInterrupt) as stopped:
         return _stopped(stopped, argv)
-    except typer.Abort as aborted:  # what typer makes of an interrupt, and of an EOFError, which is none
+    except typer.Abort as aborted:  # typer raises it for an interrupt, and for an EOFError, which is none
         if isinstance(aborted.__cause__, KeyboardInterrupt):
             return _stopped(aborted.__cause__, argv)
         raise (aborted.__cause__ or aborted) from None
     except MemoryError:
-        tell("error: not enough memory: lower the grid, the phases or the number of amplitudes")
+        report("error: not enough memory: lower the grid, the phases or the number of amplitudes")
     except BrokenPipeError:
-        return _unheard()
+        return _pipe_closed()
     except Exception as error:
         text = error.format_message() if hasattr(error, "format_message") else str(error)
         if not isinstance(error, (ValueError, OSError, RuntimeError)) and not hasattr(error, "format_message"):
             raise
         if isinstance(error, OSError):
-            text = _of_system(error)
-        tell("error: " + "; ".join([line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]))
+            text = _system_error(error)
+        report("error: " + "; ".join([line(text, LONGEST), *getattr(error, "__notes__", ()), *notes.values()]))
         if isinstance(error, OSError):
-            _deaf(sys.stdout)
+            _discard(sys.stdout)
     return 2
 
 
-def _of_system(error: OSError) -> str:
-    """What the system refuses, with its cure. Standard output has no name; it is what commands write to themselves."""
+def _system_error(error: OSError) -> str:
+    """Return the text of an error of the system, with its cure. Standard output, to which commands write, has no name."""
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return "too many files are open at once: raise the limit, as by 'ulimit -n 1024'"
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
@@ -171,41 +171,41 @@ def _of_system(error: OSError) -> str:
 
 
 def _stopped(by: BaseException, argv: list[str]) -> int:
-    """What is kept, as the notes of ``by`` say, and the command that takes it up."""
-    kept, again = "; ".join(getattr(by, "__notes__", ())), shlex.join(["geomech", *argv])
-    told = f"{kept}: {again}" if kept else f"nothing is kept; the same command starts anew: {again}"
-    tell(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {told}")
+    """Report what is stored, as the notes of ``by`` say, and the command that resumes; return the exit code."""
+    stored, command = "; ".join(getattr(by, "__notes__", ())), shlex.join(["geomech", *argv])
+    text = f"{stored}: {command}" if stored else f"nothing is kept; the same command starts anew: {command}"
+    report(f"error: stopped by {getattr(by, 'name', 'SIGINT')}: {text}")
     return getattr(by, "code", 130)
 
 
-def _unheard() -> int:
-    """What we said was not wanted to the end: `geomech scenes | head -1`. Files are written by then: no failure."""
-    _deaf(sys.stdout)
+def _pipe_closed() -> int:
+    """Return success where the reader left early: `geomech scenes | head -1`. Files are written by then."""
+    _discard(sys.stdout)
     return 0
 
 
-def tell(text: str) -> None:
-    """One line on standard error, if anybody listens."""
+def report(text: str) -> None:
+    """Print one line on standard error, if that can be written to."""
     try:
         print(printable(" ".join(text.split())), file=sys.stderr, flush=True)
     except OSError:
-        _deaf(sys.stderr)
+        _discard(sys.stderr)
 
 
-def _deaf(stream) -> None:
-    """Lead a stream that cannot be written to nowhere, so that Python does not complain of it at the end."""
+def _discard(stream) -> None:
+    """Redirect a stream that cannot be written to, so that Python does not complain of it at the end."""
     with contextlib.suppress(AttributeError, OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _any_letters() -> None:
-    """What a terminal has no letters for is escaped, and matplotlib keeps its folders to itself: nothing fails for the sake
-    of what is said beside the results."""
+def _escape_letters() -> None:
+    """Escape letters that a terminal does not have, and silence matplotlib about its folders: no command fails for the sake
+    of its messages."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         Path.home()
-    except RuntimeError:  # nowhere: matplotlib then takes a temporary folder if it is told of one that cannot be
+    except RuntimeError:  # there is none: matplotlib takes a temporary folder if MPLCONFIGDIR cannot be one
         os.environ.setdefault("MPLCONFIGDIR", os.devnull)

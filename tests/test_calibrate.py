@@ -370,7 +370,7 @@ def test_the_medium_written_is_the_one_fitted(tmp_path, monkeypatch):
         read = scene.parse(
             '[medium]\nfile = "M.toml"\n[body]\nkind = "chain"\n[gait]\nkind = "circle"\n', str(tmp_path / "s.toml")
         ).system.medium
-        want = calibration.of_drag(law, "dem-rod-drag", {}, 0.0).fit.medium
+        want = calibration.Calibration("dem-rod-drag", law).ask().subject.medium
         assert type(read) is kind
         for field in dataclasses.fields(kind):
             np.testing.assert_allclose(*(getattr(m, field.name) for m in (read, want)), rtol=1e-15)
@@ -393,17 +393,18 @@ def test_outputs_never_replace_the_data(tmp_path):
 def test_the_picture_shows_data_law_band_and_residuals():
     from geomech.output import plots
 
-    numbers = calibration.of_drag("granular", "dem-rod-drag", {}, 0.0).curves(7)
-    top, bottom = plots.drag_figure(numbers).axes
+    result = calibration.Calibration("dem-rod-drag", "granular").ask()
+    psi, force, residual, law = (result[name].values for name in ("psi", "force", "residual", "law"))
+    top, bottom = plots.drag_figure(result).axes
     across, data_across, along, data_along = top.lines[:4]
-    np.testing.assert_allclose(across.get_ydata(), numbers["law"][1])
-    np.testing.assert_allclose(along.get_ydata(), numbers["law"][0])
-    np.testing.assert_allclose(data_across.get_xydata().T, [numbers["psi_deg"], numbers["forces"][1]])
-    np.testing.assert_allclose(data_along.get_xydata().T, [numbers["psi_deg"], numbers["forces"][0]])
+    np.testing.assert_allclose(across.get_ydata(), law[1])
+    np.testing.assert_allclose(along.get_ydata(), law[0])
+    np.testing.assert_allclose(data_across.get_xydata().T, [psi, force[1]])
+    np.testing.assert_allclose(data_along.get_xydata().T, [psi, force[0]])
     edges = top.collections[0].get_paths()[0].vertices
-    assert edges[:, 1].max() == pytest.approx((numbers["law"][1] + numbers["band"][1]).max())
-    np.testing.assert_allclose(bottom.lines[0].get_ydata(), numbers["residuals"][1])
-    np.testing.assert_allclose(numbers["forces"][0][0] - numbers["law"][0][0], numbers["residuals"][0][0], rtol=1e-9)
+    assert edges[:, 1].max() == pytest.approx((law[1] + result["law"].error[1]).max())
+    np.testing.assert_allclose(bottom.lines[0].get_ydata(), residual[1])
+    np.testing.assert_allclose(force[0][0] - law[0][0], residual[0][0], rtol=1e-9)
     assert top.get_ylabel() == "drag (N)" and "degrees" in bottom.get_xlabel()
 
 

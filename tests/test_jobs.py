@@ -15,11 +15,12 @@ from tasks import doubled, who
 from test_store import HARD, same
 
 from geomech import scene as scenes
-from geomech import terminal
+from geomech import terminal, text
 from geomech.commands.pipeline import allow, storing
 from geomech.core.knob import Knob
 from geomech.geometry import connection
 from geomech.optimise import checked, search
+from geomech.optimise.question import result_of
 from geomech.output import plots
 from geomech.run import jobs, store
 from geomech.run.digest import Undigestible
@@ -225,7 +226,7 @@ def test_studies_resume_to_the_last_digit(tmp_path, monkeypatch):
         study = Study(scene)
         return [study.compute_metric().coefficients, study.fitted.A, study.fitted.residual]
 
-    numbers = lambda: [json.dumps({**search(request).numbers(), "seconds": 0.0})]
+    numbers = lambda: [json.dumps({**text.numbers(result_of(search(request))), "seconds": 0.0})]
     errors = lambda *of: [np.array(x["error"]) for x in accuracy.study(*of)["lines"]]
     for ask, after in (
         (lambda: errors(scene, None, 1), 5),
@@ -427,8 +428,8 @@ def small(tmp_path, monkeypatch, fine, step_by_step):
     monkeypatch.setattr(walking, "PILOT", 0.0)
     monkeypatch.setattr(walking, "TOGETHER", 2)
     monkeypatch.setattr(type(scenes.load("c-leg")), "ladder", (4, 8, 16, 32))
-    for file, text in SMALL.items():
-        (tmp_path / file).write_text(text)
+    for file, content in SMALL.items():
+        (tmp_path / file).write_text(content)
     return tmp_path
 
 

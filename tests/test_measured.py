@@ -36,7 +36,7 @@ from geomech.study.single import single
 from geomech.study.study import Study
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import length_unit
-from geomech.text import measured as told
+from geomech.text import measured as texts
 from geomech.text.explain import explain
 from rft import se2
 from rft.refusal import Refusal
@@ -449,7 +449,7 @@ def test_joints_that_follow_from_others_are_named(noise, rows, said):
     f = measured.fit_log(log)
     found = re.sub(r"\d\.\d+", lambda x: f"{float(x[0]):.1g}", results.status(f))  # noise moves the third digit
     assert re.match("fitted along the gait alone: " + said, found)
-    assert results.status(f) in told.described(f)
+    assert results.status(f) in texts.described(f)
     if noise == 1e-3 and len(rows) == 1:
         kept = dataclasses.replace(log, alpha=log.alpha[:, :-1], joints=log.joints[:-1])
         assert results.status(measured.fit_log(kept, harmonics=2)) == "fitted"
@@ -718,7 +718,7 @@ def test_cycles_that_do_not_vary_tell_the_displacement_and_no_more(viscous, tmp_
     assert (slopes > 0).sum() == 6  # of three components, across the gait and along it
     save_field(tmp_path / "a.nc", f)
     np.testing.assert_allclose(Table(tmp_path / "a.nc").run(*f.gait.cycle(128)).net, net, rtol=1e-9)
-    assert told.told(f)["status"].startswith("fitted along the gait alone")
+    assert texts.fit_numbers(f)["status"].startswith("fitted along the gait alone")
 
 
 def test_cycles_that_differ_in_size_alone_tell_the_slope_along_the_gait(viscous, monkeypatch):

@@ -16,6 +16,7 @@ from geomech.optimise.aims import Aim
 from geomech.optimise.constraints import Constraints
 from geomech.optimise.cycles import Phases, Runs, cycle_values
 from geomech.optimise.loops import Loops
+from geomech.optimise.question import result_of
 from geomech.optimise.stroke import Stroke
 from geomech.scene import Scene, parse
 from geomech.study import fields
@@ -133,7 +134,7 @@ def test_published_strokes_of_the_viscous_swimmer(stroke, cheap):
 
 def test_what_is_told_is_what_the_scene_does(cheap):
     """The scene, written and read, at amplitude 1, by the direct tier and by the metric."""
-    scene = parse(optima.scene_toml(cheap))
+    scene = parse(optima.scene_toml(result_of(cheap)))
     assert scene.gait == cheap.gait
     assert scene.gait.amplitude == 1.0
     net = Study(scene).displacement("direct", amplitudes=[1.0])[0]
@@ -146,7 +147,7 @@ def test_what_is_told_is_what_the_scene_does(cheap):
     assert cheap.value == pytest.approx(np.hypot(*net[:2]) / length, rel=1e-10)
     Study(scene).displacement("area", amplitudes=[1.0])  # its field holds it
     assert scene.numerics.extent == 2.5  # and is no larger than need be
-    numbers = json.loads(json.dumps(cheap.numbers()))
+    numbers = json.loads(json.dumps(optima.numbers(result_of(cheap))))
     assert list(numbers) == [
         "objective", "value", "start_value", "displacement", "path_length", "work", "gait", "evaluations", "seconds",
         "active", "answers", "estimate", "body_length", "units",
@@ -193,10 +194,10 @@ def test_best_gaits_in_sand(sand):
     assert len(sand.active) == (4 if asked[0] == "displacement" else 2)
     assert np.abs(sand.gait.cycle(20_000)[0]).max() <= asked[1]
     assert sum(times for _, times in sand.answers + sand.others) == 9 + 4
-    told = optima.told(sand)
+    told = optima.text(result_of(sand))
     assert "9 starts, and 4 that narrower limits led to, answers that differ: " in told
     assert "by a table alone, less: " in told
-    assert sand.numbers()["answers"] == [list(x) for x in sand.answers + sand.others]
+    assert optima.numbers(result_of(sand))["answers"] == [list(x) for x in sand.answers + sand.others]
 
 
 def test_best_gaits_in_sand_go_round_once_and_never_back(sand):
@@ -344,7 +345,7 @@ def test_starts_are_the_same_every_time_and_answers_are_counted():
     first, again = (loops.starts(loops.of(Circle()), 3) for _ in range(2))
     assert all(np.array_equal(p, q) for p, q in zip(first, again))
     assert all(np.abs(loops.gait(p).cycle(500)[0]).max() <= 1.4 for p in first)
-    assert "answers that differ" in optima.told(found)
+    assert "answers that differ" in optima.text(result_of(found))
 
 
 def serpenoid(body=None):
@@ -477,7 +478,7 @@ def test_a_cycle_without_slopes_is_that_with():
 
 def test_a_scene_in_the_minimum_perturbation_frame(cheap):
     """The same stroke; its displacement is told in that frame."""
-    scene = parse('frame = "minimum-perturbation"\n' + optima.scene_toml(cheap).split('frame = "link-2"')[1])
+    scene = parse('frame = "minimum-perturbation"\n' + optima.scene_toml(result_of(cheap)).split('frame = "link-2"')[1])
     found = optimise(scene, "efficiency")
     assert cheap.value <= found.start.value * (1 + 1e-6)
     assert found.value == pytest.approx(cheap.value, rel=1e-3)
@@ -505,16 +506,16 @@ def test_wrong_types_are_refused(wrong):
 
 def test_the_loop_on_the_map(stroke, cheap, tmp_path):
     """For displacement it follows the zero line, for efficiency the path's length holds it back, and a limit is a limit."""
+    from geomech.optimise.gain import gained_ccf, limiting
     from geomech.output import plots
-    from geomech.output.plots.optimum import along, held
 
-    share = lambda found, kind: (held(found, along(found)) == kind).mean()
+    share = lambda found, kind: (limiting(found, gained_ccf(found)) == kind).mean()
     assert share(stroke, "zero") > 0.95
     assert share(cheap, "length") > 0.4
     assert share(cheap, "zero") > 0.2
     short = optimise(viscous(), within=1.2, harmonics=3)
     assert share(short, "limit") > 0.15
-    field = along(stroke)
+    field = gained_ccf(stroke)
     assert field.values[0, 15, 15] == pytest.approx(0.0204, abs=2e-4)  # against the sense of the CCF's x
     for found, name in ((short, "two.svg"), (optimise(serpenoid(), "turning", harmonics=1, starts=1), "three.png")):
         plots.save(plots.optimum_figure(found), tmp_path / name)
@@ -636,7 +637,7 @@ def test_chains_without_drag_cost_what_their_metric_says():
     assert found.best.length == pytest.approx(length, rel=1e-10)
     assert found.value == pytest.approx(np.hypot(*found.best.displacement[:2]) / length, rel=1e-10)
     assert found.value > 1.005 * found.start.value
-    assert "of the system's own metric" in optima.told(found)
+    assert "of the system's own metric" in optima.text(result_of(found))
 
 
 @pytest.mark.parametrize("name", ["three-link-viscous", "three-link-ideal-fluid"])
@@ -704,7 +705,7 @@ def test_a_loop_that_cannot_be_run_ends_no_search():
     loops = Loops(2, 2, 2.5, 32)
     cycles, aim = Phases(loops, velocity), Aim("displacement")
     first = loops.of(Circle(amplitude=0.5))
-    p = ascend(cycles, aim, first, most=40)
+    p = ascend(cycles, aim, first, max_steps=40)
     assert np.abs(loops.cycle(p)[0]).max() <= 1.1
     assert aim.value(cycles(p))[0] > 1.5 * aim.value(cycles(first))[0]
 
@@ -736,18 +737,18 @@ def test_loops_on_maps_of_all_kinds(stroke):
     """Singular shapes leave the scene's own frame, time stepping no CCF, and a metric stretches the map."""
     import dataclasses
 
+    from geomech.optimise.gain import gained_ccf, limiting
     from geomech.output import plots
-    from geomech.output.plots.optimum import along, held
     from rft.effects import Transient
 
     snake = optimise(geomech.load("no-slip-snake"), harmonics=1)
     titles = [ax.get_title() for ax in plots.optimum_figure(snake).axes]
     assert "CCF of the displacement,\nframe mean" in titles
     assert "singular shapes" in snake.active
-    assert 0.1 < (held(snake, along(snake)) == "singular").mean() < 0.5
+    assert 0.1 < (limiting(snake, gained_ccf(snake)) == "singular").mean() < 0.5
     past = stroke.scene.changed(system=Swimmer(SAND, Chain(), (Transient(travel=0.1),)))
     stepped = dataclasses.replace(stroke, request=dataclasses.replace(stroke.request, scene=past))
-    assert set(held(stepped, None)) == {"loop"}
+    assert set(limiting(stepped, None)) == {"loop"}
     assert "no CCF" in plots.optimum_figure(stepped).axes[0].get_title()
     fig = plots.optimum_figure(stroke, stretched=True)
     assert any("stretched" in ax.get_title() for ax in fig.axes)

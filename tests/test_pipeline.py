@@ -78,7 +78,7 @@ def test_every_command_has_one_order(asked, monkeypatch, capsys):
     monkeypatch.setattr("geomech.text.text", lambda result: "the result")
     question = asked()
     said = lambda result, path: f"{result.kind} in {path}"
-    wanted = output(question, said=said), pipeline.Output(None, None), output(question, "more.csv")
+    wanted = output(question, message=said), pipeline.Output(None, None), output(question, "more.csv")
     pipeline.execute(question, *wanted)
     assert question.told == [
         "name out.csv", "name more.csv", "check", "cost", "answer", "write out.csv", "write more.csv"

@@ -9,9 +9,11 @@ import pytest
 from commands import geomech
 
 from geomech import scene
+from geomech import text as texts
 from geomech.io import rows
 from geomech.scene import penetration
 from geomech.study import stress_calibration
+from geomech.study.calibration import Calibration
 from rft.plates import VERTICAL, StressMap, calibrate
 from rft.plates.calibrate import COEFFICIENTS, GENERIC, MISTAKES, SPREAD, fit_stress, fit_zeta
 from rft.plates.survey import survey
@@ -295,28 +297,27 @@ def test_what_is_not_determined_is_noted(tmp_path):
 
 
 def test_numbers_of_text_and_picture(tmp_path):
-    found = stress_calibration.of_plates("stress-map", str(plates(tmp_path)), {}, 0.0)
-    numbers, drawn, f = found.numbers(), found.curves(), found.fit
-    np.testing.assert_allclose(drawn["generic"], f.zeta * GENERIC)
-    np.testing.assert_allclose(drawn["values"], [numbers[name] for name in drawn["names"]])
-    np.testing.assert_allclose(drawn["intervals"], list(numbers["intervals"].values()))
-    np.testing.assert_allclose(drawn["beta_deg"], GRID[0] / RAD)
-    np.testing.assert_allclose(drawn["gamma_deg"], GRID[1] / RAD)
-    lines = found.text().splitlines()
+    found = Calibration(str(plates(tmp_path)), "stress-map").ask()
+    numbers, f = texts.numbers(found), found.subject
+    np.testing.assert_allclose(found["generic"].values, f.zeta * GENERIC)
+    np.testing.assert_allclose(found["value"].values, [numbers[name] for name in found["coefficient"].values])
+    np.testing.assert_allclose(found["interval"].values, list(numbers["intervals"].values()))
+    np.testing.assert_allclose(found["beta"].values, GRID[0] / RAD)
+    np.testing.assert_allclose(found["gamma"].values, GRID[1] / RAD)
+    lines = texts.text(found).splitlines()
     assert lines[2].split()[:2] == ["A00", f"{f.values[0]:.4f}"] and lines[2].split()[-1] == f"{f.zeta * 0.206:.4f}"
     of_map = [a[-1] for a in f.stress(*GRID)]
-    last = [GRID[0][-1] / RAD, GRID[1][-1] / RAD, found.alpha_x[-1], of_map[0], found.alpha_z[-1], of_map[1]]
+    x, z = found["stress"].values[:, -1]
+    last = [GRID[0][-1] / RAD, GRID[1][-1] / RAD, x, of_map[0], z, of_map[1]]
     np.testing.assert_allclose([float(x) for x in lines[-1].split()], last, atol=1e-4)
     assert len(lines) == 42 + 14
-    test = stress_calibration.of_penetration(
-        "zeta", str(written(tmp_path / "p.csv", "depth,force", *TEST)), {"area": 1e-3}, 0.0
-    )
-    drawn, z = test.curves(), test.fit.zeta
-    np.testing.assert_allclose(drawn["law"], z * 1e3 * drawn["depth"])
-    np.testing.assert_allclose(
-        [drawn["low"] / drawn["law"], drawn["high"] / drawn["law"]], np.tile(test.fit.interval / z, (4, 1)).T
-    )
-    assert test.rms == drawn["rms"] == pytest.approx(np.sqrt(np.mean((drawn["force"] - drawn["law"]) ** 2)))
+    file = written(tmp_path / "p.csv", "depth,force", *TEST)
+    test = Calibration(str(file), "zeta", (("area", 1e-3),)).ask()
+    law, z = test["law"], test.subject.zeta
+    np.testing.assert_allclose(law.values, z * 1e3 * test["depth"].values)
+    bounds = np.stack([law.values - law.error, law.values + law.error]) / law.values
+    np.testing.assert_allclose(bounds, np.tile(test.subject.interval / z, (4, 1)).T)
+    assert test.attributes["rms"] == pytest.approx(np.sqrt(np.mean((test["force"].values - law.values) ** 2)))
 
 
 def test_drags_are_drawn_where_the_same_plate_moves_ahead():
@@ -344,8 +345,8 @@ def test_one_component_may_be_nothing():
 def test_a_map_that_drives_motion_on_is_noted(tmp_path):
     lost = StressMap(B01=-0.05)
     assert survey(lost).pushing > 0
-    found = stress_calibration.of_plates("stress-map", str(plates(tmp_path, lost)), {}, 0.0)
-    assert any("drives motion on" in line for line in found.notes())
+    found = Calibration(str(plates(tmp_path, lost)), "stress-map").ask()
+    assert any("drives motion on" in line for line in found.attributes["notes"])
 
 
 def test_a_plate_that_the_package_pushes_down_has_its_zeta(tmp_path):

@@ -119,8 +119,8 @@ def test_a_shell_completes_commands_options_and_scenes(words, found, monkeypatch
 
 
 def test_what_is_completed_can_be_given():
-    for name in (*names.shown_names(), "half-cylinder", "sphere", "poppy-seeds-loose", "coulomb", "no-slip-snake"):
-        assert name in names.shown_names() and run("scenes", "--show", name)[0] == 0
+    for name in (*names.printable_names(), "half-cylinder", "sphere", "poppy-seeds-loose", "coulomb", "no-slip-snake"):
+        assert name in names.printable_names() and run("scenes", "--show", name)[0] == 0
     for name in names.medium_names():
         assert run("stress", name, "--beta", "0", "--gamma", "90")[0] == 0
     assert names.section_names() == [*sections()]  # each of which tests/test_keys.py prints

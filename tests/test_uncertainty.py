@@ -141,7 +141,7 @@ def test_media_that_end_before_the_points_are_carried_on_from_nearer_ones():
     sand = scene(Granular(1.49, 0.22, covariance=((1.0, 0.0), (0.0, 1e-6))))
     reach, near, both = uncertainty.sigma_points(sand)
     assert reach == 1.0 and sorted(round(s.medium.C, 9) for pair in near for s in pair) == [0.49, 1.49, 1.49, 2.49]
-    assert len(both) == 1 and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.REACH
+    assert len(both) == 1 and uncertainty.sigma_points(scene(granular()))[0] == uncertainty.DEVIATIONS
     assert np.isfinite(uncertainty.of_medium(sand, GAIT, np.array([1.0]))["x"]).all()
 
 

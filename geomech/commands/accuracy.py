@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geomech.commands.asked import loaded_any
+from geomech.commands.loading import load_any
 from geomech.commands.options import EitherArgument, FolderOption, JsonOption, YesOption, with_workers
 from geomech.commands.pipeline import Output, execute
 
@@ -16,10 +16,10 @@ def accuracy(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):
-    """What accuracy costs in this scene: error against time for every tier and knob, and the cheapest settings; of an intruder
-    scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
+    """Measure the cost of accuracy in a scene: error against time for every tier and knob, and the cheapest settings; of an
+    intruder scene, for the number of elements or triangles; of a walking robot, for steps, elements and rounding."""
     from geomech.output import report
     from geomech.study.accuracy import Accuracy
 
-    folder = Output(out, report.write_accuracy, said=report.files, folder=True)
-    execute(Accuracy(loaded_any(name)), folder, as_json=as_json, yes=yes)
+    folder = Output(out, report.write_accuracy, message=report.files, folder=True)
+    execute(Accuracy(load_any(name)), folder, as_json=as_json, yes=yes)

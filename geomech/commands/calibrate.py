@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.options import JsonOption, PlotOption, caps
+from geomech.commands.options import JsonOption, PlotOption, parse_end_caps
 from geomech.commands.pipeline import Output, execute
 
 Size = Optional[float]
@@ -35,14 +35,14 @@ def calibrate(
     area: Annotated[Size, typer.Option(help="of the plate in m^2, in place of the file's")] = None,
     as_json: JsonOption = False,
 ):
-    """A medium of one's own: fits a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, of
-    the vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to
-    a plate pushed straight down, columns depth_m, force_N."""
+    """Fit a medium of your own: a force law to the drag on a rod, columns psi_deg, F_parallel_N, F_perpendicular_N; or, in the
+    vertical plane, nine coefficients to plate drags, columns beta, gamma, alpha_x, alpha_z (degrees, N/cm^3), or zeta to a
+    plate pushed straight down, columns depth_m, force_N."""
     from geomech.output import parts, pictures
     from geomech.study.calibration import Calibration
 
     sizes = {"radius": radius, "length": length, "depth": depth, "density": density, "area": area}
     known = tuple((key, x) for key, x in sizes.items() if x is not None)
-    file = Output(out, parts.write_medium, said=parts.about_medium)
+    file = Output(out, parts.write_medium, message=parts.about_medium)
     figure = Output(plot, pictures.calibration, pictures.check)
-    execute(Calibration(drag, law, known, caps(end_caps)), file, figure, as_json=as_json)
+    execute(Calibration(drag, law, known, parse_end_caps(end_caps)), file, figure, as_json=as_json)

@@ -7,7 +7,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -38,12 +38,12 @@ def ccf(
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
-    """The CCF map with the scene's gait drawn on it. Of three and more joints: a slice for each pair, or for one, with the
-    others held."""
+    """Draw the CCF map with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
+    others fixed."""
     from geomech.output import pictures
     from geomech.study.shape_space import ccf
 
-    scene = loaded(name, grid, extent)
+    scene = load_scene(name, grid, extent)
     drawn = pictures.Ccf(style, metric, stretch, beside)
     question = ccf(scene, pair, angles(scene, "--slice", slice_), beside, metric, stretch)
     execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)

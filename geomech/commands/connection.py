@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     BesideOption,
     ExtentOption,
@@ -39,13 +39,14 @@ def connection(
     beside: BesideOption = None,
     yes: YesOption = False,
 ):
-    """The local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as .mat."""
+    """Write the local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as
+    .mat."""
     from geomech.output import parts, pictures
     from geomech.study.shape_space import connection
 
     file = parts.Connection(out.suffix, sign, order)
     drawn = pictures.Connection(style, plot, pair, slice_, beside)
-    scene = loaded(name, grid, extent)
+    scene = load_scene(name, grid, extent)
     question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), beside)
     outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
     execute(question, *outputs, yes=yes, silent=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import (
     ExtentOption,
     GridOption,
@@ -34,11 +34,11 @@ def displacement(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
+    """Compute the net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
     from geomech.output import pictures
     from geomech.study.displacement import displacement
 
-    scene = loaded(name, grid, extent)
+    scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     question = displacement(scene, values, methods, tol, effort)
     execute(question, Output(plot, pictures.displacement, pictures.check), as_json=as_json, yes=yes)

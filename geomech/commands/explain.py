@@ -7,7 +7,7 @@ from geomech.commands.pipeline import show
 
 
 def explain(name: SceneArgument):
-    """Which effects a scene asks for, the engine that follows, what each costs and what it takes away."""
+    """Print the effects of a scene, the engine that follows, their costs, and the results that they rule out."""
     from geomech.scene import load
     from geomech.text.explain import explain
 

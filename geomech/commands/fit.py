@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.options import JsonOption, PlotOption, an_angle
+from geomech.commands.options import JsonOption, PlotOption, an_angle, column_names
 from geomech.commands.pipeline import Output, execute
 
 
@@ -45,12 +45,11 @@ def fit(
     ] = 1.0,
     as_json: JsonOption = False,
 ):
-    """The connection near a measured gait: phase, mean gait, A by regression with intervals, and the displacement that it
-    predicts beside the log's."""
+    """Fit the connection near a measured gait: phase, mean gait, A by regression with intervals, and the predicted
+    displacement against the log's."""
     from geomech.measured.results import Fit
     from geomech.output import parts, pictures
 
-    names = tuple(columns.split(",")) if columns is not None else ()
-    question = Fit(log, names, degrees, level, harmonics, within, body_length)
+    question = Fit(log, column_names(columns), degrees, level, harmonics, within, body_length)
     field, figure = Output(out, parts.write_tube, formats.netcdf), Output(plot, pictures.measured, pictures.check)
     execute(question, field, Output(scene, *parts.mean_gait(out)), figure, as_json=as_json)

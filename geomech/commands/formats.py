@@ -1,4 +1,4 @@
-"""What names of outputs must be like: by the format that their endings say."""
+"""Checks of the names of outputs, by their endings."""
 
 from __future__ import annotations
 

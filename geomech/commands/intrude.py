@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded_intruder
+from geomech.commands.loading import load_intruder
 from geomech.commands.options import IntruderArgument, JsonOption, PlotOption
 from geomech.commands.pipeline import Output, execute
 
@@ -19,11 +19,12 @@ def intrude(
     out: Annotated[Optional[Path], typer.Option("-o", "--output", metavar="FILE.csv", help="table to write")] = None,
     plot: PlotOption = None,
 ):
-    """Force and moment of the grains on a body, an outline in the vertical plane or a mesh, along its motion. SI units."""
+    """Compute force and moment of the grains on a body, an outline in the vertical plane or a mesh, along its motion. SI
+    units."""
     from geomech.io.results import write_csv
     from geomech.output import pictures
     from geomech.study.intrusion import Intrusion
 
     table = Output(out, lambda result, path: write_csv(path, result), formats.csv)
     figure = Output(plot, pictures.intrusion, pictures.check)
-    execute(Intrusion(loaded_intruder(name)), table, figure, as_json=as_json, yes=True)
+    execute(Intrusion(load_intruder(name)), table, figure, as_json=as_json, yes=True)

@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import JsonOption, PlotOption, SceneArgument, YesOption, joint_limits, with_workers
 from geomech.commands.pipeline import Output, execute
 
@@ -34,12 +34,13 @@ def optimize(
     as_json: JsonOption = False,
     yes: YesOption = False,
 ):  # fmt: skip
-    """The best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
+    """Find the best gait of a scene for an aim: its value with an error, as a scene, and its loop on the CCF map."""
     from geomech.optimise.question import Optimize
     from geomech.output import parts, pictures
 
-    scene = loaded(name)
-    asked = direction, harmonics, joint_limits(within, scene), starts, rate, power
+    scene = load_scene(name)
+    limits = joint_limits(within, scene)
     drawn = pictures.Optimum(stretch, plot)
     file, figure = Output(out, parts.write_best, formats.toml), Output(plot, drawn, pictures.check)
-    execute(Optimize(scene, aim, *asked, stretch), file, figure, as_json=as_json, yes=yes)
+    question = Optimize(scene, aim, direction, harmonics, limits, starts, rate, power, stretch)
+    execute(question, file, figure, as_json=as_json, yes=yes)

@@ -1,4 +1,4 @@
-"""What commands share: options, and what they must be."""
+"""Options that commands share, and their parsers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rft.refusal import Refusal, located
 
 
 def _scene(names: Callable[[], list[str]]):
-    told = "a built-in name (see 'geomech scenes') or a TOML file"
-    return typer.Argument(metavar="SCENE", help=told, autocompletion=names)
+    text = "a built-in name (see 'geomech scenes') or a TOML file"
+    return typer.Argument(metavar="SCENE", help=text, autocompletion=names)
 
 
 SceneArgument = Annotated[str, _scene(scene_names)]
@@ -36,7 +36,7 @@ MediumOption = Annotated[
 
 
 def folder(text: str | Path) -> Path:
-    """The folder of that name; an empty one is refused."""
+    """Return the folder of that name; an empty name is refused."""
     if not str(text):
         raise typer.BadParameter("an empty name: name a folder, '.' for this one")
     return Path(text)
@@ -82,15 +82,15 @@ def load_plugins(files: list[Path] | None) -> None:
 
 
 def with_plugins(command: Callable) -> Callable:
-    """A command that also takes ``--plugin``, as all do that take a scene; any other as it is."""
+    """Return a command that also takes ``--plugin`` if it takes a scene; any other as it is."""
     signature = inspect.signature(command, eval_str=True)
     if not {"name", "plugins"} & {*signature.parameters} or "plugin" in signature.parameters:
         return command
 
     @functools.wraps(command)
-    def run(plugin=None, **given):
+    def run(plugin=None, **arguments):
         load_plugins(plugin)
-        return command(**given)
+        return command(**arguments)
 
     more = inspect.Parameter("plugin", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption)
     run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), more])
@@ -108,14 +108,14 @@ SchedulerOption = Annotated[
 
 
 def with_workers(command: Callable) -> Callable:
-    """A command that also takes ``--workers`` and ``--scheduler`` (`geomech.run.workers`)."""
+    """Return a command that also takes ``--workers`` and ``--scheduler`` (`geomech.run.workers`)."""
 
     @functools.wraps(command)
-    def run(workers=None, scheduler=None, **given):
+    def run(workers=None, scheduler=None, **arguments):
         from geomech.run.workers import using
 
         with using(workers, scheduler):
-            return command(**given)
+            return command(**arguments)
 
     signature = inspect.signature(command, eval_str=True)
     more = {"workers": WorkersOption, "scheduler": SchedulerOption}
@@ -129,7 +129,7 @@ NO_ANGLE = "this is no angle"
 
 
 def _number(text: str, angle: str | None) -> float:
-    """0.5, or 30deg for an angle, in rad. angle: of what it is said to be none; None if it is one."""
+    """Return 0.5, or 30deg for an angle, in rad. angle: why degrees are refused; None for an angle."""
     if not text.strip().endswith("deg"):
         return float(text)
     if angle is not None:
@@ -138,11 +138,12 @@ def _number(text: str, angle: str | None) -> float:
 
 
 class _NoAngle(Exception):
-    """Degrees of what is no angle; its text is what."""
+    """Degrees were given where they are refused; its text says why."""
 
 
 def numbers(option: str, text: str, count: int | None = None, angle: str | None = NO_ANGLE) -> list[float]:
-    """0.5,0.3, as many as ``count`` if that is given. angle: None for angles, which may be 30deg; else what they are."""
+    """Return the numbers of 0.5,0.3, ``count`` of them if that is given. angle: None for angles, which may be 30deg; else why
+    degrees are refused."""
     try:
         values = [_number(x, angle) for x in text.split(",")]
         if count not in (None, len(values)):
@@ -160,7 +161,7 @@ def numbers(option: str, text: str, count: int | None = None, angle: str | None 
 
 
 def an_angle(text: str | float) -> float:
-    """An option that is an angle: 2.5, or 120deg, in rad."""
+    """Return an option that is an angle, 2.5 or 120deg, in rad."""
     try:
         return _number(str(text), None)
     except ValueError:
@@ -174,7 +175,8 @@ def angles(scene, option: str, text: str | None) -> tuple[float, ...] | None:
 
 
 def joint_limits(text: str | None, scene) -> float | list[tuple[float, float]] | None:
-    """--within: 2.5 or 120deg for all joints, -0.5:2 from low to high, or some of these, 1,-0.5:2, one for each."""
+    """Return the limits of --within, rad: 2.5 or 120deg for all joints, -0.5:2 from low to high, or one of these for each,
+    1,-0.5:2."""
     if text is None:
         return None
     pairs = []
@@ -195,7 +197,7 @@ ExtentOption = Annotated[
 
 
 def amplitude_kind(scene) -> str | None:
-    """Of `numbers`: what an amplitude of the scene's gait is, None if it is an angle."""
+    """Return the ``angle`` of `numbers` for an amplitude of the scene's gait."""
     from geomech.scene.key import angles_of
 
     if "amplitude" in angles_of(type(scene.gait)):
@@ -204,7 +206,7 @@ def amplitude_kind(scene) -> str | None:
 
 
 def parameter_kind(scene, parameter: str) -> str | None:
-    """Of `numbers`: what a scene's parameter is (`geomech.study.sweep`), None if it is an angle in rad."""
+    """Return the ``angle`` of `numbers` for a scene's parameter (`geomech.study.sweep`)."""
     from geomech.scene.key import angles_of
 
     section, *_, key = parameter.split(".") if "." in parameter else (parameter, "")
@@ -223,7 +225,7 @@ def parameter_kind(scene, parameter: str) -> str | None:
 
 
 def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
-    """0.5,1.0 or START:STOP:COUNT, all finite; angle: of `numbers`."""
+    """Return the numbers of 0.5,1.0 or START:STOP:COUNT, all finite. angle: as for `numbers`."""
     parts = text.split(":")
     if len(parts) == 1:
         values = numbers(option, text, angle=angle)
@@ -238,21 +240,26 @@ def spread(option: str, text: str, angle: str | None = NO_ANGLE) -> list[float]:
     return values
 
 
-def parameters(over: Sequence[str], scene, most: int | None = None) -> dict[str, list[float]]:
-    """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. most: parameters that a figure takes."""
+def parameters(over: Sequence[str], scene, drawn: bool = False) -> dict[str, list[float]]:
+    """Return the values by parameter of texts such as gait.amplitude=0.5:1.5:3. drawn: in a figure, which takes one or two."""
     axes = {}
     for text in over:
         parameter, equals, values = text.partition("=")
         if not equals or parameter in axes:
             raise Refusal(f"--over {text!r}", instead="give each parameter once, as PARAM=START:STOP:COUNT")
         axes[parameter] = values
-    if most is not None and len(axes) > most:
+    if drawn and len(axes) > 2:
         raise Refusal(f"cannot draw {len(axes)} parameters", instead="sweep one or two, or leave --plot out")
     return {p: spread(f"--over {p}", values, parameter_kind(scene, p)) for p, values in axes.items()}
 
 
-def caps(text: str) -> float | str:
-    """e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
+def column_names(text: str | None) -> tuple[str, ...]:
+    """Return the names in T,A1,A2; none for an option that is left out."""
+    return () if text is None else tuple(text.split(","))
+
+
+def parse_end_caps(text: str) -> float | str:
+    """Return e of the rod's ends (`rft.EndCaps`), 0 to leave them out, or "fitted"."""
     if text in ("left-out", "fitted"):
         return 0.0 if text == "left-out" else text
     try:

@@ -23,37 +23,40 @@ if TYPE_CHECKING:  # commands start without NumPy
 
 @dataclass(frozen=True)
 class Output:
-    """A file that a command writes, or a folder that it fills; path: None where it is not asked for.
+    """A file that a command writes, or a folder that it fills.
 
-    check: refuses a name that cannot be one, such as of another format. said: a line that is printed behind the result."""
+    path: None where it is not requested. check: refuses a name that cannot be one, such as of another format. message: builds
+    the line that is printed after the result."""
 
     path: Path | None
     write: Callable[[Result, Path], None]
     check: Callable[[Path], Any] = lambda path: None
-    said: Callable[[Result, Path], str] | None = None
+    message: Callable[[Result, Path], str] | None = None
     folder: bool = False
 
 
 def execute(
     question: Question, *outputs: Output, as_json: bool = False, yes: bool = False, silent: bool = False
 ) -> None:
-    """Answer a question as a command does. silent: what is asked for is in its outputs, nothing is printed."""
-    wanted = [output for output in outputs if output.path is not None]
-    for output in wanted:
+    """Answer a question as a command does: check, cost, compute, write, print.
+
+    yes: whatever it costs. silent: nothing is printed, the outputs hold the result."""
+    requested = [output for output in outputs if output.path is not None]
+    for output in requested:
         output.check(output.path)
     inputs = question.inputs()
     question.check()
-    _check_outputs(wanted, inputs)
-    with contextlib.ExitStack() as under:
-        bar = under.enter_context(_course(question, wanted, inputs, yes))
-        places = [_place(output, inputs, under) for output in wanted]
+    _check_outputs(requested, inputs)
+    with contextlib.ExitStack() as stack:
+        bar = stack.enter_context(_computing(question, requested, inputs, yes))
+        places = [_place(output, inputs, stack) for output in requested]
         result = question.answer(bar, lambda cost: allow(question, cost, yes))
-        for output, place in zip(wanted, places):
+        for output, place in zip(requested, places):
             output.write(result, place)
     for line in result.attributes.get("notes", ()):
         note(line)
     if not silent:
-        _print(result, wanted, as_json)
+        _print(result, requested, as_json)
 
 
 def show(lines: Iterable[str]) -> None:
@@ -63,9 +66,9 @@ def show(lines: Iterable[str]) -> None:
 
 
 def allow(question: Question, cost: Cost, yes: bool) -> None:
-    """Say what is to come if it takes long or otherwise than expected; Refusal, which says what to do else, if it takes
-    too long to be begun without --yes: here, or in its first second (`geomech.run.cost.decide`). From here on "auto" is the
-    back end for that many balances."""
+    """Print the cost of a question if it takes long; Refusal, with what to do instead, if it takes too long to begin without
+    --yes: here, or in its first second (`geomech.run.cost.decide`). From here on "auto" is the back end for that many
+    balances."""
     from geomech.run.backend import prefer_for
     from geomech.run.cost import decide
 
@@ -74,7 +77,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
     def judge(cost: Cost) -> None:
         cost.check(scene.name, yes, question.less)
         if not cost.small or cost.seconds >= question.worth_saying:
-            terminal.tell(f"{scene.name}: {cost}")
+            terminal.report(f"{scene.name}: {cost}")
 
     prefer_for(cost.as_balances)
     decide(cost, judge)
@@ -82,7 +85,7 @@ def allow(question: Question, cost: Cost, yes: bool) -> None:
 
 
 def _note(scene: Any) -> None:
-    """Say what is likely not meant, once a command."""
+    """Warn of what is likely not meant, once a command."""
     from geomech.text.system import notes
 
     for line in notes(scene.system) if hasattr(scene, "system") else ():  # an intruder scene has no system
@@ -107,32 +110,32 @@ class _Unused(Exception):
 
 
 @contextlib.contextmanager
-def _course(question: Question, outputs: list[Output], inputs: list[Path], yes: bool) -> Iterator[Callable]:
-    """Show how far a question is, once its cost is allowed, and store what is done of it beside its first output or, of what
-    is only printed, in the user's cache folder; the same command resumes from there."""
-    with contextlib.ExitStack() as under:
-        bar = under.enter_context(terminal.progress(question.title)) if hasattr(question, "scene") else _quiet
+def _computing(question: Question, outputs: list[Output], inputs: list[Path], yes: bool) -> Iterator[Callable]:
+    """Show the progress of a question, once its cost is allowed, and store finished tasks next to its first output or, of
+    results that are only printed, in the user's cache folder; the same command resumes from there."""
+    with contextlib.ExitStack() as stack:
+        bar = stack.enter_context(terminal.progress(question.title)) if hasattr(question, "scene") else _quiet
         cost = question.cost()
         if cost is None:
             _note(getattr(question, "scene", None))
         else:
             allow(question, cost, yes)
-            under.enter_context(storing(question, next((output.path for output in outputs), None), inputs))
+            stack.enter_context(storing(question, next((output.path for output in outputs), None), inputs))
         yield bar
 
 
-def behind(words: str) -> Callable[[Result, Path], str]:
-    """Return what prints some words before an output's path."""
+def path_message(words: str) -> Callable[[Result, Path], str]:
+    """Return the message of an output: some words before its path."""
     return lambda result, path: f"{words} {path}"
 
 
-def _quiet(done: float) -> None: ...
+def _quiet(fraction: float) -> None: ...
 
 
 @contextlib.contextmanager
 def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iterator[None]:
-    """Store what is computed in the body of the statement; at its end nothing is stored any more. Refusal while another
-    computation to the output is under way."""
+    """Store the results of tasks that run in the body of the statement; at its end they are removed. Refusal while another
+    computation for the output is running."""
     from geomech.run import jobs, store
     from geomech.run.digest import digest
 
@@ -143,9 +146,9 @@ def storing(question: Question, output: Path | None, inputs: list[Path]) -> Iter
         yield
 
 
-def _place(output: Output, inputs: list[Path], under: contextlib.ExitStack) -> Path:
-    """Return where an output is written: a folder is filled elsewhere, and appears whole or not at all."""
-    return under.enter_context(atomic_folder(output.path, inputs)) if output.folder else output.path
+def _place(output: Output, inputs: list[Path], stack: contextlib.ExitStack) -> Path:
+    """Return the path to write to: a folder is filled elsewhere, and appears whole or not at all."""
+    return stack.enter_context(atomic_folder(output.path, inputs)) if output.folder else output.path
 
 
 def _print(result: Result, outputs: list[Output], as_json: bool) -> None:
@@ -156,5 +159,5 @@ def _print(result: Result, outputs: list[Output], as_json: bool) -> None:
         return
     print(text.text(result))
     for output in outputs:
-        if output.said:
-            print(output.said(result, output.path))
+        if output.message:
+            print(output.message(result, output.path))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.names import scene_names
 from geomech.commands.options import FolderOption, MediumOption, YesOption, with_workers
 from geomech.commands.pipeline import Output, execute
@@ -26,10 +26,10 @@ def run(
     medium: MediumOption = None,
     yes: YesOption = False,
 ):
-    """Everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
+    """Compute everything: connection, CCF map and displacement against amplitude, as figures and numbers, into DIR."""
     from geomech.output import report
     from geomech.study.report import Report
 
-    question = Report(loaded(name, medium=medium))
+    question = Report(load_scene(name, medium=medium))
     folder = Output(out, report.write, lambda path: report.refuse_folder(question.scene, path), report.files, True)
     execute(question, folder, yes=yes)

@@ -6,17 +6,17 @@ from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.names import shown_names
-from geomech.commands.pipeline import show as shown
+from geomech.commands.names import printable_names
+from geomech.commands.pipeline import show as print_lines
 
 
 def scenes(
     show: Annotated[
         Optional[str],
-        typer.Option(metavar="NAME", help="print this scene's or medium's TOML", autocompletion=shown_names),
+        typer.Option(metavar="NAME", help="print this scene's or medium's TOML", autocompletion=printable_names),
     ] = None,
 ):
-    """The scenes that ship with the toolkit, and the named media."""
-    from geomech.text.scenes import listing, toml_of
+    """List the scenes that ship with the toolkit, and the named media."""
+    from geomech.text.scenes import lines
 
-    shown(listing() if show is None else [toml_of(show)])
+    print_lines(lines(show))

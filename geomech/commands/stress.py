@@ -25,7 +25,8 @@ def stress(
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ):
-    """Stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig. 7)."""
+    """Compute the stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig.
+    7)."""
     from geomech.output import pictures
     from geomech.study.stress import Stress
 

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded_moving
+from geomech.commands.loading import load_moving
 from geomech.commands.options import PlotOption, SceneArgument, YesOption, parameters, with_workers
-from geomech.commands.pipeline import Output, behind, execute
+from geomech.commands.pipeline import Output, execute, path_message
 
 
 @with_workers
@@ -21,13 +21,15 @@ def sweep(
     plot: PlotOption = None,
     yes: YesOption = False,
 ):
-    """Net displacement, or speed of a robot that walks, over a grid of the scene's parameters. What is done is kept if
-    interrupted, and taken up again."""
+    """Compute the net displacement, or the speed of a robot that walks, over a grid of the scene's parameters. A repeated
+    command resumes an interrupted one."""
     from geomech.io.results import write_netcdf
     from geomech.output import pictures
     from geomech.study.sweep import Sweep, as_stored
 
-    scene = loaded_moving(name)
-    axes = parameters(over, scene, 2 if plot else None)
-    file = Output(out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, behind("results in"))
+    scene = load_moving(name)
+    axes = parameters(over, scene, drawn=plot is not None)
+    file = Output(
+        out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, path_message("results in")
+    )
     execute(Sweep(scene, axes), file, Output(plot, pictures.sweep, pictures.check), yes=yes)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import SceneArgument
 from geomech.commands.pipeline import show
 
@@ -16,7 +16,7 @@ def symbolic(
     latex: Annotated[bool, typer.Option("--latex", help="LaTeX, for a paper")] = False,
     ccf: Annotated[bool, typer.Option(help="the CCF of every two joints, too")] = True,
 ):
-    """The connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
+    """Print the connection in closed form, and its CCF: of chains in a viscous or ideal fluid, afloat, on wheels."""
     from geomech.text.formulas import formulas
 
-    show(formulas(loaded(name), ccf, latex))
+    show(formulas(load_scene(name), ccf, latex))

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from geomech.commands import formats
-from geomech.commands.asked import loaded
+from geomech.commands.loading import load_scene
 from geomech.commands.options import CyclesOption, SceneArgument, YesOption
-from geomech.commands.pipeline import Output, behind, execute
+from geomech.commands.pipeline import Output, execute, path_message
 
 
 def trajectory(
@@ -19,8 +19,12 @@ def trajectory(
     cycles: CyclesOption = 1,
     yes: YesOption = False,
 ):
-    """Where the body is at every phase of the scene's gait: pose, joint angles and ends of all links, as CSV."""
+    """Write pose, joint angles and ends of all links at every phase of the scene's gait, as CSV."""
     from geomech.output import trajectories
     from geomech.study.motion import Trajectory
 
-    execute(Trajectory(loaded(name), cycles), Output(out, trajectories.write, formats.csv, behind("table in")), yes=yes)
+    execute(
+        Trajectory(load_scene(name), cycles),
+        Output(out, trajectories.write, formats.csv, path_message("table in")),
+        yes=yes,
+    )

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from geomech.commands.asked import scene_with_gait
+from geomech.commands.loading import load_with_gait
 from geomech.commands.options import JsonOption, SceneArgument, angles
 from geomech.commands.pipeline import execute
 
@@ -17,9 +17,9 @@ def velocity(
     alphadot: Annotated[str, typer.Option(help="joint rates in rad per unit time, such as 1,0, or in deg")],
     as_json: JsonOption = False,
 ):
-    """Body velocity for one shape and its rate of change, with its residual and status."""
+    """Compute the body velocity for one shape and its rate of change, with its residual and status."""
     from geomech.study.velocity import Velocity
 
-    scene = scene_with_gait(name)
+    scene = load_with_gait(name)
     question = Velocity(scene, angles(scene, "--alpha", alpha), angles(scene, "--alphadot", alphadot))
     execute(question, as_json=as_json)

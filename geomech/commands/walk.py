@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Optional
 
 import typer
 
-from geomech.commands.asked import loaded_walker
+from geomech.commands.loading import load_walker
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, folder
 from geomech.commands.pipeline import Output, execute
 
@@ -27,12 +26,12 @@ def walk(
     ] = None,
     yes: YesOption = False,
 ):
-    """How a robot walks on grains: mean speed with its error, and its way from rest. SI units, pitch in rad, nose down."""
+    """Compute how a robot walks on grains: mean speed with its error, and its motion from rest. SI units, pitch in rad, nose
+    down."""
     from geomech.output import animate as film
     from geomech.output import walks
-    from geomech.run.cost import LONGEST
     from geomech.study.walking import Walking
 
-    question = Walking(loaded_walker(name), engine, math.inf if yes else LONGEST)
+    question = Walking(load_walker(name), engine, limited=not yes)
     results, picture = Output(out, walks.write, folder=True), Output(animate, walks.film, film.check_format)
     execute(question, results, picture, as_json=as_json, yes=yes)

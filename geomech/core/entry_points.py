@@ -53,7 +53,7 @@ def _load(registry: Registry, where: str, name: str, entries: list[EntryPoint]) 
         ) from error
     with located(where), located(f"{name!r} of {packages}"):
         if not registry.admits(part):
-            raise Refusal(f"{getattr(part, '__name__', part)} is not {registry.told}")
+            raise Refusal(f"{getattr(part, '__name__', part)} is not {registry.noun}")
         if getattr(part, registry.key, name) != name:
             raise Refusal(f"its {registry.key} is {getattr(part, registry.key)!r}", instead="give both one name")
         registry.put(part, name)

@@ -1,7 +1,6 @@
-"""Methods that other modules add to values: how a notebook shows them, how they are saved and loaded.
+"""Methods of values that their classes do not need to know: how they are shown, saved and loaded.
 
-`geomech.face` registers them as the package is imported, before the classes of the values exist; the classes do not
-depend on them.
+`geomech.face` registers them as the package is imported, before the classes of the values exist.
 """
 
 from __future__ import annotations

@@ -19,25 +19,28 @@ SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after an infeasible loop or no 
 
 
 def ascend(
-    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, most: int = 100, tolerance: float = 1e-6,
+    cycles: Callable, aim: Aim, p: np.ndarray, *, turn: float = 0.0, max_steps: int = 100, tolerance: float = 1e-6,
     stroke: bool = False, singularity: Callable | None = None, away: float = 0.0, on_cycle: Callable = lambda: None,
     even: float = EVEN,
 ) -> np.ndarray:  # fmt: skip
     """Return the loop with the locally largest ``aim`` that an ascent from the loop ``p`` reaches.
 
-    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. most: steps.
+    cycles: `Phases` or `Runs`. turn (rad): largest net turn of a cycle, for aims that are distances. max_steps: steps.
     stroke: the loop is a `Stroke`, and stays one. singularity: a function of shapes that is 0 at singular ones; it
     stays at least ``away`` from 0. on_cycle: called after every cycle. even: see `Problem`."""
-    problem, once = Problem(cycles, aim, p, on_cycle, TRIES * most, even), Stroke(cycles.loops, p) if stroke else None
-    constraints = problem.constraints(turn, once, singularity, away)
-    same = lambda x: once is None or once.winding(problem.loop(x)) == 1
-    x, remaining, stride = problem.first, most, STRIDE
+    problem, once_round = (
+        Problem(cycles, aim, p, on_cycle, TRIES * max_steps, even),
+        Stroke(cycles.loops, p) if stroke else None,
+    )
+    constraints = problem.constraints(turn, once_round, singularity, away)
+    is_same_stroke = lambda x: once_round is None or once_round.winding(problem.loop(x)) == 1
+    x, remaining, stride = problem.first, max_steps, STRIDE
     while remaining > 0 and stride > SHORTEST * STRIDE:
-        ascent = _Ascent(problem.objective, constraints, same)
+        ascent = _Ascent(problem.objective, constraints, is_same_stroke)
         end = ascent.run(x, stride, p.size, min(remaining, TOGETHER), tolerance)
-        begun, x = x, x if ascent.best is None else ascent.best
+        previous, x = x, x if ascent.best is None else ascent.best
         remaining = 0 if end == "spent" else remaining - max(ascent.steps, 1)
-        moved = np.abs(x - begun)[: p.size].max()
+        moved = np.abs(x - previous)[: p.size].max()
         if end == "converged" and moved < stride * (1 - 1e-6):
             break
         stride *= (SHORTER if end == "infeasible" else 1.0) * (SHORTER if moved == 0 else 1.0)
@@ -82,11 +85,11 @@ def _shortest(constraints: list[tuple]) -> np.ndarray:
 class _Ascent:
     """A recorder of iterates: it stores the best feasible one, or the last where none was feasible."""
 
-    def __init__(self, objective: Callable, constraints: list[dict], same: Callable):
-        self.objective, self.constraints, self.same, self.best, self.least, self.steps = (
+    def __init__(self, objective: Callable, constraints: list[dict], is_same_stroke: Callable):
+        self.objective, self.constraints, self.is_same_stroke, self.best, self.least, self.steps = (
             objective,
             constraints,
-            same,
+            is_same_stroke,
             None,
             np.inf,
             -1,
@@ -94,7 +97,7 @@ class _Ascent:
 
     def __call__(self, x: np.ndarray) -> None:
         self.steps += 1
-        if not self.same(x):
+        if not self.is_same_stroke(x):
             raise RuntimeError("a loop of another number of strokes")
         value = (
             self.objective(x)[0]
@@ -104,8 +107,8 @@ class _Ascent:
         if value < self.least or (self.least == np.inf and np.isfinite(x).all()):
             self.best, self.least = np.array(x), value
 
-    def run(self, x: np.ndarray, stride: float, moving: int, most: int, tolerance: float) -> str:
-        """Run at most ``most`` steps from x, with the first ``moving`` numbers within ``stride`` of it, and return how
+    def run(self, x: np.ndarray, stride: float, moving: int, max_steps: int, tolerance: float) -> str:
+        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``stride`` of it, and return how
         they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke; or "spent".
         """
         from scipy.optimize import minimize
@@ -116,9 +119,15 @@ class _Ascent:
             with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds
                 warnings.filterwarnings("ignore", "Values in x were outside bounds", RuntimeWarning)
                 solution = minimize(
-                    self.objective, x, jac=True, method="SLSQP", constraints=self.constraints,
-                    bounds=np.stack([x - radius, x + radius], -1), options={"maxiter": most, "ftol": tolerance}, callback=self,
-                )  # fmt: skip
+                    self.objective,
+                    x,
+                    jac=True,
+                    method="SLSQP",
+                    constraints=self.constraints,
+                    bounds=np.stack([x - radius, x + radius], -1),
+                    options={"maxiter": max_steps, "ftol": tolerance},
+                    callback=self,
+                )
         except Enough:
             return "spent"
         except RuntimeError:

@@ -10,8 +10,6 @@ import numpy as np
 from geomech.gaits import Gait, Sine
 from geomech.optimise.request import Request
 from geomech.scene.model import Scene
-from geomech.scene.write import gait_table
-from geomech.systems.base import length_unit
 from geomech.systems.capabilities import stored_table
 
 
@@ -65,30 +63,3 @@ class Optimum:
             return scene
         largest = np.abs(gait.shape(np.linspace(0, 2 * np.pi, 721))).max()
         return scene.with_numerics(extent=max(scene.numerics.extent, 1.0001 * float(largest)))
-
-    def numbers(self) -> dict:
-        """Return the numbers of the JSON output; the value of a distance is over the body's length, the displacement is
-        not."""
-        b, system = self.best, self.scene.system
-        aim, unit = self.request.aim.unit, length_unit(system)
-        return {
-            "objective": self.request.aim.name,
-            "value": b.value,
-            "start_value": self.start.value,
-            "displacement": b.displacement.tolist(),
-            "path_length": b.length,
-            "work": b.work,
-            "gait": gait_table(b.gait),
-            "evaluations": self.evaluations,
-            "seconds": self.seconds,
-            "active": list(self.active),
-            "answers": [list(x) for x in self.answers + self.others],
-            "estimate": b.error,
-            "body_length": float(system.length),
-            "units": {
-                **dict.fromkeys(("value", "start_value", "estimate"), aim),
-                "displacement": [unit, unit, "rad"],
-                "body_length": unit,
-                "seconds": "s",
-            },
-        }

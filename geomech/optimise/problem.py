@@ -25,13 +25,13 @@ class Problem:
     cycles: `Phases` or `Runs`; `Enough` is raised after ``most``. on_cycle: called after every cycle. even: weight of
     the penalty of uneven pacing and long loops, as a share of the value."""
 
-    def __init__(self, cycles, aim: Aim, p: np.ndarray, on_cycle: Callable, most: float, even: float = EVEN):
+    def __init__(self, cycles, aim: Aim, p: np.ndarray, on_cycle: Callable, max_cycles: float, even: float = EVEN):
         self.cycles, self.aim, self.loops, self.on_cycle, self.last = (
             cycles,
             aim,
             cycles.loops,
             on_cycle,
-            cycles.count + most,
+            cycles.count + max_cycles,
         )
         self.unit, self.shape, self.count = cycles.loops.unit, p.shape, p.size
         self.paced = aim.timed and aim.rate is not None
@@ -83,11 +83,11 @@ class Problem:
         return slower, slower / P / self.cycles.degree * dP
 
     def constraints(
-        self, turn: float, once: Stroke | None, singularity: Callable | None, away: float, dense: bool = False
+        self, turn: float, stroke: Stroke | None, singularity: Callable | None, away: float, dense: bool = False
     ) -> list[dict]:
         """Return the constraints, as `scipy.optimize.minimize` takes them.
 
-        turn (rad): largest net turn of a cycle. once: the stroke that the loop stays. singularity: a function of
+        turn (rad): largest net turn of a cycle. stroke: the stroke that the loop stays. singularity: a function of
         shapes, at least ``away`` from 0. dense: limits hold between phases, too."""
         out = [_limits(self, dense)]
         if self.paced:
@@ -96,7 +96,7 @@ class Problem:
         theta = self.values_at(self.first).net[1][2]
         if self.aim.straight and np.abs(theta).max() > STRAIGHT**2:  # else no loop near turns, as with sines
             out += _straight(self, turn)
-        out += [] if once is None else [_once(self, once)]
+        out += [] if stroke is None else [_one_stroke(self, stroke)]
         return out + ([] if singularity is None else [_away(self, singularity, away)])
 
 
@@ -110,33 +110,37 @@ def _linear(A: np.ndarray, limit) -> dict:
     return {"type": "ineq", "fun": lambda x: limit - A @ x, "jac": lambda x: -A}
 
 
-def _limits(of: Problem, dense: bool) -> dict:
+def _limits(problem: Problem, dense: bool) -> dict:
     """Return the constraint that no shape exceeds its limits."""
-    A, limit = of.loops.limits(dense)
-    return _linear(of.slopes(A.reshape(-1, *of.shape)), limit)
+    A, limit = problem.loops.limits(dense)
+    return _linear(problem.slopes(A.reshape(-1, *problem.shape)), limit)
 
 
-def _rates(of: Problem) -> dict:
+def _rates(problem: Problem) -> dict:
     """Return the constraint that no shape variable is faster than the limit, in the time that the last of x sets."""
-    A = np.concatenate([np.kron(of.loops.rates, one) for one in np.eye(of.loops.joints)[:, None]])
-    A = of.slopes(np.concatenate([A, -A]).reshape(-1, *of.shape))
-    A[:, -1] = -of.aim.rate * of.time
+    A = np.concatenate([np.kron(problem.loops.rates, unit) for unit in np.eye(problem.loops.joints)[:, None]])
+    A = problem.slopes(np.concatenate([A, -A]).reshape(-1, *problem.shape))
+    A[:, -1] = -problem.aim.rate * problem.time
     return _linear(A, 0.0)
 
 
-def _power(of: Problem) -> dict:
+def _power(problem: Problem) -> dict:
     def slopes(x):
-        out = -of.slopes(of.by_power(of.values_at(x))[1])[None]
+        out = -problem.slopes(problem.by_power(problem.values_at(x))[1])[None]
         out[:, -1] = 1.0
         return out
 
-    return {"type": "ineq", "fun": lambda x: np.array([x[-1] - of.by_power(of.values_at(x))[0]]), "jac": slopes}
+    return {
+        "type": "ineq",
+        "fun": lambda x: np.array([x[-1] - problem.by_power(problem.values_at(x))[0]]),
+        "jac": slopes,
+    }
 
 
-def _straight(of: Problem, turn: float) -> list[dict]:
+def _straight(problem: Problem, turn: float) -> list[dict]:
     """Return the constraints of a net turn of at most ``turn`` in either sense, or of none."""
-    theta = lambda x: np.array([of.values_at(x).net[0][2]])
-    slopes = lambda x: of.slopes(of.values_at(x).net[1][2])[None]
+    theta = lambda x: np.array([problem.values_at(x).net[0][2]])
+    slopes = lambda x: problem.slopes(problem.values_at(x).net[1][2])[None]
     if turn < STRAIGHT:
         return [{"type": "eq", "fun": theta, "jac": slopes}]
     return [
@@ -145,20 +149,20 @@ def _straight(of: Problem, turn: float) -> list[dict]:
     ]
 
 
-def _once(of: Problem, stroke: Stroke) -> dict:
+def _one_stroke(problem: Problem, stroke: Stroke) -> dict:
     """Return the constraint that the loop never goes back."""
-    swept, slopes = lambda x: stroke.swept(of.loop(x)), lambda x: of.slopes(stroke.slopes(of.loop(x)))
+    swept, slopes = lambda x: stroke.swept(problem.loop(x)), lambda x: problem.slopes(stroke.slopes(problem.loop(x)))
     return {"type": "ineq", "fun": swept, "jac": slopes}
 
 
-def _away(of: Problem, singularity: Callable, least: float) -> dict:
+def _away(problem: Problem, singularity: Callable, distance: float) -> dict:
     """Return the constraint that shapes stay on one side of the singular ones, at a distance."""
-    shapes, h = lambda x: of.loops.cycle(of.loop(x))[0], 1e-6
-    side, steps = np.sign(singularity(shapes(of.first))[0]), h * np.eye(of.loops.joints)
+    shapes, h = lambda x: problem.loops.cycle(problem.loop(x))[0], 1e-6
+    side, steps = np.sign(singularity(shapes(problem.first))[0]), h * np.eye(problem.loops.joints)
 
     def slopes(x):
         alpha = shapes(x)
         by = [(singularity(alpha + e) - singularity(alpha - e)) / (2 * h) for e in steps]
-        return of.slopes(side * np.einsum("nk,nj->nkj", of.loops.basis, np.stack(by, -1)))
+        return problem.slopes(side * np.einsum("nk,nj->nkj", problem.loops.basis, np.stack(by, -1)))
 
-    return {"type": "ineq", "fun": lambda x: side * singularity(shapes(x)) - least, "jac": slopes}
+    return {"type": "ineq", "fun": lambda x: side * singularity(shapes(x)) - distance, "jac": slopes}

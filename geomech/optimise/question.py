@@ -7,6 +7,7 @@ from functools import cached_property
 
 from geomech.core.variables import Result, Variable
 from geomech.optimise.limits import WithinArgument
+from geomech.optimise.optimum import Optimum
 from geomech.optimise.request import Request, checked
 from geomech.optimise.search import search
 from geomech.run.cost import Cost
@@ -54,15 +55,20 @@ class Optimize(Question):
         return self.request.cost()
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        optimum = search(self.request, progress)
-        best, aim, unit = optimum.best, self.request.aim, length_unit(self.scene.system)
-        variables = [Variable("value", (), best.value, aim.unit, aim.name, best.error)]
-        variables += [
-            Variable(name, (), x, u, "net displacement per cycle")
-            for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad"))
-        ]
-        costs = (("path_length", best.length), ("work", best.work))
-        variables += [Variable(name, (), x) for name, x in costs if x is not None]
-        return Result(
-            "optimum", tuple(variables), {"active": optimum.active, "evaluations": optimum.evaluations}, optimum
-        )
+        return result_of(search(self.request, progress))
+
+
+def result_of(optimum: Optimum) -> Result:
+    """Return an optimum as variables; the value of a distance is over the body's length, the displacement is not."""
+    best, aim, unit = optimum.best, optimum.request.aim, length_unit(optimum.scene.system)
+    variables = [
+        Variable("value", (), best.value, aim.unit, aim.name, best.error),
+        Variable(
+            "start_value", (), optimum.start.value, aim.unit, f"{aim.name} of the scene's gait", optimum.start.error
+        ),
+    ]
+    for name, x, u in zip(("x", "y", "theta"), best.displacement, (unit, unit, "rad")):
+        variables.append(Variable(name, (), x, u, "net displacement per cycle"))
+    for name, x in (("path_length", best.length), ("work", best.work)):
+        variables += [] if x is None else [Variable(name, (), x)]
+    return Result("optimum", tuple(variables), {"active": optimum.active, "evaluations": optimum.evaluations}, optimum)

@@ -160,8 +160,8 @@ class Request:
         """
         if not self.looks_up:
             return self.starts
-        more = self.starts + LED + 3 * MORE if self.starts > 1 else 0
-        return self.starts + min(FINISHED, self.starts) + 1 + more
+        extra = self.starts + LED + 3 * MORE if self.starts > 1 else 0
+        return self.starts + min(FINISHED, self.starts) + 1 + extra
 
     @property
     def extent(self) -> float:

@@ -15,7 +15,7 @@ from geomech.output import plots
 from geomech.output.plots.style import styled
 from geomech.run.cost import Cost
 from geomech.run.progress import counted
-from geomech.run.progress import progress as shown
+from geomech.run.progress import progress as progress_bar
 from geomech.scene.model import Scene
 from geomech.study.motion import Motion, Picture
 from rft.refusal import Refusal
@@ -29,7 +29,7 @@ FRAME = 4e5  # bytes a frame holds until the film is written
 
 
 def check_format(path: Path) -> None:
-    """Refusal for a name that does not end as a film or a figure, or for a film that nothing here can write."""
+    """Refuse a name that does not end as a film or a figure, or a film that nothing here can write."""
     ending = path.suffix.lower()
     if ending not in FILMS + STRIPS:
         raise Refusal(
@@ -48,13 +48,13 @@ def is_film(path: Path) -> bool:
 
 
 def rows(phases: int, cycles: int) -> np.ndarray:
-    """Of a motion, those that are drawn: the cycle's end is the next one's start, and the last one's is left out."""
+    """Return the rows of a motion that are drawn: a cycle's end is the next one's start, and the last end is left out."""
     step = max(1, -(-phases // FRAMES))
     return np.arange(0, phases * cycles, step)
 
 
 def cost(phases: int, cycles: int) -> Cost:
-    """Of a film."""
+    """Return the cost of drawing a film."""
     frames = len(rows(phases, cycles))
     return Cost(0, DRAWING * frames, FRAME * frames, DRAWING * frames)
 
@@ -67,50 +67,50 @@ def picture(scene: Scene, path: Path, cycles: int | None) -> Picture:
 
 def write(result: Result, path: Path) -> None:
     """Write the film or strip of a motion."""
-    with shown(f"film of {result.subject[0].scene.name}") as bar:
+    with progress_bar(f"film of {result.subject[0].scene.name}") as bar:
         save(path, *result.subject, progress=bar)
 
 
 def save(path: Path, motion: Motion, field=None, error=None, progress: Callable | None = None) -> None:
-    """The film or strip of a motion, beside its shapes on a map of the CCF if there is one; whole or not at all."""
+    """Write the film or strip of a motion, next to its shapes on a map of the CCF if there is one; whole or not at all."""
     if not is_film(path):
         plots.save(plots.filmstrip(motion, field, error), path)
         return
-    some = rows(motion.scene.numerics.phases, motion.cycles)
-    film = counted(_frames(motion, some, field, error), len(some), progress)
+    drawn = rows(motion.scene.numerics.phases, motion.cycles)
+    film = counted(_frames(motion, drawn, field, error), len(drawn), progress)
     with atomic_file(path) as part:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(part, film)
 
 
-def _frames(motion: Motion, shown: np.ndarray, field, error) -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3), bytes. What stands still is drawn once."""
-    canvas, put, still = _set(motion, shown, field, error)
-    for row in shown:
-        canvas.restore_region(still)
-        for artist in put(row):
+def _frames(motion: Motion, rows: np.ndarray, field, error) -> Iterator[np.ndarray]:
+    """Yield pictures (height, width, 3), bytes. Artists that stand still are drawn once."""
+    canvas, update, background = _set(motion, rows, field, error)
+    for row in rows:
+        canvas.restore_region(background)
+        for artist in update(row):
             artist.axes.draw_artist(artist)
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
 @styled
-def _set(motion: Motion, shown: np.ndarray, field, error):
-    """(canvas, function that moves what moves, what stands still)."""
+def _set(motion: Motion, rows: np.ndarray, field, error):
+    """Return (canvas, function that moves the artists to a row, background)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    fig, put = plots.stage(motion, shown, field, error)
+    fig, update = plots.stage(motion, rows, field, error)
     fig.set_dpi(DOTS)
     canvas = FigureCanvasAgg(fig)
-    moving = put(shown[0])
-    canvas.draw()  # lays out with the longest of what moves in place
+    moving = update(rows[0])
+    canvas.draw()  # lays out with the longest text in place
     fig.set_layout_engine("none")
     for artist in moving:
         artist.set_animated(True)
     canvas.draw()
-    return canvas, put, canvas.copy_from_bbox(fig.bbox)
+    return canvas, update, canvas.copy_from_bbox(fig.bbox)
 
 
 def _gif(path: Path, frames: Iterator[np.ndarray]) -> None:
-    """One palette for all, so that nothing flickers."""
+    """Write a GIF with one palette for all frames, so that nothing flickers."""
     from PIL import Image
 
     first = Image.fromarray(next(frames)).quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
@@ -120,24 +120,24 @@ def _gif(path: Path, frames: Iterator[np.ndarray]) -> None:
 
 
 def _mp4(path: Path, frames: Iterator[np.ndarray]) -> None:
-    """Pictures handed to ffmpeg one by one; Refusal with its own last words if it fails."""
+    """Write an MP4 by handing frames to ffmpeg one by one; Refusal with its last line if it fails."""
     first = next(frames)
-    tall, wide = (2 * (x // 2) for x in first.shape[:2])  # of which its usual colours take even numbers
-    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(RATE), "-i", "-"]
-    made = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
-    command = ["ffmpeg", "-loglevel", "error", *taken, *made]
+    tall, wide = (2 * (x // 2) for x in first.shape[:2])  # its usual colours take even sizes
+    raw_input = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{wide}x{tall}", "-r", str(RATE), "-i", "-"]
+    encoding = ["-an", "-pix_fmt", "yuv420p", "-y", str(path)]
+    command = ["ffmpeg", "-loglevel", "error", *raw_input, *encoding]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, **pipes) as ffmpeg:
         try:
             _hand(ffmpeg.stdin, first, frames, tall, wide)
-            said = ffmpeg.communicate()[1]
+            message = ffmpeg.communicate()[1]
         except BrokenPipeError:
-            said = ffmpeg.stderr.read()
+            message = ffmpeg.stderr.read()
         except BaseException:
             ffmpeg.kill()
             raise
     if ffmpeg.returncode or not path.exists():
-        words = said.decode(errors="replace").strip().splitlines()[-1:] or ["it says nothing"]
+        words = message.decode(errors="replace").strip().splitlines()[-1:] or ["it says nothing"]
         raise Refusal(f"cannot write {path.name}", because=f"ffmpeg failed: {words[0]}", instead="end the name in .gif")
 
 

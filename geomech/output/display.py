@@ -1,4 +1,4 @@
-"""What a notebook shows of results: a line, a small table or a picture, as HTML. Nothing is computed for it."""
+"""Results as HTML for a notebook: a line, a small table or a picture. Nothing is computed for it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DPI = 90
 
 
 def page(line: str, head: Sequence[str] = (), rows: Iterable[Sequence] = (), picture=None) -> str:
-    """A line, a table of at most MOST_ROWS, a Figure."""
+    """Return a line, a table of at most MOST_ROWS rows and a Figure as HTML."""
     rows, cell = list(rows), lambda tag, x: f"<{tag}>{html.escape(printable(_text(x)))}</{tag}>"
     line = html.escape(printable(line))
     parts = [f"<p>{line}</p>"]
@@ -50,33 +50,33 @@ def _encoded(picture) -> str:
 
 
 def connection(fitted: Connection) -> str:
-    """Its rows as arrows over shape space, or its line where shape space is no plane."""
+    """Return the rows of A as arrows over shape space, or a line where shape space is no plane."""
     return page(repr(fitted), picture=plots.connection_figure(fitted) if len(fitted.axes) == 2 else None)
 
 
 def field(values: Field) -> str:
-    """Its components as colours over shape space, as those of a CCF; its line for any other."""
+    """Return the components of a CCF as colours over shape space; a line for any other field."""
     drawn = values.joints == 2 and values.values.shape[0] == 3 and values.values.ndim == 3
     return page(repr(values), picture=plots.ccf_figure(values) if drawn else None)
 
 
 def study(bench: Study) -> str:
-    """Its scene, tiers and, where it is computed already, the CCF with the scene's gait."""
-    scene, held = bench.scene, {key[0] for key in bench.computed}
+    """Return the scene and tiers of a study and, where it is computed already, the CCF with the scene's gait."""
+    scene, computed = bench.scene, {key[0] for key in bench.computed}
     rows = [
         ("system", described(scene.system)[0]),
         ("gait", repr(scene.gait)),
         ("numerics", repr(scene.numerics)),
         ("tiers", ", ".join(bench.tiers)),
-        ("computed", ", ".join(sorted(held)) or "nothing yet"),
+        ("computed", ", ".join(sorted(computed)) or "nothing yet"),
     ]
-    drawn = {"ccf", "error of the ccf"} <= held and scene.system.joints == 2
+    drawn = {"ccf", "error of the ccf"} <= computed and scene.system.joints == 2
     maps = lambda: plots.ccf_figure(bench.curvature, [scene.gait], error=bench.curvature_error)
     return page(f"Study of {scene.name}", (), rows, maps() if drawn else None)
 
 
 def displacements(table: Displacements) -> str:
-    """Return a row an amplitude and tier."""
+    """Return a table with a row for each amplitude and tier."""
     result = table.result
     net, heading = result["net_distance"], result["heading"]
     columns = {f"error ({net.unit})": net.error, "error of heading (rad)": heading.error}
@@ -91,8 +91,8 @@ def displacements(table: Displacements) -> str:
             pose = (float(np.round(result[q].values[j, k], 12)) + 0.0 for q in ("x", "y", "heading"))
             rows.append((amplitude, tier, *pose, *(f"{x[j, k]:{styles.get(n, '.4g')}}" for n, x in columns.items())))
     head = ("amplitude", "tier", f"x ({net.unit})", f"y ({net.unit})", "heading (rad)", *columns)
-    said = f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
-    return page(f"Net displacement per cycle of {table.scene.name}{said}", head, rows)
+    note = f"; estimated error: {table['estimate_is']}" if "estimate_is" in table else ""
+    return page(f"Net displacement per cycle of {table.scene.name}{note}", head, rows)
 
 
 def swept(results: Swept) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from geomech import text
 from geomech.core.errors import choose
 from geomech.core.variables import Result
 from geomech.io.files import note, write_text
@@ -20,7 +21,7 @@ from rft.refusal import Refusal
 
 @dataclass(frozen=True)
 class Connection:
-    """Writes a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
+    """A writer of a connection, as NetCDF or, with an ending of .mat, in sysplotter's layout with this sign and order."""
 
     ending: str
     sign: str | None = None
@@ -52,7 +53,8 @@ def write_tube(result: Result, path: Path) -> None:
 
 
 def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Callable[[Path], Any]]:
-    """Return what writes a scene of a measured gait, whose connection is in the file ``field``, and what checks its name."""
+    """Return a function that writes a scene of a measured gait, whose connection is in the file ``field``, and a check of the
+    name of that scene."""
 
     def check(path: Path) -> None:
         if path.suffix != ".toml":
@@ -65,14 +67,15 @@ def mean_gait(field: Path | None) -> tuple[Callable[[Result, Path], None], Calla
 
 def write_best(result: Result, path: Path) -> None:
     """Write a scene with the best gait."""
-    write_text(path, optimum.scene_toml(result.subject))
+    write_text(path, optimum.scene_toml(result))
 
 
 def write_medium(result: Result, path: Path) -> None:
     """Write a medium that was calibrated."""
-    write_text(path, result.subject.toml())
+    write_text(path, text.medium(result))
 
 
 def about_medium(result: Result, path: Path) -> str:
-    """Return how a scene takes a medium."""
-    return f'medium in {path}: in {result.subject.scene}, [medium] file = "{path.name}"'
+    """Return the line that says how a scene takes a medium."""
+    scene = "a scene" if result.kind == "rod_drag" else "an intruder scene"
+    return f'medium in {path}: in {scene}, [medium] file = "{path.name}"'

@@ -16,6 +16,11 @@ from geomech.systems.base import shape_labels
 from rft.refusal import Refusal
 
 check = plots.check_format
+CALIBRATIONS = {
+    "rod_drag": plots.drag_figure,
+    "plate_drags": plots.plates_figure,
+    "penetration": plots.penetration_figure,
+}
 
 
 def displacement(result: Result, path: Path) -> None:
@@ -48,12 +53,12 @@ def measured(result: Result, path: Path) -> None:
 
 def calibration(result: Result, path: Path) -> None:
     """Draw measurements and the law that was fitted to them."""
-    plots.save(getattr(plots, result.subject.picture)(result.subject.curves()), path)
+    plots.save(CALIBRATIONS[result.kind](result), path)
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """Draws the best gait. stretch: where equal lengths cost the same, too."""
+    """A drawing of the best gait. stretch: where equal lengths cost the same, too."""
 
     stretch: bool
     plot: Path | None
@@ -68,7 +73,7 @@ class Optimum:
 
 @dataclass(frozen=True)
 class Connection:
-    """Draws a connection as arrows or streamlines."""
+    """A drawing of a connection as arrows or streamlines."""
 
     style: str | None
     plot: Path | None
@@ -85,18 +90,18 @@ class Connection:
     def __call__(self, result: Result, path: Path) -> None:
         space: Space = result.subject
         scene = space.study.scene
-        told: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
+        options: dict[str, Any] = {"labels": shape_labels(scene.system), "style": self.style or "quiver"}
         if space.planes:
-            plots.save(plots.plane_connection_figure(space.planes, **told), path)
+            plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
         if space.other:
-            told |= {"beside": space.other.fitted, "names": [scene.frame, self.beside]}
-        plots.save(plots.connection_figure(space.study.fitted, **told), path)
+            options |= {"beside": space.other.fitted, "names": [scene.frame, self.beside]}
+        plots.save(plots.connection_figure(space.study.fitted, **options), path)
 
 
 @dataclass(frozen=True)
 class Ccf:
-    """Draws a CCF with the scene's gait on it, or slices of it."""
+    """A drawing of a CCF with the scene's gait on it, or of slices of it."""
 
     style: str | None
     metric: bool
@@ -116,22 +121,22 @@ class Ccf:
         plots.save(self._slices(space) if space.planes else self._map(space), path)
 
     def _slices(self, space: Space) -> Any:
-        scene, told = space.study.scene, {"style": self.style or "map"}
+        scene, options = space.study.scene, {"style": self.style or "map"}
         if space.other_planes:
-            told |= {"beside": space.other_planes[0], "names": [scene.frame, self.beside]}
-        return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **told)
+            options |= {"beside": space.other_planes[0], "names": [scene.frame, self.beside]}
+        return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **options)
 
     def _map(self, space: Space) -> Any:
         study, scene, other = space.study, space.study.scene, space.other
-        told: dict[str, Any] = {
+        options: dict[str, Any] = {
             "gaits": [scene.gait],
             "error": study.curvature_error,
             "labels": shape_labels(scene.system),
         }
         if self.stretch:
             effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
-            return plots.stretched_figure(study.curvature, stretch.stretch(study.metric), **told, effort=effort)
-        told |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
+            return plots.stretched_figure(study.curvature, stretch.stretch(study.metric), **options, effort=effort)
+        options |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
         if other:
-            told |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.beside]}
-        return plots.ccf_figure(study.curvature, **told)
+            options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.beside]}
+        return plots.ccf_figure(study.curvature, **options)

@@ -1,4 +1,4 @@
-"""What `geomech run` and `geomech accuracy` leave behind: figures, numbers and the scene, in one folder."""
+"""The folder that `geomech run` and `geomech accuracy` write: figures, numbers and the scene."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ SCENE, TABLES = "scene.toml", "displacement.json"
 
 
 def refuse_folder(scene: Scene, folder: Path) -> None:
-    """Refusal if the files of `write` would replace an input, or a scene that no `run` has left in ``folder``."""
-    there = folder / SCENE
-    refuse_inputs([there, folder / TABLES], inputs(scene))
-    if os.path.lexists(there) and not os.path.lexists(folder / TABLES) and not _holds(there, toml(scene)):
+    """Refuse a folder in which `write` would replace an input, or a scene that no `run` has written."""
+    path = folder / SCENE
+    refuse_inputs([path, folder / TABLES], inputs(scene))
+    if os.path.lexists(path) and not os.path.lexists(folder / TABLES) and not _holds(path, toml(scene)):
         raise Refusal(
-            f"cannot write {there}", because="another scene stands there", instead="choose another folder with -o"
+            f"cannot write {path}", because="another scene stands there", instead="choose another folder with -o"
         )
 
 

@@ -7,32 +7,32 @@ from pathlib import Path
 
 from geomech.core.variables import Result
 from geomech.io.files import atomic_file
-from geomech.run.progress import progress as shown
+from geomech.run.progress import progress as progress_bar
 from geomech.study.motion import Motion
 from geomech.systems.base import length_unit, shape_labels
 
 
 def write(result: Result, path: Path) -> None:
-    """Write the table of a motion, and show how much of it is written."""
-    with shown(f"table of {result.subject.scene.name}") as bar:
+    """Write the table of a motion with a progress bar."""
+    with progress_bar(f"table of {result.subject.scene.name}") as bar:
         save(path, result.subject, bar)
 
 
 def save(path: Path, motion: Motion, progress: Callable | None = None) -> None:
-    """Write names of the columns, what they mean and in which units behind '#', then a row a phase, with every digit."""
-    done = 0
+    """Write names of the columns, their meaning and units behind '#', then a row for each phase, with every digit."""
+    written = 0
     with atomic_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n".join([",".join(motion.columns), *(f"# {line}" for line in about(motion))]) + "\n")
         for table in motion.tables():
             for row in table.tolist():
                 file.write(",".join(map(repr, row)) + "\n")
-            done += len(table)
+            written += len(table)
             if progress:
-                progress(done / len(motion.phase))
+                progress(written / len(motion.phase))
 
 
 def about(motion: Motion) -> list[str]:
-    """What the columns are, in lines."""
+    """Return the meaning of the columns, in lines."""
     scene, columns = motion.scene, motion.columns
     system, unit = scene.system, length_unit(scene.system)
     shapes = ", ".join(f"alpha_{k + 1} {name} ({u})" for k, (name, u) in enumerate(shape_labels(system)[:8]))

@@ -1,4 +1,4 @@
-"""How a robot walks, in pictures and films."""
+"""The walk of a robot in pictures and films."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write(result: Result, folder: Path) -> None:
 
 @plots.styled
 def draw(scene: WalkerScene, found: Walked):
-    """Forward speed, height and pitch in time, and the robot at its end."""
+    """Draw forward speed, height and pitch in time, and the robot at its end."""
     w = found.walk
     fig, axes = plots.figure(7.2, 4.6, 2, 2)
     lines = (
@@ -62,7 +62,7 @@ def film(result: Result, path: Path) -> None:
 
 @plots.styled
 def strip(scene: WalkerScene, found: Walked):
-    """The last cycle in pictures."""
+    """Draw the last cycle in pictures."""
     w = found.walk
     times = np.linspace(max(0.0, w.t[-1] - 1 / scene.gait.frequency), w.t[-1], STRIP)
     rows = np.searchsorted(w.t, times - 1e-9).clip(0, len(w.t) - 1)
@@ -73,8 +73,8 @@ def strip(scene: WalkerScene, found: Walked):
 
 
 def _frames(scene: WalkerScene, found: Walked) -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3), bytes, at the pace of the film: MuJoCo's of a walk of three dimensions where there is a GL
-    to draw them with."""
+    """Yield pictures (height, width, 3), bytes, at the rate of the film: by MuJoCo for a walk of three dimensions where there
+    is a GL to draw with."""
     w = found.walk
     last = min(w.t[-1], FRAMES / animate.RATE)
     times = np.arange(0.0, last, max(1 / animate.RATE, last / FRAMES)) if last else np.zeros(1)
@@ -88,30 +88,30 @@ def _drawn(scene: WalkerScene, found: Walked, rows: np.ndarray) -> Iterator[np.n
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     fig, axes = plots.figure(6.4, 2.4)
-    put = _stage(axes[0, 0], scene, found, rows)
+    update = _stage(axes[0, 0], scene, found, rows)
     fig.set_dpi(animate.DOTS)
     canvas = FigureCanvasAgg(fig)
     for row in rows:
-        put(row)
+        update(row)
         canvas.draw()
         yield np.array(canvas.buffer_rgba())[..., :3]
 
 
 def _stage(ax, scene: WalkerScene, found: Walked, rows: np.ndarray):
-    """Ground and axes that hold the robot at these rows of its walk; a function that puts it there at one."""
-    shown = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
-    room, reach = shown.room * 1.1, shown.reach
+    """Draw the ground on axes that hold the robot at these rows of its walk; return a function that draws it at one."""
+    robot = _Solid(scene, found) if found.walk.spatial else _Flat(scene, found)
+    room, reach = robot.room * 1.1, robot.reach
     x = found.walk.pose[rows, 0]
     ax.axhspan(-3 * reach, 0.0, color="peru", alpha=0.35, lw=0)
     limits = {"xlim": (x.min() - room, x.max() + room), "ylim": (-1.2 * reach, 3.2 * reach)}
     ax.set(**limits, aspect="equal", xlabel="$x$ (m)", ylabel="$z$ (m)")
-    draw, label = shown.on(ax), ax.set_title("", loc="left", fontsize=8)
+    draw, label = robot.on(ax), ax.set_title("", loc="left", fontsize=8)
 
-    def put(row):
+    def update(row):
         draw(row)
         label.set_text(f"t = {found.walk.t[row]:.2f} s")
 
-    return put
+    return update
 
 
 class _Flat:
@@ -121,8 +121,8 @@ class _Flat:
         self.robot, self.gait, self.walk = scene.robot, scene.gait, found.walk
         self.leg, self.belly = scene.robot.leg(40).points, scene.robot.belly(8)
         self.reach, self.hips = np.abs(self.leg).max(), [(h, scene.robot.hip_height) for h in scene.robot.hips]
-        away = [self.reach, *(abs(h) + self.reach for h, _ in self.hips), getattr(scene.robot, "length", 0.0) / 2]
-        self.room = max(away)
+        extents = [self.reach, *(abs(h) + self.reach for h, _ in self.hips), getattr(scene.robot, "length", 0.0) / 2]
+        self.room = max(extents)
 
     def on(self, ax):
         legs = [(k, at) for k in range(len(self.hips)) for at in self.robot.hip_phases]
@@ -133,16 +133,16 @@ class _Flat:
             pose, t = self.walk.pose[row], self.walk.t[row]
             for line, (k, at) in zip(lines, legs):
                 phase = self.gait.frequency * t + (k * self.robot.hip_phases[-1] + at) % 1.0
-                hip = _turned(np.array([self.hips[k]]), pose[2]) + pose[:2]
-                line.set_data(*(_turned(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
+                hip = _rotated(np.array([self.hips[k]]), pose[2]) + pose[:2]
+                line.set_data(*(_rotated(self.leg, pose[2] + float(self.gait.angle(phase, phase))) + hip).T)
             if self.belly is not None:
-                box.set_data(*(_turned(self.belly.points, pose[2]) + pose[:2]).T)
+                box.set_data(*(_rotated(self.belly.points, pose[2]) + pose[:2]).T)
 
         return draw
 
 
 class _Solid:
-    """Triangles of a robot in three dimensions, seen from its right. room, reach: as of `_Flat`."""
+    """Triangles of a robot in three dimensions, seen from its right. room, reach: as for `_Flat`."""
 
     def __init__(self, scene: WalkerScene, found: Walked):
         self.view, self.walk = walking.view(scene), found.walk
@@ -166,5 +166,5 @@ class _Solid:
         return draw
 
 
-def _turned(points: np.ndarray, angle: float) -> np.ndarray:
+def _rotated(points: np.ndarray, angle: float) -> np.ndarray:
     return points @ np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

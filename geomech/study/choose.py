@@ -49,8 +49,10 @@ def cheapest(
     medium = uncertainty.of_medium(scene, gait, amplitudes)
 
     def answer(method: str, poses, error, settings: dict) -> dict:
-        more = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
-        return Displacements(tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **more))
+        attributes = {"tier": method, "settings": settings, "seconds": {method: time.perf_counter() - start}}
+        return Displacements(
+            tables.result(scene, gait, amplitudes, {method: poses}, {method: error}, medium, **attributes)
+        )
 
     sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
@@ -102,9 +104,9 @@ def _refined(scene: Scene, gait: Gait, amplitudes, tol: float, phases: int, ask:
         pieces, phases = (2 * pieces, phases) if coarse_pieces else (pieces, 2 * phases)
         finer_scene = scene.with_numerics(pieces=pieces) if pieces_per_length(scene.system) else scene
         ask(cost.direct(finer_scene, gait, len(worse), phases))
-        finer, now, finer_pieces = in_groups(finer_scene, gait, amplitudes[worse], phases)
-        stalled = (now + finer_pieces > 0.9 * error[worse])[:, 0].all() and phases > 1024
-        poses[worse], error[worse], of_pieces[worse], open_ = finer, now + finer_pieces, finer_pieces, worse
+        finer, finer_error, finer_pieces = in_groups(finer_scene, gait, amplitudes[worse], phases)
+        stalled = (finer_error + finer_pieces > 0.9 * error[worse])[:, 0].all() and phases > 1024
+        poses[worse], error[worse], of_pieces[worse], open_ = finer, finer_error + finer_pieces, finer_pieces, worse
         if stalled:
             break
     return (poses, error), {"phases": phases, **({"pieces": pieces} if pieces_per_length(scene.system) else {})}

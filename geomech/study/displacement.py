@@ -41,8 +41,8 @@ class Displacement(Question):
             refuse_costless(self.scene)
 
     def cost(self) -> Cost:
-        more = cost.of_effort(self.scene, len(self.amplitudes)) if self.effort else []
-        return self.study.cost(self.amplitudes, self.chosen, more=more)
+        effort_jobs = cost.of_effort(self.scene, len(self.amplitudes)) if self.effort else []
+        return self.study.cost(self.amplitudes, self.chosen, more=effort_jobs)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
         result = self.study.study(self.amplitudes, self.chosen, progress=progress).result
@@ -63,7 +63,7 @@ class Cheapest(Question):
         return f"displacement of {self.scene.name}"
 
     @property
-    def _more(self) -> list[cost.Job]:
+    def _effort_jobs(self) -> list[cost.Job]:
         return cost.of_effort(self.scene, len(self.amplitudes)) if self.effort else []
 
     def check(self) -> None:
@@ -72,10 +72,10 @@ class Cheapest(Question):
 
     def cost(self) -> Cost:
         # The cost of a tolerance is known only once a tier has run: `allow` is called before each.
-        return cost.price(self._more)
+        return cost.price(self._effort_jobs)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        ask = lambda jobs: allow(cost.price([*jobs, *self._more]))
+        ask = lambda jobs: allow(cost.price([*jobs, *self._effort_jobs]))
         result = cheapest(self.scene, self.amplitudes, self.tolerance, ask=ask).result
         return with_effort(result) if self.effort else result
 

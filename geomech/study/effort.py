@@ -60,13 +60,17 @@ def why_none(system: System) -> str:
     if system.traits.power_degree is None:
         has_power = capability(system, Dissipative) is not None
         power = "its power is of no one degree in the rate" if has_power else "nothing says what moving costs"
-        return f"no metric with {_who(system)}: {power}"
+        return f"no metric with {_responsible_parts(system)}: {power}"
     if not system.traits.linear and system.joints != 2:
         return f"no metric of {system.joints} joints where power is not quadratic: its norm is told for two"
-    return "" if _even(system) else f"no metric with {_who(system)}: one way costs another power than the way back"
+    return (
+        ""
+        if _even(system)
+        else f"no metric with {_responsible_parts(system)}: one way costs another power than the way back"
+    )
 
 
-def _who(system: System) -> str:
+def _responsible_parts(system: System) -> str:
     """Return the parts of a system that break a premise; the whole system where none does."""
     return listed(system, ALL)
 
@@ -114,9 +118,9 @@ def with_harmonics(
     """Return the harmonic table and the metric from the same force balances. Refusal if there is no metric."""
     if reason := why_none(system):
         raise Refusal(reason)
-    seen = _Watched(system)
-    harmonics = harmonic.table(seen, numerics).build(progress)
-    P, size = np.concatenate(seen.powers), np.prod([len(a) for a in harmonics.axes])
+    watched = _Watched(system)
+    harmonics = harmonic.table(watched, numerics).build(progress)
+    P, size = np.concatenate(watched.powers), np.prod([len(a) for a in harmonics.axes])
     P = np.concatenate([P, P[: size - len(P)][::-1]])  # with mirror symmetry half of the grid is solved
     F = _norm(P, system.traits.power_degree).T.reshape(-1, *map(len, harmonics.axes))
     unit = connection.directions(2, len(F))
@@ -230,12 +234,12 @@ def with_effort(result: Result) -> Result:
     with np.errstate(divide="ignore", invalid="ignore"):
         towed = np.nan * distance if degree is None else distance * (distance / (2 * np.pi)) ** (degree - 1)
         ratios = {"efficiency": distance / efforts["path_length"], "cost_of_transport": efforts["work"] / towed}
-    more = [
+    extra = [
         Variable(key, ("amplitude",), efforts[key], unit.get(key, ""), "", efforts[f"{key}_error"])
         for key in ("path_length", "work")
     ]
-    more += [Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()]
-    return replace(result, variables=(*result.variables, *more))
+    extra += [Variable(key, tables.OVER, x, unit.get(key, "")) for key, x in ratios.items()]
+    return replace(result, variables=(*result.variables, *extra))
 
 
 def units(system: System) -> dict[str, str]:

@@ -59,11 +59,11 @@ def in_groups(scene: Scene, gait: Gait, amplitudes: np.ndarray | None, phases: i
     groups = (
         [None] if amplitudes is None else [amplitudes[k : k + size] for k in range(0, max(1, len(amplitudes)), size)]
     )
-    one = (
+    compute = (
         _direct if scene.system.traits.steps else partial(runner().call, _direct)
     )  # time stepping stores its own checkpoints
     with located(scene.name):
-        return tuple(np.concatenate(x) for x in zip(*(one(scene, gait, group, phases) for group in groups)))
+        return tuple(np.concatenate(x) for x in zip(*(compute(scene, gait, group, phases) for group in groups)))
 
 
 def _direct(

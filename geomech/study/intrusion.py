@@ -62,8 +62,8 @@ def estimate(scene: Intruding, run) -> Estimate:
     if counts[0] == scene.count:
         return Estimate(np.nan, np.nan, scene.count)
     for times, count in zip(scene.finer, counts):
-        other, factor = scene.run(times * scene.count), MARGIN / (1.0 - (scene.count / count) ** scene.order)
-        pairs = ((x.reshape(len(x), -1), y.reshape(len(y), -1)) for x, y in zip(_loads(other), _loads(run)))
+        finer, factor = scene.run(times * scene.count), MARGIN / (1.0 - (scene.count / count) ** scene.order)
+        pairs = ((x.reshape(len(x), -1), y.reshape(len(y), -1)) for x, y in zip(_loads(finer), _loads(run)))
         change = np.maximum(change, [factor * np.linalg.norm(x - y, axis=1).max() for x, y in pairs])
     return Estimate(*change.tolist(), counts[-1])
 

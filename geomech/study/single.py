@@ -13,7 +13,7 @@ from rft.refusal import Refusal, formatted
 
 def single(system: System, alpha, alphadot) -> dict:
     """Return {"xi", "status", "residual"} for one shape (joints,) and its rate; ValueError if it is singular."""
-    alpha, alphadot = (_one(system, name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
+    alpha, alphadot = (_checked_numbers(system, name, x) for name, x in (("alpha", alpha), ("alphadot", alphadot)))
     note_angles(system, np.abs(alpha).max())
     traits = system.traits
     if traits.singularity is not None and not traits.singularity(alpha):
@@ -23,7 +23,7 @@ def single(system: System, alpha, alphadot) -> dict:
     return {"xi": evaluate(system.velocity, alpha, alphadot).tolist(), "status": "exact", "residual": 0.0}
 
 
-def _one(system: System, name: str, x) -> np.ndarray:
+def _checked_numbers(system: System, name: str, x) -> np.ndarray:
     """Return x as finite numbers (joints,); ValueError naming it."""
     x = real_array(name, x)
     if x.shape != (system.joints,) or not np.isfinite(x).all():

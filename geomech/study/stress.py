@@ -39,7 +39,7 @@ class Stress(Question):
         law = load_medium(self.medium)
         overview = survey(law)
         description = f"{self.medium} {overview.description()}" + (", which is cut" if law.tension == "cut" else "")
-        facts, angles = {"told": description, "notes": [description] if overview.pushing else []}, None
+        facts, angles = {"description": description, "notes": [description] if overview.pushing else []}, None
         if self.beta is None:
             variables = [Variable(name, (), getattr(overview, name), "1") for name in ("pulling", "pushing")]
         else:

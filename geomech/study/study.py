@@ -108,9 +108,9 @@ class Study(Extensible):
     def plan(self, tier: str, gait: Gait | None = None, amplitudes=None) -> Plan:
         """Return how a tier predicts displacements of a gait, or of the scene's own; Refusal if it is not available."""
         with located(self.scene.name):
-            how = _tier(tier)
-            how.refuse(self.scene.system)
-            return self._plan(how, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
+            chosen = _tier(tier)
+            chosen.refuse(self.scene.system)
+            return self._plan(chosen, self.scene.gait if gait is None else checked_gait(gait), amplitudes)
 
     def _plan(self, tier: Tier, gait: Gait, amplitudes) -> Plan:
         return tier.plan(self.scene.system, self.scene.numerics, gait, amplitudes)

@@ -18,7 +18,7 @@ from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
 from geomech.run.backend import preferred, suiting
-from geomech.run.cost import BASE, Cost
+from geomech.run.cost import BASE, LONGEST, Cost
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
@@ -77,20 +77,20 @@ def walked(
 ) -> list[Walked]:
     """Return the walks of scenes with equal numerics and engines, computed in batches. settling: a few cycles from rest
     suffice. progress: called with the fraction done."""
-    numerics, how, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
+    numerics, chosen, walkers = scenes[0].numerics, engine(by or scenes[0].engine), [s.walker for s in scenes]
     callback = {"progress": lambda done: progress(WALKING * done)} if progress else {}
-    walks = how.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
-    others = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
-    others += [("elements", min(1000, 2 * numerics.elements))]
+    walks = chosen.walk(walkers, numerics, SETTLING if settling else None, advance=jobs.runner().call, **callback)
+    refinements = [("steps", max(8, numerics.steps // 2)), ("steps", max(8, 3 * numerics.steps // 4))]
+    refinements += [("elements", min(1000, 2 * numerics.elements))]
     changes = []
-    for k, (name, other) in enumerate(others):
+    for k, (name, other) in enumerate(refinements):
         finer = dataclasses.replace(numerics, **{name: other})
-        rerun = how.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
+        rerun = chosen.rerun(walkers, finer, walks, SETTLING if settling else None, advance=jobs.runner().call)
         changes.append(np.abs([np.subtract(_means(a), _means(b)) for a, b in zip(rerun, walks)]))
         if progress:
-            progress(WALKING + (1.0 - WALKING) * (k + 1) / len(others))
-    half, most, finer = changes
-    error = np.maximum(half, most) + TO_COME * finer
+            progress(WALKING + (1.0 - WALKING) * (k + 1) / len(refinements))
+    half, three_quarters, finer = changes
+    error = np.maximum(half, three_quarters) + TO_COME * finer
     error[:, 0] += [w.drift + w.unsolved_error for w in walks]
     return [Walked(w, *e, TO_COME * float(x)) for w, e, x in zip(walks, error.tolist(), finer[:, 0])]
 
@@ -133,11 +133,11 @@ def run(
 
 @dataclass(frozen=True)
 class Walking(Question):
-    """The walk of a robot. engine: in place of the scene's. longest: seconds, see `run`."""
+    """The walk of a robot. engine: in place of the scene's. limited: with at most `LONGEST` seconds of computing, see `run`."""
 
     scene: WalkerScene
     engine: str | None = None
-    longest: float = field(default=math.inf, compare=False)
+    limited: bool = field(default=False, compare=False)
 
     @property
     def title(self) -> str:
@@ -150,7 +150,7 @@ class Walking(Question):
         return price(self.scene, by=self.engine)
 
     def answer(self, progress: Progress, allow: Allow) -> Result:
-        return of_walk(self.scene, run(self.scene, self.engine, progress, self.longest))
+        return of_walk(self.scene, run(self.scene, self.engine, progress, LONGEST if self.limited else math.inf))
 
 
 def of_walk(scene: WalkerScene, run: Walked) -> Result:
@@ -184,8 +184,8 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
 
     Where these take many times as many evaluations as usual, as for robots so light that they bounce or stick at every
     step, the search for a limit cycle is assumed to fail."""
-    numerics, how = scene.numerics, by or scene.engine
-    planar = how == "planar"
+    numerics, engine_name = scene.numerics, by or scene.engine
+    planar = engine_name == "planar"
     together = TOGETHER if planar else 1
     own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
@@ -194,7 +194,7 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     with located(scene.name), suiting(STEP * least if planar else 0.0):
         per_step, more = PER_STEP[preferred()], MORE[preferred()]
         usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
-        step_seconds, tries = engine(how).step_cost(scene.walker, numerics, PILOT)
+        step_seconds, tries = engine(engine_name).step_cost(scene.walker, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
     steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)

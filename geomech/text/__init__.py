@@ -1,6 +1,7 @@
-"""Results in words: a kind has a module of its name.
+"""Results in words: a kind of result has a module of its name.
 
-In it ``text(result)`` gives lines for a reader, and ``numbers(result)`` what JSON has of it."""
+Its ``text(result)`` returns lines for a reader, ``numbers(result)`` the JSON, and of a calibration ``medium(result)`` a file
+that scenes take."""
 
 from __future__ import annotations
 
@@ -16,8 +17,13 @@ def text(result: Result) -> str:
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return a result as JSON takes it."""
+    """Return a result as plain numbers, for JSON."""
     return _module(result).numbers(result)
+
+
+def medium(result: Result) -> str:
+    """Return the medium that a calibration found, as TOML."""
+    return _module(result).medium(result)
 
 
 def _module(result: Result) -> Any:

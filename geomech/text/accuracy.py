@@ -1,4 +1,4 @@
-"""What accuracy costs, as lines: the cheapest settings by tolerance, then a sentence a knob."""
+"""The cost of accuracy in lines: the cheapest settings by tolerance, then a sentence for each setting that was varied."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ SCALES = {  # of an error, by what only a study of that kind has
 
 def text(result: Result) -> str:
     """Return the table and the sentences of a study."""
-    found = numbers(result)
-    return "\n".join([table(found), "", *sentences(found)])
+    study = numbers(result)
+    return "\n".join([table(study), "", *sentences(study)])
 
 
 def table(found: Mapping[str, Any]) -> str:
@@ -34,28 +34,28 @@ def table(found: Mapping[str, Any]) -> str:
     for row in rows:
         cells = (f"{row[n]:>{wide[n]}}" for n in names if n in row)
         lines.append("  ".join([*cells, *["none of those tried"] * (len(row) < len(names))]))
-    if own := found.get("own_error"):
+    if error := found.get("own_error"):
         lines.append(
-            f"errors here include the table's own, {own:.1e} BL, which no setting takes away; those below do not"
+            f"errors here include the table's own, {error:.1e} BL, which no setting takes away; those below do not"
         )
     return "\n".join(lines)
 
 
 def _cells(choice: Mapping[str, Any]) -> dict[str, str]:
     """Return a row of the table by column; its tolerance alone where nothing meets that."""
-    found = {"tolerance": f"{choice['tolerance']:.0e}"}
+    cells = {"tolerance": f"{choice['tolerance']:.0e}"}
     if choice.get("tier"):
-        found["setting"] = f"{choice['tier']}, {choice['knob']} = {choice['value']:g}"
+        cells["setting"] = f"{choice['tier']}, {choice['knob']} = {choice['value']:g}"
     settings = {k: x for k, x in choice.items() if k not in ("tolerance", "tier", "knob", "value", "error", "seconds")}
     if any(x is not None for x in settings.values()) or len(settings) > 1:
-        found |= {name: "-" if x is None else f"{x:g}" for name, x in settings.items()}
+        cells |= {name: "-" if x is None else f"{x:g}" for name, x in settings.items()}
     if "error" in choice:
-        found |= {"error": f"{choice['error']:.1e}", "seconds": f"{choice['seconds']:.4f}"}
-    return found
+        cells |= {"error": f"{choice['error']:.1e}", "seconds": f"{choice['seconds']:.4f}"}
+    return cells
 
 
 def sentences(found: Mapping[str, Any]) -> list[str]:
-    """Return a sentence a knob: its settings from coarse to fine, error, time, what it buys, and its measured order."""
+    """Return a sentence for each knob: its settings from coarse to fine, error, time, gain, and measured order."""
     lines, (_, of) = [], _scale(found)
     for line in found["lines"]:
         e, t, v = line["error"], line["seconds"], line["value"]

@@ -16,8 +16,8 @@ numbers = tables.table
 
 
 def text(result: Result, title: str = "") -> str:
-    """Return x, y, heading and net distance per cycle by tier, each with its error in its own unit. title: what lines begin
-    with, by default the scene's name."""
+    """Return x, y, heading and net distance per cycle by tier, each with its error in its own unit. title: the beginning of
+    lines, by default the scene's name."""
     facts, title = result.attributes, title or result.attributes["name"]
     lines = [f"{title}: {facts['note']}"] if "note" in facts else []
     for variable, headline, by, places in _blocks(result):
@@ -45,10 +45,10 @@ def _blocks(result: Result) -> Iterator[tuple[Variable, str, float, int]]:
     facts, unit = result.attributes, result["x"].unit
     length = facts["body_length"]
     decimals = 6 - min(0, math.floor(math.log10(length) + 1e-9))
-    moved = f"displacement per cycle ({unit}) +- estimated error"
-    yield result["net_distance"], f"{moved}: net distance, sqrt(x^2 + y^2)", 1.0, decimals
-    yield result["x"], f"{moved}: x", 1.0, decimals
-    yield result["y"], f"{moved}: y", 1.0, decimals
+    per_cycle = f"displacement per cycle ({unit}) +- estimated error"
+    yield result["net_distance"], f"{per_cycle}: net distance, sqrt(x^2 + y^2)", 1.0, decimals
+    yield result["x"], f"{per_cycle}: x", 1.0, decimals
+    yield result["y"], f"{per_cycle}: y", 1.0, decimals
     yield result["heading"], "heading gained (rad) +- estimated error", 1.0, 6
     if (f := facts.get("frequency")) is not None:
         speed = lambda u: f"speed ({u}/s) at {f:g} Hz +- estimated error: net distance times frequency"
@@ -81,33 +81,33 @@ def _surfaces(result: Result) -> Iterator[str]:
     """Yield how far tiers depend on the surface that a loop of three and more joints spans."""
     if tables.SURFACE[0] not in result:
         return
-    spread, turned = (result[name] for name in tables.SURFACE)
+    positions, headings = (result[name] for name in tables.SURFACE)
     for k, tier in enumerate(result["tier"].values):
-        if np.isnan(spread.values[k]).any():
+        if np.isnan(positions.values[k]).any():
             continue
         yield f"{tier}: over a cone from the loop's mean shape; other surfaces that it spans differ by, which is in the error,"
-        yield f"amplitude position ({spread.unit})  heading (rad)"
-        rows = zip(result["amplitude"].values, spread.values[k], turned.values[k])
+        yield f"amplitude position ({positions.unit})  heading (rad)"
+        rows = zip(result["amplitude"].values, positions.values[k], headings.values[k])
         yield from (f"{a:9.6g} {x:13.1e} {t:14.1e}" for a, x, t in rows)
 
 
 def _effort(result: Result, title: str) -> Iterator[str]:
-    """Yield path length and work, and the cost of transport by tier, if they were asked for."""
+    """Yield path length and work, and the cost of transport by tier, if the result has them."""
     if "work" not in result:
         return
-    told = lambda x, form: f"{format(x, form) if np.isfinite(x) else '-':>12}"
+    cell = lambda x, form: f"{format(x, form) if np.isfinite(x) else '-':>12}"
     yield f"{title}: path length and work of a cycle, and cost of transport: work over that of towing the body as far"
     yield "amplitude path length        work" + "".join(f"{m:>12}" for m in result["tier"].values)
     length, work, transport = (result[key].values for key in ("path_length", "work", "cost_of_transport"))
     for k, amplitude in enumerate(result["amplitude"].values):
-        ratios = "".join(told(x, ".4g") for x in transport[:, k])
-        yield f"{amplitude:9.6g}{told(length[k], '.6f')}{told(work[k], '.6f')}{ratios}"
-    some = [result[key] for key in ("path_length", "work") if result[key].unit]
-    yield "; ".join(f"{v.name.replace('_', ' ')}: {v.unit}" for v in some)
+        ratios = "".join(cell(x, ".4g") for x in transport[:, k])
+        yield f"{amplitude:9.6g}{cell(length[k], '.6f')}{cell(work[k], '.6f')}{ratios}"
+    with_unit = [result[key] for key in ("path_length", "work") if result[key].unit]
+    yield "; ".join(f"{v.name.replace('_', ' ')}: {v.unit}" for v in with_unit)
 
 
 def _times(facts: Any) -> str:
-    """Return what tables took to build and tiers to look up, in words."""
-    kept = facts.get("kept", ())
-    told = [f"{name} {took:.3g}{' (built before)' * (name in kept)}" for name, took in facts["seconds"].items()]
-    return f"seconds: {', '.join(told)}{' with the search for it' * ('tier' in facts)}"
+    """Return the seconds that tables took to build and tiers to look up, in words."""
+    stored = facts.get("kept", ())
+    times = [f"{name} {took:.3g}{' (built before)' * (name in stored)}" for name, took in facts["seconds"].items()]
+    return f"seconds: {', '.join(times)}{' with the search for it' * ('tier' in facts)}"

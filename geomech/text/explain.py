@@ -1,4 +1,4 @@
-"""What a scene asks for, and what follows from it."""
+"""The system of a scene in words: its effects, its engine, and the results that exist."""
 
 from __future__ import annotations
 
@@ -22,26 +22,27 @@ MOST_JOINTS = 5  # of which all pairs are drawn side by side
 
 
 def explain(scene: Scene | Intruding | WalkerScene) -> str:
-    """The system with its effects on and off, the engine and why, and the results that are left, as plain text. Of an
-    intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
+    """Return the system with its effects on and off, the engine and why, and the results that exist, as plain text.
+
+    Of an intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
     if hasattr(scene, "description"):  # of bodies in grains, whose modules a swimmer does without
         return printable("\n".join(scene.description()))
     system = checked_scene(scene).system
-    first, *told = described(system)
+    first, *rest = described(system)
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)
     timed = "" if scene.frequency is None else f" at {scene.frequency:g} Hz"
-    lines = [f"{scene.name}: {first}, {gait} gait{timed}", *told]
+    lines = [f"{scene.name}: {first}, {gait} gait{timed}", *rest]
     lines.append(f"engine: {engine(system)}")
     phases = scene.numerics.phases
     if (count := solved_phases(system, scene.gait, phases)) < phases:
         lines.append(f"by symmetry: {count} of {phases} phases of the gait are solved, the others are images of these")
     by_name = [m for m, tier in TIERS.items() if tier.is_possible(system) and not tier.is_offered(system)]
     lines.append("tiers: " + ", ".join(tiers(system)) + f"; by name: {', '.join(by_name)}" * bool(by_name))
-    return printable("\n".join([*lines, *_lost(system)]))
+    return printable("\n".join([*lines, *_unavailable(system)]))
 
 
-def _lost(system) -> list[str]:
-    """A line of the results that are not to be had for each reason there is."""
+def _unavailable(system) -> list[str]:
+    """Return a line for each reason for which results do not exist, with these results."""
     reasons: dict[str, list[str]] = {}
     if system.traits.lacks & ALL:
         first = reasons[f"{listed(system, ALL)} takes away what they rest on"] = ["connection", "CCF"]
@@ -53,19 +54,19 @@ def _lost(system) -> list[str]:
     for tier in TIERS.values():
         if not tier.is_possible(system):
             reasons.setdefault(_why(tier, system), []).append(tier.name)
-    return [f"not available: {_listed(lost)}: {why}" for why, lost in reasons.items()]
+    return [f"not available: {_listed(results)}: {why}" for why, results in reasons.items()]
 
 
-def _listed(lost: list[str]) -> str:
-    """Results, and tiers after them: "CCF maps, area and harmonic tiers"."""
-    tiers = [name for name in lost if name in TIERS]
-    told = " and ".join(filter(None, [", ".join(tiers[:-1]), *tiers[-1:]]))
-    named = [f"{told} tier{'s' * (len(tiers) > 1)}"] if tiers else []
-    return ", ".join([*(name for name in lost if name not in TIERS), *named])
+def _listed(results: list[str]) -> str:
+    """Return results, and tiers after them: "CCF maps, area and harmonic tiers"."""
+    tiers = [name for name in results if name in TIERS]
+    names = " and ".join(filter(None, [", ".join(tiers[:-1]), *tiers[-1:]]))
+    phrase = [f"{names} tier{'s' * (len(tiers) > 1)}"] if tiers else []
+    return ", ".join([*(name for name in results if name not in TIERS), *phrase])
 
 
 def _why(tier, system) -> str:
-    """Why a tier says nothing of a system."""
+    """Return the reason why a tier does not apply to a system."""
     if system.traits.lacks & tier.rests_on:
         return f"{listed(system, ALL)} takes away what they rest on"
     if system.joints not in tier.joints:

@@ -14,17 +14,17 @@ ROWS = ("x", "y", "theta")
 
 
 def formulas(scene: Scene, ccf: bool = True, latex: bool = False) -> Iterator[str]:
-    """Yield A(alpha), xi = A alphadot, of a scene, and the CCF of every two joints if asked for, one after the other as they
-    are found: an equation of LaTeX each, or a line for each entry. Refusal for a system without closed form."""
+    """Yield A(alpha) of a scene, xi = A alphadot, and with ``ccf`` the CCF of every two joints, each as soon as it is found: an
+    equation of LaTeX, or a line for each entry. Refusal for a system without closed form."""
     with located(scene.name):
         A, alpha = formula(scene.system)
     A = symbolic.simplified(A, alpha)
-    told = symbolic.latex if latex else _text
-    yield told(A, "A")
+    formatted = symbolic.latex if latex else _text
+    yield formatted(A, "A")
     if ccf:
         for i, j in itertools.combinations(range(len(alpha)), 2):
             of_two = symbolic.simplified(symbolic.ccf(A, alpha, i, j), alpha)
-            yield told(of_two, f"F_{{{i + 1}{j + 1}}}" if latex else f"CCF_{i + 1}{j + 1}")
+            yield formatted(of_two, f"F_{{{i + 1}{j + 1}}}" if latex else f"CCF_{i + 1}{j + 1}")
 
 
 def _text(matrix, name: str) -> str:

@@ -16,12 +16,12 @@ def numbers(result: Result) -> dict[str, Any]:
     """Return the columns, and the errors of force, N, and moment, N m; None where there are none."""
     error, parts = result.attributes["error"], result.subject[0].parts
     known = {k: x if np.isfinite(x) else None for k, x in error._asdict().items()}
-    told = {"force": known["force"], "moment": known["moment"], f"from_{parts}": error.count}
-    return {**{v.name: v.values.tolist() for v in result.variables}, "estimate": told}
+    estimate = {"force": known["force"], "moment": known["moment"], f"from_{parts}": error.count}
+    return {**{v.name: v.values.tolist() for v in result.variables}, "estimate": estimate}
 
 
 def text(result: Result) -> str:
-    """Return extremes of force and moment, and where they are; their errors; work."""
+    """Return the extremes of force and moment with their places and errors, and the work."""
     (scene, found), error = result.subject, result.attributes["error"]
     columns = {v.name: v.values for v in result.variables}
     kinds = type(scene.intruder).__name__, type(scene.motion).__name__

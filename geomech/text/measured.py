@@ -1,4 +1,4 @@
-"""What a measured gait tells, in lines and as JSON has it."""
+"""A measured gait, in lines and as JSON has it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from geomech.scene.write import gait_table
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    return told(result.subject)
+    """Return a measured gait as `geomech fit --json` prints it."""
+    return fit_numbers(result.subject)
 
 
-def told(fit: Fitted) -> dict[str, Any]:
-    """What `geomech fit --json` prints. Triples are x, y and theta; intervals are (low, high) of each; A, its interval's half
-    width and the half width of the data at SHOWN phases of the gait."""
-    (net, off), (mean, mean_off) = fit.displacement, fit.mean
+def fit_numbers(fit: Fitted) -> dict[str, Any]:
+    """Return the numbers of a fit. Triples are x, y and theta; intervals are (low, high) of each; A, its interval's half width
+    and the half width of the data at PRINTED_PHASES phases of the gait."""
+    (net, half_width), (mean, mean_half_width) = fit.displacement, fit.mean
     t = 2 * np.pi * np.arange(PRINTED_PHASES) / PRINTED_PHASES
     A, error = fit.along(t)
-    apart, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
+    residual, rates = fit.measured - fit.predicted, [f"{fit.unit}/rad", f"{fit.unit}/rad", "rad/rad"]
     return {
         "log": fit.log.name,
         "rows": len(fit.log.t),
@@ -33,8 +34,8 @@ def told(fit: Fitted) -> dict[str, Any]:
         "gait": gait_table(fit.gait),
         "displacement_measured": mean.tolist(),
         "displacement_predicted": net.tolist(),
-        "interval": np.stack([net - off, net + off], -1).tolist(),
-        "interval_measured": np.stack([mean - mean_off, mean + mean_off], -1).tolist(),
+        "interval": np.stack([net - half_width, net + half_width], -1).tolist(),
+        "interval_measured": np.stack([mean - mean_half_width, mean + mean_half_width], -1).tolist(),
         "coverage_level": fit.known.level,
         "harmonics": fit.known.A.shape[-1] // 2,
         "residual": fit.residual.tolist(),
@@ -48,7 +49,7 @@ def told(fit: Fitted) -> dict[str, Any]:
         "per_cycle": {
             "measured": fit.measured.tolist(),
             "predicted": fit.predicted.tolist(),
-            "rms": np.sqrt((apart**2).mean(0)).tolist(),
+            "rms": np.sqrt((residual**2).mean(0)).tolist(),
         },
         "body_length": fit.length,
         "units": {"displacement": [fit.unit, fit.unit, "rad"], "frequency": "cycles per unit of t", "phase_residual": "rad",
@@ -58,21 +59,21 @@ def told(fit: Fitted) -> dict[str, Any]:
 
 
 def reach(fit: Fitted) -> np.ndarray:
-    """Half width, rad, of what the data reach across the gait, in the direction in which that is least, at SHOWN phases."""
+    """Return the half width of the data across the gait, rad, in the direction in which it is least, at PRINTED_PHASES."""
     spread = fit.known.spread
     least = np.sqrt(np.linalg.eigvalsh(np.moveaxis(spread, -1, 0))[:, 0])
     return least[np.arange(PRINTED_PHASES) * spread.shape[-1] // PRINTED_PHASES]
 
 
 def text(result: Result) -> str:
-    """Return the same in lines."""
+    """Return a measured gait in lines."""
     return described(result.subject)
 
 
 def described(fit: Fitted) -> str:
-    """Return what a measured gait tells, in lines."""
-    (net, off), (mean, mean_off), unit = fit.displacement, fit.mean, fit.unit
-    apart, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
+    """Return displacement, connection and reach of a measured gait, in lines."""
+    (net, half_width), (mean, mean_half_width), unit = fit.displacement, fit.mean, fit.unit
+    residual, wide = np.sqrt(((fit.measured - fit.predicted) ** 2).mean(0)), reach(fit)
     lines = [
         f"{fit.log.name}: {len(fit.measured)} whole cycles of {', '.join(fit.log.joints)}, {fit.frequency:.6g} per unit of t; "
         f"phase within {fit.irregular:.2g} rad of a uniform run through each",
@@ -80,11 +81,11 @@ def described(fit: Fitted) -> str:
         "            mean of the log        mean gait, by the connection   rms of a cycle: log - prediction",
     ]
     for k, (name, u) in enumerate((("x", unit), ("y", unit), ("heading", "rad"))):
-        pair = f"{mean[k]:11.6f} +-{mean_off[k]:7.1e}      {net[k]:11.6f} +-{off[k]:7.1e}"
-        lines.append(f"{name:>8}{pair}          {apart[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
-    told = "  ".join(f"{name} {100 * x:.3g} %" for name, x in zip(("x", "y", "heading"), fit.explained))
+        pair = f"{mean[k]:11.6f} +-{mean_half_width[k]:7.1e}      {net[k]:11.6f} +-{half_width[k]:7.1e}"
+        lines.append(f"{name:>8}{pair}          {residual[k]:.2g} of {fit.measured[:, k].std():.2g} {u}")
+    explained = "  ".join(f"{name} {100 * x:.3g} %" for name, x in zip(("x", "y", "heading"), fit.explained))
     return "\n".join([
         *lines,
-        f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explains of the body velocity {told}",
+        f"connection: {fit.known.A.shape[-1] // 2} harmonics in the phase; explains of the body velocity {explained}",
         f"the data reach {wide.min():.3g} to {wide.max():.3g} rad from the mean gait; status: {status(fit)}",
     ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""Where a motion ends, in a line."""
+"""The end of a motion, in a line."""
 
 from __future__ import annotations
 

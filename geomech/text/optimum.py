@@ -7,54 +7,74 @@ from typing import Any
 
 from geomech.core.variables import Result
 from geomech.optimise import Optimum
-from geomech.scene.write import toml
+from geomech.scene.write import gait_table, toml
 from geomech.study.effort import METRIC
-from geomech.systems.base import length_unit
 
 SHOWN = 6  # answers that a table led to, of those that nobody finished
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return what was found as `Optimum.numbers` has it."""
-    return result.subject.numbers()
+    """Return the best gait as JSON has it; a path length or work that does not exist is None."""
+    optimum, value, number = result.subject, result["value"], lambda name: float(result[name].values)
+    unit = result["x"].unit
+    return {
+        "objective": value.label,
+        "value": number("value"),
+        "start_value": number("start_value"),
+        "displacement": [number(name) for name in ("x", "y", "theta")],
+        **{name: number(name) if name in result else None for name in ("path_length", "work")},
+        "gait": gait_table(optimum.gait),
+        "evaluations": optimum.evaluations,
+        "seconds": optimum.seconds,
+        "active": list(optimum.active),
+        "answers": [list(x) for x in optimum.answers + optimum.others],
+        "estimate": float(value.error),
+        "body_length": float(optimum.scene.system.length),
+        "units": {
+            **dict.fromkeys(("value", "start_value", "estimate"), value.unit),
+            "displacement": [unit, unit, "rad"],
+            "body_length": unit,
+            "seconds": "s",
+        },
+    }
 
 
 def text(result: Result) -> str:
-    """Return what was found."""
-    return told(result.subject)
-
-
-def told(optimum: Optimum) -> str:
-    """Return what was found, in lines."""
-    aim, best, system = optimum.request.aim, optimum.best, optimum.scene.system
-    towards = f" along {aim.direction}" if aim.direction else ""
-    (x, y, theta), unit = best.displacement, length_unit(system)
-    lines = [
-        f"{optimum.scene.name}: {aim.name}{towards} {best.value:.6g} {aim.unit}, error {best.error:.1g} "
-        f"(the scene's gait: {optimum.start.value:.6g})",
-        f"displacement per cycle: x {x:.6g} {unit}, y {y:.6g} {unit}, theta {theta:.6g} rad",
-    ]
-    if best.work is not None:
-        lines.append(f"path length {best.length:.6g}, work {best.work:.6g} (body's axial drag x body length)")
-    elif best.length is not None:
-        lines.append(f"path length {best.length:.6g} ({METRIC})")
+    """Return the best gait in lines: its value, its cost, the limits that it touches, and where the starts led."""
+    optimum, value, start = result.subject, result["value"], result["start_value"]
+    aim = optimum.request.aim
+    moved = ", ".join(f"{name} {result[name].values:.6g} {result[name].unit}" for name in ("x", "y", "theta"))
+    lines = [_headline(result), f"displacement per cycle: {moved}"]
+    if "work" in result:
+        length, work = result["path_length"].values, result["work"].values
+        lines.append(f"path length {length:.6g}, work {work:.6g} (body's axial drag x body length)")
+    elif "path_length" in result:
+        lines.append(f"path length {result['path_length'].values:.6g} ({METRIC})")
     if aim.timed:
         limits = {
             "rate": aim.rate and f"rates of shape up to {aim.rate:.6g} rad/s",
             "power": aim.power and f"mean power {aim.power:g}",
         }
         limited = " and ".join(filter(None, limits.values()))
-        lines.append(f"frequency {best.gait.frequency:.6g} Hz, with {limited}")
+        lines.append(f"frequency {optimum.gait.frequency:.6g} Hz, with {limited}")
     lines.append(f"limits that it touches: {', '.join(optimum.active) or 'none'}")
     if optimum.request.starts > 1:
-        lines += _found(optimum)
-    if optimum.best.value <= optimum.start.value * (1 + 1e-12):
+        lines += _answers(optimum)
+    if value.values <= start.values * (1 + 1e-12):
         lines.append("nothing better than the scene's own gait was found")
     return "\n".join([*lines, f"{optimum.evaluations} cycles evaluated in {optimum.seconds:.2g} s"])
 
 
-def _found(optimum: Optimum) -> list[str]:
-    """What the starts led to."""
+def _headline(result: Result) -> str:
+    """Return the value with its error, and that of the scene's gait."""
+    optimum, value, start = result.subject, result["value"], result["start_value"]
+    towards = f" along {optimum.request.aim.direction}" if optimum.request.aim.direction else ""
+    reached = f"{value.label}{towards} {value.values:.6g} {value.unit}, error {value.error:.1g}"
+    return f"{optimum.scene.name}: {reached} (the scene's gait: {start.values:.6g})"
+
+
+def _answers(optimum: Optimum) -> list[str]:
+    """Return the values that the starts led to."""
     listed = lambda answers: ", ".join(f"{value:.6g} (from {count})" for value, count in answers)
     led = sum(count for _, count in optimum.answers + optimum.others) - optimum.request.starts
     more = f", and {led} that narrower limits led to" if led > 0 else ""
@@ -66,7 +86,7 @@ def _found(optimum: Optimum) -> list[str]:
     return lines
 
 
-def scene_toml(optimum: Optimum) -> str:
-    """Return the scene with the best gait, and what it is, as a comment."""
-    about = textwrap.wrap(" ".join(told(optimum).splitlines()[:1]), 110)
-    return "".join(f"# {line}\n" for line in about) + "\n" + toml(optimum.scene)
+def scene_toml(result: Result) -> str:
+    """Return the scene with the best gait, behind a comment with its value."""
+    about = textwrap.wrap(_headline(result), 110)
+    return "".join(f"# {line}\n" for line in about) + "\n" + toml(result.subject.scene)

@@ -12,6 +12,11 @@ from geomech.scene.write import medium_toml, vertical_toml
 from rft.plates import VERTICAL
 
 
+def lines(name: str | None) -> Iterator[str]:
+    """Yield the TOML of a scene or medium; the list of all where no name is given."""
+    return listing() if name is None else iter([toml_of(name)])
+
+
 def listing() -> Iterator[str]:
     """Yield a line for each scene and medium, with what it is."""
     for title, names in (

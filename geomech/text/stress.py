@@ -8,12 +8,12 @@ from geomech.core.variables import Result
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return both components at one plate, or the parts of the plane where a map pulls and pushes."""
+    """Return both components at one plate, or the shares of the plane where a map pulls and pushes."""
     return {v.name: float(v.values) for v in result.variables}
 
 
 def text(result: Result) -> str:
-    """Return the stress at one plate, and what the map does over its whole plane."""
+    """Return the stress at one plate, and the signs of the map over its whole plane."""
     at_one = result.subject[1] is not None
     parts = [f"{v.name} = {v.values:.4g} {v.unit}, {v.label}" for v in result.variables if at_one]
-    return "\n".join([*["; ".join(parts)] * at_one, result.attributes["told"]])
+    return "\n".join([*["; ".join(parts)] * at_one, result.attributes["description"]])

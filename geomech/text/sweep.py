@@ -1,4 +1,4 @@
-"""A sweep in a line: the ranges of what it found."""
+"""A sweep in a line: its points and the ranges of its values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A system in words: its parts with their numbers and price, its engine, and what its user may not expect."""
+"""A system in words: its parts with their numbers and cost, its engine, and notes on how it is computed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_PAST = "nothing remembers, places are alike, no mass"
 
 
 def described(system: System) -> list[str]:
-    """Return lines of what a system is and what follows; the first continues the scene's name."""
+    """Return a system in lines, part by part; the first continues the scene's name."""
     if isinstance(system, Framed):
         first, *rest = described(system.inner)
         return [f"{first}, seen from its {NAME} frame", *rest]
@@ -34,18 +34,18 @@ def described(system: System) -> list[str]:
     if isinstance(system, Table):
         return _table(system)
     fields = dataclasses.fields(system) if dataclasses.is_dataclass(system) else ()
-    told = ", ".join(f"{f.name} = {formatted(getattr(system, f.name))}" for f in fields)
-    return [f"{kind_of(system)} ({told})" if told else kind_of(system)]
+    numbers = ", ".join(f"{f.name} = {formatted(getattr(system, f.name))}" for f in fields)
+    return [f"{kind_of(system)} ({numbers})" if numbers else kind_of(system)]
 
 
 def engine(system: System) -> str:
-    """Return the name of a system's engine, why it needs it, and what that does."""
+    """Return the name of a system's engine, its working, and the reason for it."""
     if isinstance(system, Framed):
         return engine(system.inner)
     if isinstance(system, Swimmer):
         name = engine_of(system.effects)
         broken = [(e.kind, e.breaks & SHAPE_ALONE) for e in system.effects if e.breaks & SHAPE_ALONE]
-        reasons = [f"with {kind} the scene is {negated(lost)}" for kind, lost in broken]
+        reasons = [f"with {kind} the scene is {negated(premises)}" for kind, premises in broken]
         return f"{name} ({ENGINES[name]}): {'; '.join(reasons) or NO_PAST}"
     if isinstance(system, Table):
         return "algebraic (the velocity at every shape, looked up)"
@@ -53,7 +53,7 @@ def engine(system: System) -> str:
 
 
 def notes(system: System) -> tuple[str, ...]:
-    """Return lines on what a system's user may not expect of how it is computed."""
+    """Return notes on how a system is computed that its user may not expect."""
     if isinstance(system, Framed):
         return notes(system.inner)
     if not isinstance(system, Swimmer) or system.closed or system.solver.loads != "exact":
@@ -72,9 +72,9 @@ def _swimmer(system: Swimmer) -> list[str]:
     lines = [f"{medium}, {body}", *notes(system)]
     for effect in system.effects:
         cost = f"; costs {effect.cost}" if effect.cost else ""
-        gone = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
+        limit = f"; gone at {effect.limit}, order {effect.order}" if effect.limit else ""
         premises = negated(effect.breaks) or "keeps every premise"
-        lines.append(f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{gone}")
+        lines.append(f"on:  {summary.part(effect.kind, effect)}; {premises}{cost}{limit}")
         if assumed := effect.assumes(system.medium):
             lines.append(f"     assumes {assumed}")
     off = [name for name in EFFECTS if name not in [e.kind for e in system.effects]]

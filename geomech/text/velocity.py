@@ -9,8 +9,8 @@ from geomech.core.variables import Result
 
 def numbers(result: Result) -> dict[str, Any]:
     """Return the velocity with its residual and status."""
-    told = {key: x for key, x in result.attributes["found"].items() if key != "iterations"}
-    return {**told, "units": result.attributes["units"]}
+    numbers = {key: x for key, x in result.attributes["found"].items() if key != "iterations"}
+    return {**numbers, "units": result.attributes["units"]}
 
 
 def text(result: Result) -> str:

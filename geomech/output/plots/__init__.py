@@ -1,5 +1,5 @@
-"""Plots: each draws on the Axes it is given and returns it. Without any it draws where you stand: on pyplot's current Axes if
-you have a figure of pyplot open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
+"""Plots: each draws on the Axes that it is given and returns it; without any on pyplot's current Axes if a figure of pyplot
+is open, else on a new one, which a notebook shows. Nothing here imports pyplot or changes its state.
 """
 
 from geomech.output.plots.displacements import displacement, displacement_figure, medium_band, net

@@ -21,9 +21,9 @@ def displacement(
     table: Mapping, *, ax=None, label: str = "", gait: Gait | None = None, quantity: str = "x", legend: bool = True,
     errors: bool = True, **style,
 ):  # fmt: skip
-    """One of QUANTITIES per cycle against amplitude, a line a tier; ``table`` as `Study.study` gives it.
+    """Draw one of QUANTITIES per cycle against amplitude, a line for each tier; ``table`` as `Study.study` returns it.
 
-    errors: with their bars. The table's own units are those of the axis."""
+    errors: with error bars. The table's own units are those of the axis."""
     ax, amplitudes = axes_of(ax), np.asarray(table["amplitude"], float)
     for name, tier in TIERS.items():
         if name in table:
@@ -46,7 +46,7 @@ def displacement(
 
 
 def _band(ax, table: Mapping, quantity: str, amplitudes) -> None:
-    """What the medium leaves open, about the best tier there is and as far from it as the medium shifts the mean."""
+    """Draw the uncertainty by the medium about the best tier, shifted as far as the medium shifts the mean."""
     best = [name for name in TIERS if name in table][-1:]
     if "medium_error_of" in table and best:
         values, error = of_pose(table[best[0]])[quantity], np.array(table["medium_error_of"][quantity])
@@ -55,7 +55,7 @@ def _band(ax, table: Mapping, quantity: str, amplitudes) -> None:
 
 
 def medium_band(ax, x, values, error) -> None:
-    """What an uncertain medium leaves open of values (B,): error (B,) to either side."""
+    """Draw the uncertainty by a medium of values (B,): error (B,) to either side."""
     look = {"color": BAND, "alpha": 0.4, "label": "medium, one standard deviation", "zorder": 1.5}
     if len(x) == 1:  # no band to see
         ax.vlines(x, values - error, values + error, lw=6, **look)
@@ -71,7 +71,7 @@ def _widen(ax, least: float) -> None:
 
 @styled
 def displacement_figure(tables: Mapping[str, Mapping], gaits: Sequence[Gait]):
-    """QUANTITIES side by side, a row for each gait's table."""
+    """Draw QUANTITIES side by side, a row for each gait's table."""
     fig, axes = figure(10.8, 0.5 + 2.5 * len(tables), len(QUANTITIES), len(tables))
     for row, (name, table), gait in zip(axes, tables.items(), gaits):
         for ax, quantity in zip(row, QUANTITIES):
@@ -86,13 +86,13 @@ def displacement_figure(tables: Mapping[str, Mapping], gaits: Sequence[Gait]):
 
 
 def _speed_axis(ax, frequency: float, unit: str) -> None:
-    """A scale on the right of net distances: the speed at that frequency."""
+    """Draw a scale on the right of net distances: the speed at that frequency."""
     right = ax.secondary_yaxis("right", functions=(lambda d: d * frequency, lambda v: v / frequency))
     right.set_ylabel(f"speed ({unit}/s) at {frequency:g} Hz")
     right.spines["right"].set_visible(True)
 
 
 def net(poses) -> np.ndarray:
-    """Net distance (...,) of poses (..., 3), negative where it points backwards (x < 0)."""
+    """Return the net distance (...,) of poses (..., 3), negative where it points backwards (x < 0)."""
     found = of_pose(poses)
     return np.copysign(found["net_distance"], found["x"])

@@ -47,8 +47,9 @@ def vector_field(
     labels: Labels = ANGLES,
     top: float | None = None,
 ):
-    """Row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length. labels: as in
-    `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
+    """Draw row ``component`` of A as arrows over shape space (Fig. 11(c)); colour repeats their length.
+
+    labels: as for `shape_space`. top: of the colours and of the arrows' scale, for maps that are compared."""
     ax = axes_of(ax)
     step = every or max(1, round(len(connection.axes[0]) / 13))
     pick = slice(step // 2, None, step)
@@ -61,16 +62,19 @@ def vector_field(
         cut = np.fmin(1.0, largest(size) / np.fmax(size, 1e-300))
         u, v, size = cut * u, cut * v, cut * size
     most = np.nanmax(size, initial=0.0)
-    own = {"scale": None if most else 1.0}
+    scale = {"scale": None if most else 1.0}
     if top:
-        own = {"scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])), "scale_units": "xy"}
-    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **own)
+        scale = {
+            "scale": top / (1.4 * step * np.ptp(connection.axes[0]) / len(connection.axes[0])),
+            "scale_units": "xy",
+        }
+    arrows = ax.quiver(x, y, u, v, size, cmap="viridis", pivot="mid", width=0.007, **scale)
     arrows.set_clim(0.0, top or most or 1.0)
-    return row_told(ax, arrows, component, connection, labels)
+    return label_row(ax, arrows, component, connection, labels)
 
 
-def row_told(ax, arrows, component: int, connection: Connection, labels: Labels):
-    """Title, colours and plane of a map of a row of A."""
+def label_row(ax, arrows, component: int, connection: Connection, labels: Labels):
+    """Set title, colour bar and axes of a map of a row of A."""
     of = rf"\mathbf{{A}}^{{{COMPONENTS[component]}}}"
     ax.set_title(f"${of}$: {TITLES[component]}")
     colorbar = ax.figure.colorbar(arrows, ax=ax, shrink=0.85)
@@ -79,19 +83,19 @@ def row_told(ax, arrows, component: int, connection: Connection, labels: Labels)
 
 
 def unit_of(component: int, unit: str) -> str:
-    """Of a component of a displacement."""
+    """Return the unit of a component of a displacement."""
     return "rad" if component == 2 else unit
 
 
 def drawable(field: Field) -> Field:
-    """The field on at most FINEST points an axis: a finer mesh shows no more and fills gigabytes."""
+    """Return the field on at most FINEST points an axis: a finer mesh shows no more and fills gigabytes."""
     picks = [np.unique(np.linspace(0, len(a) - 1, min(len(a), FINEST)).round().astype(int)) for a in field.axes]
     axes = tuple(a[p] for a, p in zip(field.axes, picks))
     return replace(field, axes=axes, values=field.values[(..., *np.ix_(*picks))])
 
 
 def has(field: Field, component: int) -> bool:
-    """Whether a component of a CCF is more than rounding."""
+    """Return whether a component of a CCF is more than rounding."""
     size = np.nanmax(np.abs(field.values), axis=tuple(range(1, field.values.ndim)), initial=0.0)
     return bool(size[component] > OF_CCF * size.max())
 
@@ -101,13 +105,13 @@ def ccf_map(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, legend: bool = True, metric: Metric | Finsler | None = None, top: float | None = None,
 ):  # fmt: skip
-    """A component of the CCF over shape space with gaits drawn on it (Fig. 11(d)), as far as the field goes; the colours
-    are centred on zero. One that is nothing but rounding is drawn as nothing.
+    """Draw a component of the CCF over shape space with gaits on it (Fig. 11(d)), as far as the field goes; the colours are
+    centred on zero. A component that is rounding alone is drawn as zero.
 
-    error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is
-    known (`unknown`); there no line of zeros is drawn, and beside them only what parts two signs that are known
-    (`certain`). labels: as in `shape_space`. legend: say below the map what hatching means, and rings. metric: drawn as rings
-    (`indicatrices`). top: of the colours, for maps that are compared."""
+    error: of the field (`curvature.error`). Hatched are patches where it exceeds the value, so that not even the sign is known
+    (`unknown`); there no line of zeros is drawn, and next to them only lines that part two known signs (`certain`). labels: as
+    for `shape_space`. legend: explain hatching and rings below the map. metric: drawn as rings (`indicatrices`). top: of the
+    colours, for maps that are compared."""
     from cmcrameri import cm
 
     ax = axes_of(ax)
@@ -117,17 +121,17 @@ def ccf_map(
         values, error = 0 * values, None
     top, smooth = top or (largest(values) if drawn else 1.0), "nearest" if field.masked else "gouraud"
     image = ax.pcolormesh(*field.axes, values.T, cmap=cm.vik, vmin=-top, vmax=top, shading=smooth, rasterized=True)
-    hidden, told = None, []
+    hidden, handles = None, []
     if error is not None:
         hidden = unknown(values, error.values[component])
         values = certain(values, error.values[component])
-        told += _hatch(ax, field, hidden)
+        handles += _hatch(ax, field, hidden)
     _zeros(ax, field, values, hidden)
     shape_space(ax, field.axes, labels)
     if metric is not None:
-        told.append(indicatrices(metric, ax, field.axes))
-    if legend and told:
-        ax.legend(handles=told, loc="upper center", bbox_to_anchor=(0.5, -0.2))
+        handles.append(indicatrices(metric, ax, field.axes))
+    if legend and handles:
+        ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
     for gait in gaits:
         draw_gait(gait, ax, within=field.axes)
@@ -142,19 +146,19 @@ def ccf_map(
 
 
 def ccf_name(component: int) -> str:
-    """CCF with its index."""
+    """Return "CCF" with its index."""
     return rf"CCF$_{{{COMPONENTS[component]}}}$"
 
 
 def ccf_label(component: int, unit: str, labels: Labels) -> str:
-    """For a scale: the name with its unit."""
+    """Return the label of a scale: the name with its unit."""
     per = f"{labels[0][1]}$^2$" if labels[0][1] == labels[1][1] else f"({labels[0][1]} {labels[1][1]})"
     return f"{ccf_name(component)} ({unit_of(component, unit)}/{per})"
 
 
 def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count: int = 7):
-    """Rings around ``count`` x ``count`` shapes: the rates that cost the same, so that a ring is long where, and the way that,
-    shape changes cheaply. All have one scale. Returns what a legend needs."""
+    """Draw rings around ``count`` x ``count`` shapes: rates that cost the same, so that a ring is long in directions in which
+    shape changes cheaply. All have one scale. Return a handle for the legend."""
     from matplotlib.lines import Line2D
 
     spots = [a[0] + np.ptp(a) * (np.arange(count) + 0.5) / count for a in axes]
@@ -168,7 +172,7 @@ def indicatrices(metric: Metric | Finsler, ax, axes: Sequence[np.ndarray], count
 
 
 def _hatch(ax, field: Field, hidden: np.ndarray) -> list:
-    """Patches, with rounded edges; what a legend needs, if there are any."""
+    """Hatch patches, with rounded edges; return handles for the legend, if there are any."""
     from matplotlib.patches import Patch
 
     axes, mask = _rounded(field, hidden)
@@ -178,7 +182,7 @@ def _hatch(ax, field: Field, hidden: np.ndarray) -> list:
 
 
 def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> None:
-    """The line of zeros, but for hidden patches and for bits too short to be a line."""
+    """Draw the line of zeros, but for hidden patches and for bits too short to be a line."""
     from matplotlib.path import Path
 
     axes, fine = finer(field, values)
@@ -197,7 +201,7 @@ def _zeros(ax, field: Field, values: np.ndarray, hidden: np.ndarray | None) -> N
 
 
 def _rounded(field: Field, hidden: np.ndarray):
-    """As `_finer`, a mask's: above one half inside."""
+    """Return a mask on the points of `finer`: above one half inside."""
     from scipy.ndimage import gaussian_filter
 
     axes, mask = finer(field, hidden.astype(float), degree=1)
@@ -205,7 +209,7 @@ def _rounded(field: Field, hidden: np.ndarray):
 
 
 def finer(field: Field, values: np.ndarray, degree: int = 3):
-    """(axes, values) between the grid's points too, for lines that are smooth; as they are beside singular shapes."""
+    """Return (axes, values) between the grid's points, too, for smooth lines; unchanged next to singular shapes."""
     from scipy.interpolate import RectBivariateSpline
 
     if field.masked or max(values.shape) * FINER > FINEST or min(values.shape) < 4:
@@ -215,8 +219,8 @@ def finer(field: Field, values: np.ndarray, degree: int = 3):
 
 
 def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """(N_1, N_2): where error > |value| over a patch of 3 by 3 points or more, or over PATCH points together away from
-    where the value changes sign. What goes along with a line of zeros says nothing that it does not say."""
+    """Return a mask (N_1, N_2) where error > |value| over a patch of 3 by 3 points or more, or over PATCH points together away
+    from sign changes. A patch along a line of zeros adds nothing to that line."""
     from scipy.ndimage import binary_opening, label, maximum_filter, minimum_filter
 
     beyond, square = error > np.abs(values), np.ones((3, 3))
@@ -228,7 +232,8 @@ def unknown(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 
 def largest(values: np.ndarray) -> float:
-    """Of the magnitudes, for a scale; beside singular shapes, where these grow beyond all bounds, of nine tenths of them."""
+    """Return the largest of magnitudes, for a scale; next to singular shapes, where they have no bound, of nine tenths of
+    them."""
     size = np.abs(values[np.isfinite(values)])
     if not size.size:
         return 1.0
@@ -236,8 +241,8 @@ def largest(values: np.ndarray) -> float:
 
 
 def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """values (N_1, N_2) for a line of zeros that follows no noise: where |value| <= error averaged with their neighbours,
-    and of the other sign wherever a patch of one sign has no point that is known."""
+    """Return values (N_1, N_2) for a line of zeros that follows no noise: where |value| <= error averaged with their
+    neighbours, and of the other sign wherever a patch of one sign has no known point."""
     from scipy.ndimage import gaussian_filter, label
 
     known = np.abs(values) > error
@@ -252,8 +257,9 @@ def certain(values: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 @styled
 def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.ndarray] | None = None, line: str = "-"):
-    """The gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid. line: its
-    style."""
+    """Draw the gait's curve with a dot at its start and an arrow along it, as far as it lies within the axes of a grid.
+
+    line: its style."""
     ax, curve = axes_of(ax), gait.shape(PHASES)
     curve[~inside_of(curve, within or ())] = np.nan
     ax.plot(*curve.T, line, color=color, lw=1.2)
@@ -267,7 +273,7 @@ def draw_gait(gait: Gait, ax=None, color: str = "black", within: Sequence[np.nda
 
 
 def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
-    """(P,): which shapes of a curve (P, 2) lie within the axes of a grid, to rounding."""
+    """Return a mask (P,) of the shapes of a curve (P, 2) that lie within the axes of a grid, to rounding."""
     inside = np.ones(len(curve), bool)
     for x, axis in zip(curve.T, axes):
         slack = 1e-9 * np.ptp(axis)
@@ -277,7 +283,7 @@ def inside_of(curve: np.ndarray, axes: Sequence[np.ndarray]) -> np.ndarray:
 
 @styled
 def frame_figure(pose: Field, *, labels: Labels = ANGLES):
-    """The pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
+    """Draw the pose of a body frame in another over shape space: x, y and heading side by side, colours centred on zero."""
     from cmcrameri import cm
 
     fig, axes = figure(10.8, 3.0, 3, layout="compressed")

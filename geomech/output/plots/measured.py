@@ -15,8 +15,8 @@ TICKS = {0.0: "0", np.pi: r"$\pi$", 2 * np.pi: r"$2\pi$"}
 
 @styled
 def measured_figure(fit: Fitted):
-    """Left the shapes of the first two joints; in the middle the rows of A along the mean gait, with bands; on the right, net
-    poses of the cycles as logged against those that the connection predicts."""
+    """Draw on the left the shapes of the first two joints, in the middle the rows of A along the mean gait, with bands, on the
+    right the net poses of the cycles as logged against those that the connection predicts."""
     from geomech.output.plots.shown import ShownAxes
 
     fig, axes = figure(10.8, 6.6, 3, 3, width_ratios=(1.4, 1.2, 1.0))
@@ -57,12 +57,14 @@ def _shapes(fit: Fitted, ax) -> None:
 
 
 def _noted(fit: Fitted, ax) -> None:
-    """The net displacement of the mean gait, in words."""
-    (net, off), (mean, mean_off) = fit.displacement, fit.mean
+    """Write the net displacement of the mean gait as a small table."""
+    (net, half_width), (mean, mean_half_width) = fit.displacement, fit.mean
     ax.set_axis_off()
     head = f"net displacement per cycle, {100 * fit.known.level:.3g} % intervals"
     rows = [("", "mean of the log", "mean gait, predicted")]
-    for name, u, a, b, c, d in zip(("x", "y", "heading"), (fit.unit, fit.unit, "rad"), mean, mean_off, net, off):
+    for name, u, a, b, c, d in zip(
+        ("x", "y", "heading"), (fit.unit, fit.unit, "rad"), mean, mean_half_width, net, half_width
+    ):
         pair = lambda value, error: rf"${value:.5f} \pm {error:.5f}$"
         rows.append((f"{name} ({u})", pair(a, b), pair(c, d)))
     ax.text(0.0, 0.8, head, transform=ax.transAxes)

@@ -1,5 +1,5 @@
-"""A body in motion: where it is on its own track, and where its shape is among all shapes; as a film's panels, and as a
-strip of pictures for a page."""
+"""A body in motion: its pose on its track and its shape among all shapes, as a film's panels and as a strip of pictures for a
+page."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from geomech.systems.base import length_unit, shape_labels
 
 BODY, HEAD = "#1b4965", "#d1495b"
 LINES = 8  # shape variables beyond which they are a map along the body, not a line each
-JOINTS_SHOWN = 12  # links beyond which their joints are not marked
+MOST_JOINTS = 12  # links beyond which their joints are not marked
 STRIP = 6  # pictures of a strip
 MAP = 2.4  # in, height of a map with its labels
 ROOM = 0.06  # of the larger side, left around what moves
 
 
 def reach(motion: Motion, rows) -> tuple[np.ndarray, np.ndarray]:
-    """(lowest, highest) x and y of all that is seen in these rows, with some room."""
+    """Return (lowest, highest) x and y of all that is seen in these rows, with a margin."""
     places = [motion.pose[:, :2], _bodies(motion, rows).reshape(-1, 2)]
     low, high = np.concatenate(places).min(0), np.concatenate(places).max(0)
     room = ROOM * max(*(high - low), 1e-9 * motion.scene.system.length)
@@ -30,7 +30,7 @@ def reach(motion: Motion, rows) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bodies(motion: Motion, rows) -> np.ndarray:
-    """(rows, points, 2): the links' ends, or an arrow's tail and head where there is no body to show."""
+    """Return the links' ends (rows, points, 2), or an arrow's tail and head for a system without a body."""
     points = motion.points(rows)
     if points is not None:
         return points
@@ -40,32 +40,33 @@ def _bodies(motion: Motion, rows) -> np.ndarray:
 
 
 def world(ax, motion: Motion, rows, limits=None) -> Callable:
-    """The track of the frame's origin on an Axes to the scale of the body; a function of row that puts the body there and
-    gives the artists it has moved."""
+    """Draw the track of the frame's origin to the scale of the body; return a function that draws the body at a row and
+    returns the artists that it moved."""
     low, high = reach(motion, rows) if limits is None else limits
     unit = length_unit(motion.scene.system)
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.plot(*motion.pose[:, :2].T, color="0.6", lw=0.6)
-    (behind,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
-    few = motion.points(slice(0, 1)) is not None and motion.points(slice(0, 1)).shape[-2] <= JOINTS_SHOWN + 1
+    (track,) = ax.plot([], [], color=HEAD, lw=1.0, zorder=3)
+    few = motion.points(slice(0, 1)) is not None and motion.points(slice(0, 1)).shape[-2] <= MOST_JOINTS + 1
     (body,) = ax.plot(
         [], [], color=BODY, lw=2.5, solid_capstyle="round", marker="o" if few else "", ms=3, mfc="white", mew=0.8
     )
     (head,) = ax.plot([], [], "o", color=HEAD, ms=5)
 
-    def put(row: int):
+    def update(row: int):
         bodies = _bodies(motion, slice(row, row + 1))[0]
-        behind.set_data(*motion.pose[: row + 1, :2].T)
+        track.set_data(*motion.pose[: row + 1, :2].T)
         body.set_data(*bodies.T)
         head.set_data(*bodies[-1:].T)
-        return behind, body, head
+        return track, body, head
 
-    return put
+    return update
 
 
 def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = None) -> Callable:
-    """The gait among all shapes: on the map of the CCF along x, or of the first component that there is, or the bare plane of
-    two shape variables; against phase a line each for few, a map along the body for many. A function of row as `world`."""
+    """Draw the gait among all shapes: on the map of the CCF along x, or of the first component that exists, or on the bare
+    plane of two shape variables; for more, against phase, a line each for few, a map along the body for many. Return a
+    function as `world` does."""
     scene, system = motion.scene, motion.scene.system
     if system.joints == 2:
         if field is not None:
@@ -93,7 +94,7 @@ def shape(ax, motion: Motion, field: Field | None = None, error: Field | None = 
 
 
 def _bends(ax, motion: Motion, turns) -> None:
-    """Curvature over phase and place along the body: angles between elements over the distance of their centres."""
+    """Draw the curvature over phase and place along the body: angles between elements over the distance of their centres."""
     from cmcrameri import cm
 
     values, name, ends = motion.alpha[: len(turns)].T, "angle between elements (rad)", motion.points(slice(0, 1))
@@ -109,15 +110,15 @@ def _bends(ax, motion: Motion, turns) -> None:
 
 
 def _moving(artist, at: Callable) -> Callable:
-    def put(row: int):
+    def update(row: int):
         artist.set_data(*at(row))
         return (artist,)
 
-    return put
+    return update
 
 
 def clock(motion: Motion, row: int) -> str:
-    """What time it is at a row."""
+    """Return the time at a row, or its cycle where the gait has no frequency."""
     if motion.time is not None:
         return f"t = {motion.time[row]:.3g} s"
     return f"cycle {motion.phase[row] / (2 * np.pi):.2f}"
@@ -125,25 +126,25 @@ def clock(motion: Motion, row: int) -> str:
 
 @styled
 def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None):
-    """(Figure, function of row that moves what moves in it and gives the artists): the world beside the shapes."""
+    """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes."""
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
     left, right = axes[0]
     if motion.scene.system.joints != 2:
         right.set_box_aspect(0.8)
-    put_body, put_shape = world(left, motion, rows), shape(right, motion, field, error)
+    move_body, move_shape = world(left, motion, rows), shape(right, motion, field, error)
     text = left.set_title("", loc="left")
 
-    def put(row: int):
+    def update(row: int):
         text.set_text(clock(motion, row))
-        return *put_body(row), *put_shape(row), text
+        return *move_body(row), *move_shape(row), text
 
-    return fig, put
+    return fig, update
 
 
 @styled
 def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = None, pictures: int = STRIP):
-    """The body at some phases, equally spaced from the start to the end and to one scale, and its shapes in a panel beside
-    them, with the same numbers."""
+    """Draw the body at some phases, equally spaced from start to end and to one scale, and its shapes in a panel next to them,
+    with the same numbers."""
     rows = np.linspace(0, len(motion.phase) - 1, pictures).round().astype(int)
     low, high = limits = reach(motion, rows)
     tall = max((high - low)[1] / (high - low)[0], 0.12)  # of a picture, for its width
@@ -167,14 +168,14 @@ def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = 
 
 
 def _numbers(ax, motion: Motion, rows) -> None:
-    """The pictures' numbers where their shapes are; those of one shape side by side."""
-    here: dict[tuple, list[str]] = {}
+    """Write the pictures' numbers at their shapes; numbers of one shape stand in one text."""
+    numbers: dict[tuple, list[str]] = {}
     for k, row in enumerate(rows):
         turn = float(motion.phase[row] / (2 * np.pi) % 1)
         at = tuple(np.round(motion.alpha[row], 9)) if motion.scene.system.joints == 2 else (round(turn, 9),)
-        here.setdefault(at, []).append(str(k + 1))
+        numbers.setdefault(at, []).append(str(k + 1))
     middle = motion.alpha.mean(0)
-    for at, numbers in here.items():
+    for at, texts in numbers.items():
         if len(at) == 2:
             ax.plot(*at, "o", color=HEAD, ms=6, mec="white", mew=0.8)
             away = np.subtract(at, middle)
@@ -183,4 +184,4 @@ def _numbers(ax, motion: Motion, rows) -> None:
             ax.axvline(at[0], color=HEAD, lw=1.0)
             where = {"xy": (at[0], 1.0), "xycoords": ("data", "axes fraction"), "xytext": (0, 6)}
         style = {"textcoords": "offset points", "ha": "center", "va": "center", "weight": "bold"}
-        ax.annotate(",".join(numbers), **where, **style)
+        ax.annotate(",".join(texts), **where, **style)

@@ -30,9 +30,11 @@ FLAT = 0.3  # order below which finer settings gain nothing to speak of
 
 @styled
 def work_precision(results: Mapping, axes=None):
-    """Error against seconds of `accuracy.study`, a line for each setting of a tier, the values it goes from and to beside
-    its ends: how far off the answer is on the first of two Axes, how far off what that setting comes to on the second. Of what
-    no setting is measured against there are no Axes."""
+    """Draw error against seconds of `accuracy.study`, a line for each setting of a tier with its first and last value at its
+    ends.
+
+    The first of two Axes has the error of the answer, the second the error from the limit of that setting alone. A kind of
+    error that no setting is measured by has no Axes."""
     found = {against: [x for x in results["lines"] if x["against"] == against] for against in PANELS}
     found = {against: lines for against, lines in found.items() if lines}
     axes = figure(5.0 * len(found), 3.8, len(found))[1][0] if axes is None else axes
@@ -63,7 +65,7 @@ def _line(ax, line: Mapping, marker: str, colour: str) -> None:
 
 
 def _decades(axis) -> None:
-    """Labels at powers of ten alone, two of them at least."""
+    """Label powers of ten alone, two of them at least."""
     low, high = axis.get_view_interval()
     if np.floor(np.log10(high)) - np.ceil(np.log10(low)) < 1:
         axis.axes.set(**{f"{axis.axis_name}lim": (10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))})
@@ -80,7 +82,7 @@ def work_precision_figure(results: Mapping):
 
 @styled
 def walk_accuracy_figure(results: dict):
-    """Error of the speed against each knob of a robot (`geomech.study.accuracy`)."""
+    """Draw the error of the speed against each knob of a robot (`geomech.study.accuracy`)."""
     fig, axes = figure(8.4, 2.9, len(results["lines"]))
     labels = {"steps": "steps of a cycle", "elements": "elements of an outline", "rounding": "rounding (m/s)"}
     for ax, line in zip(axes[0], results["lines"]):

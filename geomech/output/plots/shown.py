@@ -11,7 +11,7 @@ DPI = 110
 
 
 class ShownFigure(Figure):
-    """A Figure that is a picture where a notebook's cell ends with it."""
+    """A Figure that a notebook shows if a cell ends with it."""
 
     def _repr_png_(self) -> bytes:
         with io.BytesIO() as file:
@@ -20,12 +20,12 @@ class ShownFigure(Figure):
 
 
 class ShownAxes(Axes):
-    """Axes that show their figure where a notebook's cell ends with them."""
+    """Axes whose figure a notebook shows if a cell ends with them."""
 
     def _repr_png_(self) -> bytes:
         return self.get_figure(root=True)._repr_png_()
 
     def _update_title_position(self, renderer) -> None:
-        """Matplotlib measures all ticks to place titles above them, whether there are any or not: a tenth of a drawing."""
+        """Place titles only where there are any: matplotlib measures all ticks for it, a tenth of a drawing."""
         if any(title.get_text() for title in (self.title, self._left_title, self._right_title)):
             super()._update_title_position(renderer)

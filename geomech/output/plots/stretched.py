@@ -29,9 +29,10 @@ def stretched_map(
     field: Field, stretch: Stretch, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None,
     error: Field | None = None, labels: Labels = ANGLES, effort: str = "effort", top: float | None = None,
 ):  # fmt: skip
-    """A component of the CCF over stretched shape space, for each area there: an area on paper times the colour is what it adds
-    to the displacement, and the length of a gait what it costs. Thin lines are those of constant shape variables, thick ones
-    where they are 0. effort: unit of path length. Other arguments as for `ccf_map`."""
+    """Draw a component of the CCF over stretched shape space, per area there: an area on paper times the colour is what it
+    adds to the displacement, and the length of a gait is its cost. Lines of constant shape variables are thin, and thick at 0.
+
+    effort: unit of path length. Other arguments as for `ccf_map`."""
     from cmcrameri import cm
 
     ax, values = axes_of(ax), stretch.density(Field(field.axes, field.values[component], field.degree))
@@ -39,9 +40,9 @@ def stretched_map(
     u, v = stretch.field.values
     image = ax.pcolormesh(u, v, values, cmap=cm.vik, vmin=-most, vmax=most, shading="gouraud", rasterized=True)
     if error is not None:
-        off = stretch.density(Field(error.axes, error.values[component], 1))
-        ax.contourf(u, v, unknown(values, off).astype(float), levels=[0.5, 2.0], colors="none", hatches=["||||||"])
-        values = np.where(unknown(values, off), np.nan, certain(values, off))
+        limit = stretch.density(Field(error.axes, error.values[component], 1))
+        ax.contourf(u, v, unknown(values, limit).astype(float), levels=[0.5, 2.0], colors="none", hatches=["||||||"])
+        values = np.where(unknown(values, limit), np.nan, certain(values, limit))
     if np.nanmin(values) < 0 < np.nanmax(values):
         ax.contour(u, v, values, levels=[0.0], colors="0.35", linewidths=0.6)
     _angles(ax, stretch, labels)
@@ -56,7 +57,7 @@ def stretched_map(
 
 
 def _angles(ax, stretch: Stretch, labels: Labels) -> None:
-    """Lines of constant shape variables at round values, and which are which."""
+    """Draw and label lines of constant shape variables at round values."""
     from matplotlib.ticker import MaxNLocator
 
     axes = stretch.field.axes
@@ -85,7 +86,7 @@ def _angles(ax, stretch: Stretch, labels: Labels) -> None:
 
 
 def _draw(gait: Gait, ax, stretch: Stretch) -> None:
-    """As `draw_gait`."""
+    """Draw a gait as `draw_gait` does, on stretched shape space."""
     curve = gait.shape(PHASES)
     inside = inside_of(curve, stretch.field.axes)
     seen = np.full(curve.shape, np.nan)
@@ -103,11 +104,11 @@ def stretched_figure(
     field: Field, stretch: Stretch, gaits: Sequence[Gait] = (), *, error: Field | None = None,
     labels: Labels = ANGLES, effort: str = "effort",
 ):  # fmt: skip
-    """All three components side by side, with what the plane does to lengths."""
+    """Draw all three components side by side, with the errors of length of the plane."""
     fig, axes = figure(11.4, 3.5, 3, layout="compressed")
     for component, ax in enumerate(axes[0]):
         stretched_map(field, stretch, component, gaits, ax=ax, error=error, labels=labels, effort=effort)
-    off = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"
+    caption = f"lengths on paper are off by {100 * stretch.rms:.2g} % rms, {100 * stretch.largest:.2g} % at most"
     fold = f"; {100 * stretch.folded:.2g} % of the plane is folded over" if stretch.folded else ""
-    fig.supxlabel(off + fold, fontsize=8)
+    fig.supxlabel(caption + fold, fontsize=8)
     return fig

@@ -1,4 +1,4 @@
-"""What all pictures have in common: the project's style, figures without pyplot's global state, files that appear whole."""
+"""The look of all pictures: the project's style, figures without pyplot's global state, files that appear whole."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ STYLE = {
 }
 
 
-Asked = ParamSpec("Asked")
+Arguments = ParamSpec("Arguments")
 Drawn = TypeVar("Drawn")
 
 
-def styled(draw: Callable[Asked, Drawn]) -> Callable[Asked, Drawn]:
+def styled(draw: Callable[Arguments, Drawn]) -> Callable[Arguments, Drawn]:
     """Make a drawing function use the project's style, whatever the caller's is."""
 
     @functools.wraps(draw)
-    def in_style(*args: Asked.args, **kwargs: Asked.kwargs) -> Drawn:
+    def in_style(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Drawn:
         import matplotlib as mpl
 
         with mpl.rc_context(STYLE):
@@ -48,8 +48,8 @@ def styled(draw: Callable[Asked, Drawn]) -> Callable[Asked, Drawn]:
 
 @styled
 def blank(width: float, height: float, layout: str = "constrained") -> Any:
-    """A Figure, sizes in inches, whose Axes are laid out without overlap; "compressed" brings those of a row of maps
-    together."""
+    """Return a Figure, sizes in inches, whose Axes are laid out without overlap; "compressed" closes the gaps in a row of
+    maps."""
     from geomech.output.plots.shown import ShownFigure
 
     fig = ShownFigure(figsize=(width, height), layout=layout)
@@ -61,15 +61,16 @@ def blank(width: float, height: float, layout: str = "constrained") -> Any:
 def figure(
     width: float, height: float, columns: int = 1, rows: int = 1, layout: str = "constrained", **grid: Any
 ) -> tuple[Any, Any]:
-    """(Figure, array of Axes (rows, columns)) as `blank`; both show in a notebook. ``grid`` as for matplotlib's GridSpec."""
+    """Return (Figure, array of Axes (rows, columns)) as `blank` does; both show in a notebook. ``grid`` as for matplotlib's
+    GridSpec."""
     from geomech.output.plots.shown import ShownAxes
 
-    fig, shown = blank(width, height, layout), {"axes_class": ShownAxes}
-    return fig, fig.subplots(rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=shown)
+    fig, subplot = blank(width, height, layout), {"axes_class": ShownAxes}
+    return fig, fig.subplots(rows, columns, squeeze=False, gridspec_kw=grid, subplot_kw=subplot)
 
 
 def quantity(name: str, unit: str = "") -> str:
-    """For an axis: the name with its unit in brackets, a letter with an index drawn as one."""
+    """Return the label of an axis: the name with its unit in brackets, a letter with an index drawn as one."""
     letter, _, index = name.partition("_")
     if index.isalnum() and (letter in GREEK or len(letter) == 1):
         name = rf"$\{letter}_{{{index}}}$" if letter in GREEK else f"${letter}_{{{index}}}$"
@@ -77,8 +78,8 @@ def quantity(name: str, unit: str = "") -> str:
 
 
 def axes_of(ax: Any) -> Any:
-    """ax; without it the Axes that pyplot stands at, where the caller has a figure of pyplot open, else new ones that a
-    notebook shows."""
+    """Return ax; without it pyplot's current Axes, where the caller has a figure of pyplot open, else new ones that a notebook
+    shows."""
     if ax is not None:
         return ax
     pyplot = sys.modules.get("matplotlib.pyplot")
@@ -86,7 +87,7 @@ def axes_of(ax: Any) -> Any:
 
 
 def check_format(path: str | Path) -> Path:
-    """path if its ending is a figure format, else Refusal."""
+    """Return path if its ending is a figure format, else Refusal."""
     formats = (".png", ".pdf", ".svg")
     path = Path(path)
     if path.suffix.lower() not in formats:
@@ -96,8 +97,8 @@ def check_format(path: str | Path) -> Path:
 
 @styled
 def save(fig, *paths: str | Path) -> None:
-    """Write a figure to files, each of which appears whole or not at all. It is laid out for the first and drawn once for
-    each, where `savefig` lays out and draws twice for each."""
+    """Write a figure to files, each of which appears whole or not at all. The figure is laid out once and drawn once for each
+    file, where `savefig` lays out and draws twice for each."""
     canvas, engine, dpi = fig.canvas, fig.get_layout_engine(), fig.dpi
     try:
         for path in map(check_format, paths):

@@ -20,8 +20,8 @@ from geomech.output.plots.maps import (
     draw_gait,
     drawable,
     finer,
+    label_row,
     largest,
-    row_told,
     shape_space,
     unit_of,
     vector_field,
@@ -39,7 +39,7 @@ LINES = 61  # points an axis that streamlines are drawn on
 LEVELS = 6  # contours of either sign
 AREA = 240  # points an axis on which a gait's area is shaded
 MINUS_SIGN = "\N{MINUS SIGN}"
-_WAYS = ("ahead", "backwards"), ("to the left", "to the right"), ("turns left", "turns right")
+DIRECTIONS = ("ahead", "backwards"), ("to the left", "to the right"), ("turns left", "turns right")
 PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards, or to either side
 
 
@@ -48,8 +48,8 @@ PLUS, MINUS = "#B2182B", "#2166AC"  # of areas that carry forwards and backwards
 def streamlines(
     connection: Connection, component: int = 0, *, ax=None, labels: Labels = ANGLES, top: float | None = None
 ):  # fmt: skip
-    """Row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for its
-    size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
+    """Draw row ``component`` of A as streamlines over shape space: along them a change of shape moves the body the most for
+    its size, across them not at all. Colour: length of the row. Other arguments as for `vector_field`."""
     from matplotlib.colors import Normalize
 
     ax = axes_of(ax)
@@ -67,7 +67,7 @@ def streamlines(
         u, v, size = 0 * u, 0 * v, 0 * size
     look = {"cmap": "viridis", "norm": Normalize(0.0, most), "density": 1.1, "linewidth": 0.9, "arrowsize": 0.8}
     lines = ax.streamplot(*even, u.T, v.T, color=np.nan_to_num(size.T), **look)
-    return row_told(ax, lines.lines, component, connection, labels)
+    return label_row(ax, lines.lines, component, connection, labels)
 
 
 @CCF_STYLES.register(style="contours")
@@ -76,9 +76,10 @@ def ccf_contours(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, top: float | None = None,
 ):  # fmt: skip
-    """A component of the CCF as contours, dashed below zero, and the area of each gait shaded by the sign of what it adds to
-    the displacement: CCF times how often, and which way, the gait winds around it. error: shapes where it exceeds the value
-    have no shade. Other arguments as for `ccf_map`."""
+    """Draw a component of the CCF as contours, dashed below zero, and shade the area of each gait by the sign of its
+    contribution to the displacement: CCF times winding number.
+
+    error: shapes where it exceeds the value have no shade. Other arguments as for `ccf_map`."""
     from matplotlib.ticker import MaxNLocator
 
     ax, field = axes_of(ax), drawable(field)
@@ -95,21 +96,23 @@ def ccf_contours(
         signs |= _shaded(ax, field, component, gait, error)
         draw_gait(gait, ax, within=field.axes)
     if signs:
-        ax.legend(handles=_ways(component, signs), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+        ax.legend(handles=_legend_patches(component, signs), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     ax.set_title(f"{ccf_label(component, field.unit, labels)}: {TITLES[component]}")
     return ax
 
 
-def _ways(component: int, signs: set[int]) -> list:
-    """What a legend needs of the shades of these signs."""
+def _legend_patches(component: int, signs: set[int]) -> list:
+    """Return handles for a legend of the shades of these signs."""
     from matplotlib.patches import Patch
 
     looks = ((1, PLUS), (-1, MINUS))
-    return [Patch(facecolor=c, alpha=0.35, label=_WAYS[component][k]) for k, (s, c) in enumerate(looks) if s in signs]
+    return [
+        Patch(facecolor=c, alpha=0.35, label=DIRECTIONS[component][k]) for k, (s, c) in enumerate(looks) if s in signs
+    ]
 
 
 def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -> set[int]:
-    """Shades the area of a gait, by the sign of CCF times winding number; the signs there are."""
+    """Shade the area of a gait by the sign of CCF times winding number; return the signs that occur."""
     x, y = (np.linspace(a[0], a[-1], AREA) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
     times = winding(gait.shape(PHASES), x, y)
@@ -127,8 +130,8 @@ def _shaded(ax, field: Field, component: int, gait: Gait, error: Field | None) -
 
 
 def winding(curve: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(N, M): how often a closed curve (P, 2) winds around the points of the grid x (N,) by y (M,), counter-clockwise
-    positive: crossings, of either sign, of the line from each point to the right."""
+    """Return the winding number (N, M) of a closed curve (P, 2) around the points of the grid x (N,) by y (M,), positive
+    counter-clockwise: crossings, of either sign, of the line from each point to the right."""
     (x0, y0), (x1, y1) = curve.T, np.roll(curve, -1, 0).T
     below, above = y0[:, None] <= y, y1[:, None] <= y
     k, j = np.nonzero(below != above)
@@ -144,8 +147,10 @@ def ccf_surface(
     field: Field, component: int = 0, gaits: Sequence[Gait] = (), *, ax=None, error: Field | None = None,
     labels: Labels = ANGLES, top: float | None = None,
 ):  # fmt: skip
-    """A component of the CCF as a surface over shape space, with gaits drawn on it and, on the plane below, their areas shaded
-    by sign as in `ccf_contours`. ax: of projection "3d"; without it one of a new figure."""
+    """Draw a component of the CCF as a surface over shape space, with gaits on it and, on the plane below, their areas shaded
+    by sign as in `ccf_contours`.
+
+    ax: of projection "3d"; without it one of a new figure."""
     from cmcrameri import cm
 
     from geomech.output.plots.style import blank
@@ -154,9 +159,9 @@ def ccf_surface(
     field = drawable(field)
     axes, values = finer(field, field.values[component])
     most = top or largest(values)
-    shown = np.clip(values, -most, most)
+    clipped = np.clip(values, -most, most)
     ax.plot_surface(
-        *np.meshgrid(*axes, indexing="ij"), shown, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,
+        *np.meshgrid(*axes, indexing="ij"), clipped, cmap=cm.vik, vmin=-most, vmax=most, rcount=121, ccount=121, lw=0,
         antialiased=False, rasterized=True, alpha=0.9,
     )  # fmt: skip
     floor, signs = -1.6 * most, set()
@@ -170,7 +175,7 @@ def ccf_surface(
             ax.plot(*curve.T, np.clip(height, -most, most), color="black", lw=1.4, zorder=10)
             signs |= _floor(ax, field, component, gait, floor)
     if signs:
-        ax.legend(handles=_ways(component, signs), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2)
+        ax.legend(handles=_legend_patches(component, signs), loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2)
     ax.set(
         xlabel=quantity(*labels[0]), ylabel=quantity(*labels[1]), zlim=(floor, most),
         title=f"{ccf_name(component)}: {TITLES[component]}",
@@ -184,7 +189,7 @@ def ccf_surface(
 
 
 def _floor(ax, field: Field, component: int, gait: Gait, floor: float) -> set[int]:
-    """The area of a gait on the plane below a surface; the signs there are."""
+    """Shade the area of a gait on the plane below a surface; return the signs that occur."""
     x, y = (np.linspace(a[0], a[-1], AREA // 2) for a in field.axes)
     shapes = np.stack(np.meshgrid(x, y, indexing="ij"), -1)
     density = Field(field.axes, field.values[component], 1)(shapes) * winding(gait.shape(PHASES), x, y)

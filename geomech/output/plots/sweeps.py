@@ -37,7 +37,7 @@ def sweep_figure(scene: Any, results: Mapping):
 
 
 def _net_figure(scene: Scene, results: Mapping):
-    """Draw what is `drawn` against one parameter, or a map over two."""
+    """Draw the values of `drawn` against one parameter, or a map over two."""
     over = results["over"]
     values, error, medium, label = drawn(scene, results)
     fig, axes = figure(4.0, 3.0)
@@ -53,8 +53,8 @@ def _net_figure(scene: Scene, results: Mapping):
 
 
 def drawn(scene: Scene, results: Mapping):
-    """(values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs from
-    point to point, the speed; negative where it is backwards."""
+    """Return (values, their errors, the medium's or None, a label): the net distance per cycle or, where the frequency differs
+    from point to point, the speed; negative where it is backwards."""
     distance, frequency = net(results["displacement"]), results.get("frequency")
     unit, timed = results["units"]["estimate"], frequency is not None and np.ptp(frequency) > 0
     factor = frequency if timed else 1.0
@@ -76,7 +76,7 @@ def _line(ax, x, values: np.ndarray, errors: np.ndarray, medium: np.ndarray | No
 
 @styled
 def _map(ax, x, y, net: np.ndarray, label: str) -> None:
-    """Cells about the points, that end where the values do; colours centred on zero where the sign changes."""
+    """Draw cells about the points, which end where the values do; colours are centred on zero where the sign changes."""
     from cmcrameri import cm
 
     top = np.abs(net).max() or 1.0
@@ -89,21 +89,22 @@ def _map(ax, x, y, net: np.ndarray, label: str) -> None:
 
 
 def labels(scene, parameters: list[str], units: Mapping[str, str] = PARAMETERS) -> list[str]:
-    """For axes: names with units; by their last part where that says which, "body-inertia: frequency (Hz)" else."""
+    """Return labels of axes: names with units; by their last part where that is unique, else as "body-inertia: frequency
+    (Hz)"."""
     last = [name.rpartition(".")[2] for name in parameters]
     out = []
     for name, short in zip(parameters, last):
-        whose = name.split(".")[-2].replace("_", "-")
-        shown = short if last.count(short) == 1 else f"{whose}: {short}"
+        owner = name.split(".")[-2].replace("_", "-")
+        text = short if last.count(short) == 1 else f"{owner}: {short}"
         unit = "deg" if short.endswith("_deg") else units.get(short, "-")
-        angle = shown.removesuffix("_deg").replace("gamma0", "gamma_0")
+        angle = text.removesuffix("_deg").replace("gamma0", "gamma_0")
         out.append(scene.gait.amplitude_label if name == AMPLITUDE else quantity(angle, unit))
     return out
 
 
 @styled
 def _speed_figure(scene: Any, results: Mapping):
-    """Draw speed against one parameter, or against the first for every value of a second; open: not walking."""
+    """Draw speed against one parameter, or against the first for every value of a second; open markers: not walking."""
     over = results["over"]
     name, *second = labels(scene, list(over), OF_ROBOTS)
     values, *others = over.values()
@@ -114,14 +115,14 @@ def _speed_figure(scene: Any, results: Mapping):
 
 
 def curves(ax, values, results: Mapping, names) -> None:
-    """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open: not walking."""
+    """Draw speed (N, ...) over ``values``, a curve for each name, with its error; open markers: not walking."""
     from cmcrameri import cm
 
     speed, error, status = (np.asarray(results[x]).reshape(len(values), -1) for x in ("speed", "estimate", "status"))
     for k, label in enumerate(names):
         colour = cm.batlow(0.85 * k / max(1, len(names) - 1))
         ax.errorbar(values, speed[:, k], yerr=error[:, k], color=colour, lw=1.0, capsize=2, label=label)
-        for fill, some in ((colour, status[:, k] == "walking"), ("white", status[:, k] != "walking")):
-            ax.plot(np.array(values)[some], speed[some, k], "o", ms=4, color=colour, mfc=fill)
+        for fill, mask in ((colour, status[:, k] == "walking"), ("white", status[:, k] != "walking")):
+            ax.plot(np.array(values)[mask], speed[mask, k], "o", ms=4, color=colour, mfc=fill)
     if any(names):
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

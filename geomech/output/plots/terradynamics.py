@@ -16,21 +16,23 @@ COLOURS = {"x": "C0", "y": "C2", "z": "C3"}
 
 @styled
 def stress_figure(survey, point: tuple[float, float] | None = None):
-    """alpha_z and alpha_x over tilt and direction of motion (Fig. 7(c) and (d)) of an `rft.plates.Survey`, hatched where the
-    map pulls. point: (beta, gamma) in degrees to mark."""
+    """Draw alpha_z and alpha_x of an `rft.plates.Survey` over tilt and direction of motion (Fig. 7(c) and (d)), hatched where
+    the map pulls.
+
+    point: (beta, gamma) in degrees to mark."""
     fig, axes = figure(8.6, 3.5, 2)
     for ax, name in zip(axes[0], "zx"):
         stress_map(ax, survey, name)
         if survey.pulling:
             ax.set_title("hatched: pulls on the leading face", loc="left", fontsize=8)
         if point:
-            ax.plot(*_shown(*point), "o", mfc="white", mec="black", ms=5, clip_on=False, zorder=5)
+            ax.plot(*_point_on_map(*point), "o", mfc="white", mec="black", ms=5, clip_on=False, zorder=5)
     return fig
 
 
 def stress_map(ax, survey, name: str):
-    """alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls. Colours
-    are to the scale of both."""
+    """Draw alpha_x or alpha_z (``name`` "x" or "z") of an `rft.plates.Survey` for motion forwards, hatched where it pulls.
+    Both have one scale of colours."""
     from cmcrameri import cm
 
     ahead = np.abs(survey.gamma) < np.pi / 2
@@ -48,21 +50,21 @@ def stress_map(ax, survey, name: str):
 
 
 def square_of_angles(ax) -> None:
-    """Axes of tilt and direction of motion."""
+    """Set the axes of tilt and direction of motion."""
     ticks = [-90, -45, 0, 45, 90]
     ax.set(xlabel=r"tilt $\beta$ (degrees)", ylabel=r"direction $\gamma$ below the horizontal (degrees)")
     ax.set(aspect="equal", xlim=(-90, 90), ylim=(-90, 90), xticks=ticks, yticks=ticks)
 
 
-def _shown(beta: float, gamma: float) -> tuple[float, float]:
-    """The point of the map for any angles: motion backwards is that of the mirror image."""
+def _point_on_map(beta: float, gamma: float) -> tuple[float, float]:
+    """Return the point of the map for any angles: motion backwards is the mirror image."""
     beta, gamma = beta - 180 * round(beta / 180), gamma - 360 * round(gamma / 360)
     return (beta, gamma) if abs(gamma) <= 90 else (-beta, np.copysign(180, gamma) - gamma)
 
 
 @styled
 def intrusion_figure(scene, found) -> Any:
-    """Of an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
+    """Draw an intruder scene and its run: the body, and force and moment along the motion. An outline is drawn at a few of its
     poses, a mesh where the force is largest, with the stress on its faces."""
     fig, axes = figure(10.2, 3.2, 3)
     columns = scene.table(found)
@@ -91,8 +93,8 @@ def intrusion_figure(scene, found) -> Any:
 
 
 def draw_stress(ax, faces, above: np.ndarray, unit: float = 1e3) -> None:
-    """The faces below the surface (`rft.meshes.Faces`) on 3-D axes, in the colour of the size of the stress on them, and in
-    grey the triangles ``above`` it (Q, 3, 3)."""
+    """Draw the faces below the surface (`rft.meshes.Faces`) on 3-D axes, coloured by the size of the stress on them, and the
+    triangles ``above`` it (Q, 3, 3) in grey."""
     from cmcrameri import cm
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -114,13 +116,14 @@ def draw_stress(ax, faces, above: np.ndarray, unit: float = 1e3) -> None:
 
 
 def _scale(ax, low, span) -> None:
-    """Axes that hold what begins at ``low`` and is as large as ``span``, with arrows of a round length in place of ticks."""
+    """Set axes that hold a body that begins at ``low`` and is as large as ``span``, with arrows of a round length in place of
+    ticks."""
     length = 0.3 * span.max()
     length = max(k for k in (10.0 ** np.arange(-9, 3)[:, None] * [1, 2, 5]).flat if k <= length)
     corner = low - 0.1 * length
-    for axis, way in zip("xyz", np.eye(3) * length):
-        ax.plot(*np.stack([corner, corner + way], 1), color="0.3", lw=1.0)
-        ax.text(*(corner + 1.25 * way), f"${axis}$", color="0.3", fontsize=8, ha="center", va="center")
+    for axis, arrow in zip("xyz", np.eye(3) * length):
+        ax.plot(*np.stack([corner, corner + arrow], 1), color="0.3", lw=1.0)
+        ax.text(*(corner + 1.25 * arrow), f"${axis}$", color="0.3", fontsize=8, ha="center", va="center")
     low = corner - 0.1 * length
     high = np.maximum(low + span + 0.2 * length, corner + 1.3 * length)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -157,7 +160,7 @@ def _abscissa(columns) -> tuple[str, str, float]:
 
 @styled
 def elements_figure(results: Mapping):
-    """Error of an intruder scene against the number of its parts, and against seconds (`geomech.study.intrusion`)."""
+    """Draw the error of an intruder scene against the number of its parts, and against seconds (`geomech.study.intrusion`)."""
     from matplotlib.ticker import NullFormatter
 
     fig, axes = figure(7.2, 3.2, 2)

@@ -1,4 +1,4 @@
-"""The scenes that commands are asked for."""
+"""Scenes by name, for commands that take one kind of scene or another."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from geomech.scene import Intruding, Scene, WalkerScene
 
 
-def scene_with_gait(name: str | Scene) -> Scene:
+def load_with_gait(name: str | Scene) -> Scene:
     """Return the scene of that name, or one that is loaded; Refusal for one without a gait."""
     from geomech.scene import Scene, load
 
@@ -31,25 +31,25 @@ def scene_with_gait(name: str | Scene) -> Scene:
     )
 
 
-def loaded(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
+def load_scene(name: str | Scene, grid: int | None = None, extent: float | None = None, medium: Path | None = None):
     """Return the scene of that name, or one that is loaded, with the options of its field, in the medium of a file if one is
     given."""
     from geomech.scene import in_medium
     from geomech.systems.capabilities import stored_table
 
-    scene = scene_with_gait(name)
-    own = stored_table(scene.system, "connection")
-    if (grid, extent) != (None, None) and own:
+    scene = load_with_gait(name)
+    file_field = stored_table(scene.system, "connection")
+    if (grid, extent) != (None, None) and file_field:
         raise Refusal(
             "the field of a table has its file's own grid", where=scene.name, instead="drop --grid and --extent"
         )
-    if scene.system.traits.joint_angles and not own:
+    if scene.system.traits.joint_angles and not file_field:
         check_angle("an extent", scene.numerics.extent if extent is None else extent)
     scene = scene.with_numerics(grid=grid, extent=extent)
     return in_medium(scene, medium) if medium else scene
 
 
-def loaded_intruder(name: str):
+def load_intruder(name: str):
     """Return the intruder scene of that name; Refusal for one with a gait."""
     from geomech.scene import Scene, WalkerScene, load
 
@@ -61,7 +61,7 @@ def loaded_intruder(name: str):
     return scene
 
 
-def loaded_walker(name: str):
+def load_walker(name: str):
     """Return the scene of that name; Refusal for one without a robot."""
     from geomech.scene import WalkerScene, load
 
@@ -73,17 +73,17 @@ def loaded_walker(name: str):
     return scene
 
 
-def loaded_moving(name: str) -> Scene | WalkerScene:
+def load_moving(name: str) -> Scene | WalkerScene:
     """Return the scene of that name; Refusal for one with neither a gait nor a robot."""
     from geomech.scene import load
 
     scene = load(name)  # once: it may come through a pipe
-    return scene if hasattr(scene, "robot") else loaded(scene)
+    return scene if hasattr(scene, "robot") else load_scene(scene)
 
 
-def loaded_any(name: str) -> Scene | Intruding | WalkerScene:
+def load_any(name: str) -> Scene | Intruding | WalkerScene:
     """Return the scene of that name."""
     from geomech.scene import Scene, load
 
     scene = load(name)
-    return loaded(scene) if isinstance(scene, Scene) else scene
+    return load_scene(scene) if isinstance(scene, Scene) else scene
