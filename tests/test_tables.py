@@ -165,7 +165,7 @@ def test_intervals_of_a_table_of_ones_own_are_kept_and_part_of_its_error(ending,
     cycle = GAIT.cycle(64, 0.7)
     plain = dataclasses.replace(table.scene.system.stored, A_error=None)
     whole = table.scene.system.table_error(*cycle)
-    object.__setattr__(table.scene.system, "held", plain)
+    object.__setattr__(table.scene.system, "stored", plain)
     more = whole - table.scene.system.table_error(*cycle)
     path_length = 2 * np.pi * np.linalg.norm(cycle[1], axis=-1).mean()
     low, high = (

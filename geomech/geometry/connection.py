@@ -60,7 +60,7 @@ class Connection(Extensible):
         return Field(self.axes, self.A, self.degree, **self.size)
 
     def __call__(self, alpha) -> np.ndarray:
-        """Return a (..., 3, d) at shapes alpha (..., d); ValueError outside the grid."""
+        """Return A (..., 3, d) at shapes alpha (..., d); ValueError outside the grid."""
         return self.field(alpha)
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
@@ -110,23 +110,23 @@ def directions(joints: int, count: int) -> np.ndarray:
 
 def _van_der_corput(count: int, base: int) -> np.ndarray:
     """Return 1, 2 ... ``count`` with their digits in a base mirrored at the point; for prime numbers the sequence of Halton,
-    as scipy.stats has it, which takes half a second to load."""
-    found, left, unit = np.zeros(count), np.arange(1, count + 1), 1.0 / base
-    while left.any():
-        found += left % base * unit
-        left, unit = left // base, unit / base
-    return found
+    that of scipy.stats, which takes half a second to load."""
+    mirrored, remaining, unit = np.zeros(count), np.arange(1, count + 1), 1.0 / base
+    while remaining.any():
+        mirrored += remaining % base * unit
+        remaining, unit = remaining // base, unit / base
+    return mirrored
 
 
 def _primes(count: int) -> list[int]:
     """Return the first prime numbers."""
-    found: list[int] = []
+    primes: list[int] = []
     number = 2
-    while len(found) < count:
-        if all(number % prime for prime in itertools.takewhile(lambda prime: prime**2 <= number, found)):
-            found.append(number)
+    while len(primes) < count:
+        if all(number % prime for prime in itertools.takewhile(lambda prime: prime**2 <= number, primes)):
+            primes.append(number)
         number += 1
-    return found
+    return primes
 
 
 def sampled(

@@ -78,9 +78,9 @@ def _matched(unit: np.ndarray, image_unit: np.ndarray) -> list[tuple[np.ndarray,
 
 def to_solve(symmetries: Sequence[Image], size: int) -> np.ndarray:
     """Return a mask (size,) of the shapes that are no later image of another."""
-    first, own = np.ones(size, bool), np.arange(size)
+    first, indices = np.ones(size, bool), np.arange(size)
     for image in symmetries:
-        first &= own <= image.index
+        first &= indices <= image.index
     return first
 
 
@@ -131,7 +131,7 @@ def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
 
 
 def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Traits) -> tuple[bool, tuple]:
-    """Return (shifted, turned), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
+    """Return (shifted, backwards), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
     k (n,), from every ``step``-th of N phases. moving: a cycle that is not at rest."""
     mirror, sampled = traits.halved, np.arange(0, phases, step)
     samples = path(sampled)
@@ -139,9 +139,8 @@ def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Tra
     same = lambda x, y: bool(np.abs(x - y).max(initial=0.0) <= SAME)
     nearest = lambda k, x: k[np.abs(path(k)[moving] - x).max(-1).argmin()]
     shifted = mirror and phases % 2 == 0 and same(path(sampled + phases // 2), -samples)
-    signs = (
-        (-1.0, 1.0) if mirror and not shifted else (-1.0,)
-    )  # where the halves are images each follows from the other
+    # Where the halves are images of each other, one sign follows from the other.
+    signs = (-1.0, 1.0) if mirror and not shifted else (-1.0,)
     for sign in signs if traits.reversible and len(samples) else ():
         image = sign * np.concatenate([samples[..., joints - 1 :: -1], -samples[..., : joints - 1 : -1]], -1)
         closest = nearest(sampled, image[moving, 0])
@@ -163,17 +162,17 @@ def _orbits(phases: int, shifted: bool, backwards: tuple) -> int:
 
 @functools.lru_cache(maxsize=64)
 def _cycle_images(phases: int, shifted: bool, backwards: tuple) -> CycleImages:
-    """Return the images within a cycle. shifted: it is its own mirror image half a cycle later. turned: () or, where it
+    """Return the images within a cycle. shifted: it is its own mirror image half a cycle later. backwards: () or, where it
     is its own image backwards, head for tail, (phase of the first one's image, sign of its shape: 1 in the mirror
     too)."""
     if not (shifted or backwards):
         return CycleImages(phases, slice(None), slice(None), 1.0)
-    own = np.arange(phases)
-    source, factor = own, np.ones((phases, 3))
-    moves = [((own + phases // 2) % phases, (1.0, -1.0, -1.0))] * shifted
+    phase_indices = np.arange(phases)
+    source, factor = phase_indices, np.ones((phases, 3))
+    moves = [((phase_indices + phases // 2) % phases, (1.0, -1.0, -1.0))] * shifted
     if backwards:
         first, sign = backwards
-        moves.append(((first - own) % phases, (1.0, -sign, sign)))
+        moves.append(((first - phase_indices) % phases, (1.0, -sign, sign)))
     for index, signs in moves:  # each undoes itself; an image may be one of an image
         earlier = source[index] < source
         factor = np.where(earlier[:, None], np.array(signs) * factor[index], factor)

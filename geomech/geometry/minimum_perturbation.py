@@ -64,7 +64,7 @@ class Frame:
         return np.stack([np.moveaxis(self.field.derivative(k), 0, -1) for k in range(self.field.joints)], -1)
 
     def connection(self, first: Connection) -> np.ndarray:
-        """Return a (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
+        """Return A (3, d, N_1, ..., N_d) in this frame on its grid, from the connection in the first frame."""
         h, A = np.moveaxis(self.field.values, 0, -1), np.moveaxis(first.A, (0, 1), (-2, -1))
         return np.moveaxis(change_connection(A, h, self.grid_slopes), (-2, -1), (0, 1))
 

@@ -207,16 +207,16 @@ class TaylorSeries:
         )
 
     def connection(self, alpha) -> np.ndarray:
-        """Return a (..., 3, d) at shapes (..., d), wherever these are."""
+        """Return A (..., 3, d) at shapes (..., d), wherever these are."""
         w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.combined, w, terms)
 
     def connection_within_reach(self, alpha) -> np.ndarray:
-        """Return a (..., 3, d) at shapes (..., d); nan where the data do not reach."""
-        near = self.reach(alpha) <= 1
-        found = np.full((*near.shape, *self.A.shape[:2]), np.nan)
-        found[near] = self.connection(alpha[near])
-        return found
+        """Return A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
+        within = self.reach(alpha) <= 1
+        A = np.full((*within.shape, *self.A.shape[:2]), np.nan)
+        A[within] = self.connection(alpha[within])
+        return A
 
     def connection_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3, d) of `connection`."""
@@ -290,7 +290,7 @@ class Tube(Connection):
         return np.moveaxis(fields, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
-        """Return a (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
+        """Return A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
         return self.taylor.connection(self.checked(alpha))
 
 

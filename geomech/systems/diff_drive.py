@@ -55,7 +55,7 @@ class DifferentialDrive:
         return rates @ self._matrix.T
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """Return a (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
+        """Return A (3, 2) as a sympy Matrix, and the wheels' angles (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         return connections.differential_drive(self.wheel_radius, self.track)

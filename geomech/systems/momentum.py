@@ -132,7 +132,7 @@ class Momentum:
         )
 
     def symbolic(self) -> tuple[Any, tuple[Any, ...]]:
-        """Return a (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
+        """Return A (3, joints) as a sympy Matrix, and its angles (`geomech.symbolic`)."""
         from geomech.symbolic import connections
 
         masses, inertia = self.inertia(connections.exact)
