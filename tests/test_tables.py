@@ -360,7 +360,7 @@ def test_a_bare_mat_file_becomes_netcdf_that_says_what_it_does_not_know(made, tm
     np.testing.assert_array_equal(held.connection.A, made[1].fitted.A)
     assert not held.has_residual and "fit residual unknown" in repr(held.connection)
     mat.save_connection(tmp_path / "b.mat", bare)
-    assert not tables.load(tmp_path / "b.mat").told
+    assert not tables.load(tmp_path / "b.mat").has_residual
 
 
 def test_every_command_works_on_a_table_or_says_why_not(made, tmp_path, monkeypatch):
