@@ -68,6 +68,9 @@ def large(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", [n for n in LARGE if n != "phases"])
 def test_large_requests_are_refused_without_yes(name, large, monkeypatch):
     monkeypatch.setattr(run_cost, "ENOUGH", 0.05)  # what is refused is far beyond what may be
+    monkeypatch.setattr(connection, "SAMPLES_TOGETHER", 2000)  # three small batches tell
+    monkeypatch.setattr(cycles, "SAMPLES_TOGETHER", 4)
+    monkeypatch.setattr("geomech.systems.capabilities.VALUES_TOGETHER", 1 << 15)
     before = sorted(p.name for p in large.iterdir())
     code, out, err = run(*LARGE[name])
     assert (code, out) == (2, "")

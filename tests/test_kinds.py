@@ -96,7 +96,7 @@ def test_the_law_of_the_page_runs_as_it_stands_there(tmp_path, monkeypatch):
 def test_a_law_of_traction_alone_gives_every_tier_within_its_error(law):
     gait, body, amplitudes = Circle(amplitude=0.8, centre=(0.3, -0.2)), Chain((1, 1.4, 0.8)), np.array([0.5, 0.9])
     exact, bare = (Study(Scene(Swimmer(x, body), gait, SMALL)) for x in (law, Bare(law)))
-    finer = bare.with_numerics(loads="gauss:96")  # leaves a quarter
+    finer = bare.turned(loads="gauss:96")  # leaves a quarter
     for tier in ("area", "direct"):
         ours, theirs, better = (x.displacement(tier, amplitudes=amplitudes) for x in (exact, bare, finer))
         size, off = np.hypot(*ours[-1, :2]), estimate.distance(ours, theirs).max()
@@ -113,7 +113,7 @@ def test_a_law_of_traction_alone_takes_backbones_and_says_its_rule():
     exact = Swimmer(Coulomb(), Backbone(8, length=0.4))
     alpha, alphadot = np.full((2, 7), 0.3) * [[1], [-2]], np.cos(np.arange(14.0)).reshape(2, 7)
     np.testing.assert_allclose(fine.velocity(alpha, alphadot), exact.velocity(alpha, alphadot), atol=2e-3)
-    assert fine.evaluations == 24 * exact.evaluations
+    assert fine.balance_size.evaluations == 24 * exact.balance_size.evaluations
     assert "gauss:24" in explain(Scene(fine, Sine(elements=8), SMALL))
     assert fine.refined().solver.loads == "gauss:48"
     assert fine.about()["loads"] == "gauss:24"

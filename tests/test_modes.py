@@ -16,9 +16,10 @@ from geomech.output import mat
 from geomech.scene import Scene
 from geomech.study import fields, sweep
 from geomech.study.available import tiers
-from geomech.study.study import Study
+from geomech.study.study import Study, refuse_outside
 from geomech.systems import Swimmer, Table
 from geomech.systems.base import shape_labels
+from geomech.systems.swimmer import is_three_link
 from rft import Chain, EndCaps, Granular, Serpenoid, SkinFriction, Transient, Viscous
 
 pytestmark = pytest.mark.usefixtures("fastest")
@@ -201,7 +202,7 @@ def test_a_serpenoid_has_one_wave_if_it_does_not_say():
 def test_names_of_shape_variables():
     assert shape_labels(Swimmer(SAND, MODES)) == (("m_1", "rad"), ("m_2", "rad"))
     assert shape_labels(Swimmer(SAND, PLAIN)) == (("alpha_1", "rad"), ("alpha_2", "rad"), ("alpha_3", "rad"))
-    assert not Swimmer(SAND, Chain(modes="serpenoid")).three_link  # no published gaits beside its own
+    assert not is_three_link(Swimmer(SAND, Chain(modes="serpenoid")))  # no published gaits beside its own
 
 
 # Waves.
@@ -287,4 +288,4 @@ def test_a_table_keeps_the_names_of_modes(tmp_path, ending):
     save(tmp_path / f"twice.{ending}", Study(Scene(again, Circle())))
     assert shape_labels(Table(tmp_path / f"twice.{ending}")) == shape_labels(again)
     with pytest.raises(ValueError, match="m_1 = .* lies outside"):
-        Study(Scene(again, Circle(amplitude=9.0))).refuse_outside()
+        refuse_outside(Scene(again, Circle(amplitude=9.0)))

@@ -16,9 +16,9 @@ ROOT = pathlib.Path(__file__).parents[1]
 # of stress is written by its coefficients. Workers tell the
 # solver to take one thread, and by which back end.
 KNOW_MECHANICS = {
-    "__init__.py", "text/scenes.py", "text/system.py", "study/stress.py", "scene/intruder.py", "scene/intruding.py",
-    "scene/solid.py", "scene/stress.py", "scene/walker.py", "scene/write.py", "study/batch.py", "study/calibration.py",
-    "run/backend.py", "study/stress_calibration.py", "study/walking.py",
+    "__init__.py", "text/grains.py", "text/scenes.py", "text/system.py", "study/stress.py", "scene/intruder.py",
+    "scene/intruding.py", "scene/solid.py", "scene/stress.py", "scene/walker.py", "scene/write.py", "study/batch.py",
+    "study/calibration.py", "run/backend.py", "study/stress_calibration.py", "study/walking.py",
 }  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from geomech.systems import KINDS, NoSlipSnake, Swimmer
 from geomech.systems.base import kind_of, length_unit
 from geomech.systems.capabilities import stored_table
 from geomech.systems.framed import in_frame
-from geomech.systems.swimmer import Solver
+from geomech.systems.swimmer import Solver, is_three_link
 from geomech.text.explain import explain
 from geomech.tiers.direct import direct
 from rft import Backbone, Chain, Coulomb, Serpenoid, Transient, se2
@@ -147,7 +147,7 @@ def test_singular_shapes_are_refused_by_name_in_integrals():
     with pytest.raises(ValueError, match="velocity is not finite at alpha"):
         connection.fit(study.scene.system.velocity, connection.grid(2, 5))
     with pytest.raises(Refusal, match="numerics: 'regularisation' is unknown"):
-        study.with_numerics(regularisation=1e-3)
+        study.turned(regularisation=1e-3)
     with pytest.raises(ValueError, match="the shape is singular: the wheels' axles meet in one point"):
         single(study.scene.system, [0.4, 0.4], [1.0, 0.0])
 
@@ -217,7 +217,7 @@ def test_whatever_has_a_velocity_is_a_system():
 def test_three_links_are_a_chain_of_three_and_nothing_else():
     """The published gaits, circle and butterfly, are compared for these alone."""
     bodies = Chain((1, 2, 1)), Chain((1,) * 4), Chain((1,) * 3, modes=((1.0, 0.5), (0.0, 1.0))), Serpenoid(12)
-    assert [Swimmer(Coulomb(), body).three_link for body in bodies] == [True, False, False, False]
+    assert [is_three_link(Swimmer(Coulomb(), body)) for body in bodies] == [True, False, False, False]
 
 
 def test_points_on_either_side_of_a_change_of_sign_are_crossed():
@@ -231,5 +231,5 @@ def test_points_on_either_side_of_a_change_of_sign_are_crossed():
 )
 def test_effects_that_vary_see_pieces_or_whole_elements(body, pieces, seen):
     swimmer = Swimmer(Coulomb(), body, (Transient(travel=0.1),), Solver(pieces=pieces))
-    assert swimmer.cut == seen
-    assert dataclasses.replace(swimmer, effects=()).cut == 0
+    assert swimmer.balance_size.pieces == seen
+    assert dataclasses.replace(swimmer, effects=()).balance_size.pieces == 0

@@ -283,7 +283,7 @@ def test_a_table_predicts_what_its_scene_predicts_within_its_error(body, medium,
         ratios += list(np.array(told["estimate"]["direct"]) / np.hypot(*(np.array(told["direct"]) - true).T[:2]))
         for tier in ("area", "path"):  # of the same connection
             np.testing.assert_allclose(
-                told[tier], source.with_numerics(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
+                told[tier], source.turned(interpolation=3).displacement(tier, gait, amplitudes), atol=2e-5
             )
     assert np.median(ratios) < 60  # honest, not helpless
     if ending == ".nc" and medium.dry:
@@ -436,7 +436,7 @@ def test_lengths_that_a_file_does_not_tell_are_assumed_in_a_note(made, tmp_path,
         file = tmp_path / f"a.{ending}"
         bare = Table(file)
         told = [line for line in bare.assumed if "body_length" in line]
-        assert told == [f"{file}: {LENGTHS}"] and LENGTHS in described(bare)
+        assert told == [LENGTHS] and LENGTHS in described(bare)
         assert (length_unit(bare), bare.length) == ("BL", 1.0)
         assert (bare.stored.connection.unit, bare.stored.connection.length) == ("BL", 1.0)
         assert (Connection.load(file).unit, Connection.load(file).length) == ("length", None)

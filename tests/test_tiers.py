@@ -285,7 +285,7 @@ def test_a_tier_is_one_expression(monkeypatch):
     assert foretold == sum(counts) and [*table["seconds"]] == ["field", "direct", "leading", "path"]
     off = estimate.distance(np.array(table["leading"]), np.array(table["direct"]))
     assert (off <= table["estimate"]["leading"]).all() and off[1] > 0.01
-    assert "leading" in study.tiers and "leading" in study.methods and "leading" in study.lookups
+    assert "leading" in study.tiers and "leading" in study.methods
     assert cheapest(scene, [0.05, 1.0], 1e-4)["tier"] == "direct"
     with pytest.raises(Refusal, match="the leading tier takes a body of joints, this body has 4: use direct"):
         Study(scenes.load("seven-link-wave").changed(body=Chain((1,) * 5), gait=Wave(joints=4))).plan("leading")

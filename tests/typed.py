@@ -82,7 +82,7 @@ def scenes() -> list[Any]:
     told = (
         study.study([0.5, 1.0], ["direct"]),
         study.cost([0.5], ["direct"]),
-        study.with_numerics(phases=64),
+        study.turned(phases=64),
         study.methods,
     )
     more = (

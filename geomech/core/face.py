@@ -1,6 +1,7 @@
-"""Methods of values that their classes do not need to know: how they are shown, saved and loaded.
+"""Methods that other modules add to values: how a notebook shows them, how they are saved and loaded.
 
-`geomech.face` registers them as the package is imported, before the classes of the values exist.
+`geomech.face` registers them as the package is imported, before the classes of the values exist; the classes do not
+depend on them.
 """
 
 from __future__ import annotations

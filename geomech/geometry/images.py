@@ -131,7 +131,7 @@ def solved_count(gait: Gait, phases: int, traits: Traits) -> int:
 
 
 def _symmetries(path: Callable, phases: int, step: int, moving: int, traits: Traits) -> tuple[bool, tuple]:
-    """Return (shifted, backwards), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
+    """Return (shifted, turned), arguments of `_cycle_images`, of cycles path(k) (B, n, 2 d), shapes and rates at phases
     k (n,), from every ``step``-th of N phases. moving: a cycle that is not at rest."""
     mirror, sampled = traits.halved, np.arange(0, phases, step)
     samples = path(sampled)
@@ -162,7 +162,7 @@ def _orbits(phases: int, shifted: bool, backwards: tuple) -> int:
 
 @functools.lru_cache(maxsize=64)
 def _cycle_images(phases: int, shifted: bool, backwards: tuple) -> CycleImages:
-    """Return the images within a cycle. shifted: it is its own mirror image half a cycle later. backwards: () or, where it
+    """Return the images within a cycle. shifted: it is its own mirror image half a cycle later. turned: () or, where it
     is its own image backwards, head for tail, (phase of the first one's image, sign of its shape: 1 in the mirror
     too)."""
     if not (shifted or backwards):

@@ -8,7 +8,7 @@ Dynamics 94, 1933 (2018), here with the phase of the nearest point). All are Fou
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,7 @@ SHAPES_TOGETHER = 4096  # whose distances from all places are held at a time
 
 
 def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
-    """Return (..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
+    """(..., 2 harmonics + 1): 1, cos t, sin t, cos 2t, sin 2t ... or their derivatives of that order."""
     k = np.arange(1, harmonics + 1)
     angle = np.asarray(t, float)[..., None] * k + order * np.pi / 2  # each derivative is a quarter turn on
     both = np.stack([np.cos(angle), np.sin(angle)], -1) * (k.astype(float) ** order)[:, None]
@@ -36,8 +36,7 @@ def waves(t, harmonics: int, order: int = 0) -> np.ndarray:
 
 
 def series(coefficients: np.ndarray, t, order: int = 0) -> np.ndarray:
-    """Return (..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at
-    phases t (...)."""
+    """(..., *lead): a Fourier series with coefficients (*lead, 2 K + 1) as in `waves`, or a derivative, at phases t (...)."""
     return np.tensordot(waves(t, coefficients.shape[-1] // 2, order), coefficients, (-1, -1))
 
 
@@ -52,7 +51,7 @@ class Loop:
         return self.coefficients.shape[1] // 2
 
     def shape(self, t, order: int = 0) -> np.ndarray:
-        """Return (..., d) at phases t (...), or its derivative."""
+        """(..., d) at phases t (...), or its derivative."""
         return series(self.coefficients, t, order)
 
     @cached_property
@@ -81,7 +80,7 @@ class Loop:
         return np.array([n @ expm(-k / PLACES * holonomy) for k, n in enumerate(frames_along)])
 
     def normals(self, t) -> np.ndarray:
-        """Return (..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
+        """(..., d, d - 1): orthonormal, and normal to the curve, at phases t (...)."""
         rate = self.shape(t, 1)
         if rate.shape[-1] == 2:
             tangent = rate / np.linalg.norm(rate, axis=-1, keepdims=True)
@@ -92,7 +91,7 @@ class Loop:
         return (1 - part) * self._normals[k] + part * self._normals[k + 1]
 
     def nearest(self, alpha) -> np.ndarray:
-        """Return phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
+        """Phases (...,) of the points of the curve nearest to shapes alpha (..., d)."""
         flat = np.reshape(alpha, (-1, np.shape(alpha)[-1]))
         t, places = self._places
         rows = [flat[k : k + SHAPES_TOGETHER] for k in range(0, len(flat), SHAPES_TOGETHER)]
@@ -101,8 +100,7 @@ class Loop:
         return self.projected(alpha, start.reshape(np.shape(alpha)[:-1]), np.pi / PLACES)
 
     def projected(self, alpha, t, step: float = 0.1) -> np.ndarray:
-        """Return phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a
-        time."""
+        """Phases (...,) near t at which alpha - theta is normal to the curve: Newton, at most ``step`` rad at a time."""
         for _ in range(NEWTON):
             deviation, rate, bend = alpha - self.shape(t), self.shape(t, 1), self.shape(t, 2)
             square = (rate**2).sum(-1)
@@ -114,7 +112,7 @@ class Loop:
 
 
 def _between(values: np.ndarray, t) -> np.ndarray:
-    """Return (..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
+    """(..., *lead): values (*lead, P) at equally spaced phases, at phases t (...) between them."""
     count = values.shape[-1]
     places = 2 * np.pi * np.arange(count + 1) / count
     closed = np.concatenate([values, values[..., :1]], -1).reshape(-1, count + 1)
@@ -123,7 +121,7 @@ def _between(values: np.ndarray, t) -> np.ndarray:
 
 
 def _complement(unit: np.ndarray) -> np.ndarray:
-    """Return (d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
+    """(d, d - 1): orthonormal and normal to a unit vector, by a reflection that takes the first axis there."""
     first = np.zeros_like(unit)
     first[0] = -1.0 if unit[0] > 0 else 1.0
     v = unit - first
@@ -152,8 +150,8 @@ class TaylorSeries:
     factor: float
     level: float
 
-    def deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
-        """Return (phases (...,), deviations (..., d)) of shapes (..., d)."""
+    def _deviation(self, alpha) -> tuple[np.ndarray, np.ndarray]:
+        """Return the phases (...,) of the nearest points and the deviations (..., d) of shapes (..., d)."""
         t = self.loop.nearest(alpha)
         return t, alpha - self.loop.shape(t)
 
@@ -162,7 +160,7 @@ class TaylorSeries:
         return _between(self.spread, t)
 
     def standard_error_at(self, t) -> np.ndarray:
-        """Return (..., 3, d): standard errors of A at phases t (...), as `standard_error`."""
+        """(..., 3, d): standard errors of A at phases t (...), as `off`."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
         return np.sqrt(_between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2))
@@ -174,16 +172,12 @@ class TaylorSeries:
 
     def reach(self, alpha) -> np.ndarray:
         """Return the distances (...,) of shapes (..., d) from the gait, 1 where the data end."""
-        t, delta = self.deviation(real_array("alpha", alpha))
+        t, delta = self._deviation(real_array("alpha", alpha))
         return np.sqrt(np.einsum("...i,...ij,...j->...", delta, np.linalg.inv(self.spread_at(t)), delta))
 
-    def terms(self, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """Return (waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of combined_i,j,m,k terms_j,m
-        waves_k."""
-        return self.terms_at(self.loop.nearest(alpha), alpha, alphadot)
-
-    def terms_at(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
-        """Return `terms` with the phases t (...) of the nearest points."""
+    def terms(self, t, alpha, alphadot) -> tuple[np.ndarray, np.ndarray]:
+        """Return (waves (..., 2 K + 1), terms (..., d, d)), such that xi_i = sum of combined_i,j,m,k terms_j,m waves_k,
+        at shapes and rates (..., d) whose nearest points of the gait have phases t (...)."""
         normal = np.einsum("...ik,...i->...k", self.loop.normals(t), alpha - self.loop.shape(t))
         one = np.concatenate([np.ones((*normal.shape[:-1], 1)), normal], -1)
         return waves(t, self.A.shape[-1] // 2), alphadot[..., :, None] * one[..., None, :]
@@ -193,35 +187,22 @@ class TaylorSeries:
         """Coefficients (3, d, d, 2 K + 1) of A and then of its slopes."""
         return np.concatenate([self.A[:, :, None], self.slope], 2)
 
-    def scaled(self, factors: np.ndarray) -> TaylorSeries:
-        """Return the series with the components of xi times ``factors`` (3,)."""
-        rows = lambda x: x * factors.reshape(3, *[1] * (x.ndim - 1))
-        errors = np.moveaxis(rows(np.moveaxis(self.errors, 1, 0)), 0, 1)
-        return replace(
-            self,
-            A=rows(self.A),
-            slope=rows(self.slope),
-            errors=errors,
-            beyond=rows(self.beyond),
-            standard_error=rows(self.standard_error),
-        )
-
     def connection(self, alpha) -> np.ndarray:
-        """Return A (..., 3, d) at shapes (..., d), wherever these are."""
-        w, terms = self.terms(alpha, np.ones(np.shape(alpha)))
+        """A (..., 3, d) at shapes (..., d), wherever these are."""
+        w, terms = self.terms(self.loop.nearest(alpha), alpha, np.ones(np.shape(alpha)))
         return np.einsum("ijmk,...k,...jm->...ij", self.combined, w, terms)
 
     def connection_within_reach(self, alpha) -> np.ndarray:
-        """Return A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
-        within = self.reach(alpha) <= 1
-        A = np.full((*within.shape, *self.A.shape[:2]), np.nan)
-        A[within] = self.connection(alpha[within])
-        return A
+        """A (..., 3, d) at shapes (..., d); nan where the data do not reach."""
+        near = self.reach(alpha) <= 1
+        found = np.full((*near.shape, *self.A.shape[:2]), np.nan)
+        found[near] = self.connection(alpha[near])
+        return found
 
     def connection_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3, d) of `connection`."""
         t = self.loop.nearest(alpha)
-        w, terms = self.terms_at(t, alpha, np.ones(np.shape(alpha)))
+        w, terms = self.terms(t, alpha, np.ones(np.shape(alpha)))
         squares = (np.einsum("ijmk,...k,...jm->...ij", x, w, terms) ** 2 for x in self.errors)
         return self.factor * np.sqrt(sum(squares) + self.standard_error_at(t) ** 2)
 
@@ -230,7 +211,7 @@ class TaylorSeries:
         the same gait. alpha = theta(phi) + s n(phi) has d alpha / d phi = theta' (1 - curvature s), and dA/ds is the
         slope."""
         combined = self.combined if combined is None else combined
-        t, delta = self.deviation(alpha)
+        t, delta = self._deviation(alpha)
         rate, bend, n = self.loop.shape(t, 1), self.loop.shape(t, 2), self.loop.normals(t)[..., 0]
         speed, s = np.linalg.norm(rate, axis=-1), (n * delta).sum(-1)
         ahead = speed - s * (bend * n).sum(-1) / speed  # |d alpha / d phi|
@@ -239,8 +220,8 @@ class TaylorSeries:
         derivative = np.einsum("...ij,...j->...i", along, n) - np.einsum(
             "...ij,...j->...i", slope, rate / speed[..., None]
         )
-        A_shifted = A + slope * s[..., None, None]
-        return derivative + se2.bracket(A_shifted[..., 0], A_shifted[..., 1])
+        A_here = A + slope * s[..., None, None]
+        return derivative + se2.bracket(A_here[..., 0], A_here[..., 1])
 
     def ccf_error(self, alpha) -> np.ndarray:
         """Return the errors (..., 3) of `ccf`."""
@@ -249,7 +230,7 @@ class TaylorSeries:
 
     def error(self, alpha, alphadot) -> np.ndarray:
         """Return the errors (..., 3) of the net pose of gaits alpha, alphadot (..., N, d)."""
-        w, terms = self.terms(alpha, alphadot)
+        w, terms = self.terms(self.loop.nearest(alpha), alpha, alphadot)
         velocity = lambda x: np.einsum("ijmk,...nk,...njm->...ni", x, w, terms)
         net = displacement(velocity(self.combined))
         differences = [displacement(velocity(self.combined + x)) - net for x in self.errors]
@@ -280,8 +261,7 @@ class Tube(Connection):
         return alpha
 
     def at_grid(self, function: Callable) -> np.ndarray:
-        """Return (..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A
-        is."""
+        """(..., N_1, ..., N_d): a function of shapes (n, d), which gives (n, ...), on the grid; nan where A is."""
         shapes = np.stack(np.meshgrid(*self.axes, indexing="ij"), -1)
         reached, d = ~np.isnan(self.A[0, 0]), len(self.axes)
         values = function(shapes[reached])
@@ -290,7 +270,7 @@ class Tube(Connection):
         return np.moveaxis(fields, range(d), range(-d, 0))
 
     def __call__(self, alpha) -> np.ndarray:
-        """Return A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
+        """A (..., 3, d) at shapes alpha (..., d); ValueError where the data do not reach."""
         return self.taylor.connection(self.checked(alpha))
 
 

@@ -211,7 +211,7 @@ def _cycles(log: Log, known: TaylorSeries, phase, count, joints, pose):
     marks = 2 * np.pi * (first + np.arange(count.max() + 2))
     growing = np.maximum.accumulate(phase)
     times = np.interp(marks, growing, log.t)
-    w, terms = known.terms_at(known.loop.projected(joints.values, phase), joints.values, joints.rates)
+    w, terms = known.terms(known.loop.projected(joints.values, phase), joints.values, joints.rates)
     xi = np.einsum("ijmk,nk,njm->ni", known.combined, w, terms)
     heading = CubicSpline(log.t, xi[:, 2]).antiderivative()(log.t)
     path = CubicSpline(log.t, np.exp(1j * heading) * (xi[:, 0] + 1j * xi[:, 1])).antiderivative()(log.t)

@@ -42,7 +42,7 @@ class Residual(NamedTuple):
 def residual_of(known: TaylorSeries, samples: Samples, varies: int) -> Residual:
     """Return the misfit of ``known`` on the samples, with the error of the truncated series."""
     predicted = lambda alpha, rate: np.einsum(
-        "ijmk,nk,njm->ni", known.combined, *known.terms_at(samples.phase, alpha, rate)
+        "ijmk,nk,njm->ni", known.combined, *known.terms(samples.phase, alpha, rate)
     )
     misfit = samples.xi - predicted(samples.alpha, samples.rate)
     residual = np.sqrt((misfit**2).mean(0) / (samples.rate**2).sum(-1).mean())

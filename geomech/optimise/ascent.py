@@ -11,11 +11,11 @@ from geomech.optimise.aims import Aim
 from geomech.optimise.problem import EVEN, Enough, Problem, is_feasible
 from geomech.optimise.stroke import Stroke
 
-STRIDE = 0.5  # largest change of x (rad, if joints have 2.5) in TOGETHER steps
-TOGETHER = 50
+TRUST_RADIUS = 0.5  # largest change of x (rad, if joints have 2.5) in STEPS_PER_RUN steps
+STEPS_PER_RUN = 50
 TRIES = 2.5  # cycles per step, at most on average
-SETTLING, INSIDE = 8, 1e-9  # steps of Newton's method, and their margin inside the constraints
-SHORTER, SHORTEST = 0.25, 0.01  # of the stride: after an infeasible loop or no progress; and at the end
+NEWTON_STEPS, INSIDE = 8, 1e-9  # steps of Newton's method, and their margin inside the constraints
+SHORTER, SHORTEST = 0.25, 0.01  # of the trust radius: after an infeasible loop or no progress; and at the end
 
 
 def ascend(
@@ -34,16 +34,16 @@ def ascend(
     )
     constraints = problem.constraints(turn, once_round, singularity, away)
     is_same_stroke = lambda x: once_round is None or once_round.winding(problem.loop(x)) == 1
-    x, remaining, stride = problem.first, max_steps, STRIDE
-    while remaining > 0 and stride > SHORTEST * STRIDE:
+    x, remaining, trust_radius = problem.first, max_steps, TRUST_RADIUS
+    while remaining > 0 and trust_radius > SHORTEST * TRUST_RADIUS:
         ascent = _Ascent(problem.objective, constraints, is_same_stroke)
-        end = ascent.run(x, stride, p.size, min(remaining, TOGETHER), tolerance)
+        end = ascent.run(x, trust_radius, p.size, min(remaining, STEPS_PER_RUN), tolerance)
         previous, x = x, x if ascent.best is None else ascent.best
         remaining = 0 if end == "spent" else remaining - max(ascent.steps, 1)
         moved = np.abs(x - previous)[: p.size].max()
-        if end == "converged" and moved < stride * (1 - 1e-6):
+        if end == "converged" and moved < trust_radius * (1 - 1e-6):
             break
-        stride *= (SHORTER if end == "infeasible" else 1.0) * (SHORTER if moved == 0 else 1.0)
+        trust_radius *= (SHORTER if end == "infeasible" else 1.0) * (SHORTER if moved == 0 else 1.0)
     return problem.loop(x)
 
 
@@ -57,7 +57,7 @@ def project(
     problem = Problem(cycles, aim, p, lambda: None, np.inf)
     constraints = problem.constraints(turn, Stroke(cycles.loops, p) if stroke else None, singularity, away, dense=True)
     x = problem.first
-    for _ in range(SETTLING):
+    for _ in range(NEWTON_STEPS):
         at = [(rule["type"], rule["fun"](x)) for rule in constraints]
         if all(np.abs(y).max() <= cycles.exact if kind == "eq" else y.min() >= 0 for kind, y in at):
             break
@@ -107,13 +107,13 @@ class _Ascent:
         if value < self.least or (self.least == np.inf and np.isfinite(x).all()):
             self.best, self.least = np.array(x), value
 
-    def run(self, x: np.ndarray, stride: float, moving: int, max_steps: int, tolerance: float) -> str:
-        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``stride`` of it, and return how
-        they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke; or "spent".
-        """
+    def run(self, x: np.ndarray, trust_radius: float, moving: int, max_steps: int, tolerance: float) -> str:
+        """Run at most ``max_steps`` steps from x, with the first ``moving`` numbers within ``trust_radius`` of it, and
+        return how they end: "converged"; "unfinished"; "infeasible" at a loop that cannot be run or is another stroke;
+        or "spent"."""
         from scipy.optimize import minimize
 
-        radius = np.where(np.arange(len(x)) < moving, stride, np.inf)
+        radius = np.where(np.arange(len(x)) < moving, trust_radius, np.inf)
         try:
             self(x)
             with warnings.catch_warnings():  # SciPy before 1.13 warns where it clips its own steps to the bounds

@@ -25,7 +25,7 @@ def direct(r: Request, phases: int | None = None) -> Phases | Runs:
 
 def build_tables(r: Request) -> tuple:
     """Return the harmonics of the velocity on a grid, and the norm of the cost of moving; None if the aim has no cost."""
-    study = Study(r.scene.changed(system=r.system)).with_numerics(extent=r.extent)
+    study = Study(r.scene.changed(system=r.system)).turned(extent=r.extent)
     harmonics = study.compute_harmonics()
     if not r.aim.costs:
         return harmonics, None

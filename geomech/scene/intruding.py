@@ -8,10 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from geomech.core.summary import part
 from rft.checks import check_numbers
-from rft.ground import GROUND_EFFECTS, GroundEffect, checked_effects, weight
-from rft.premise import negated
+from rft.ground import GroundEffect, checked_effects, weight
 from rft.refusal import Refusal, located
 
 
@@ -66,34 +64,9 @@ class Intruding:
         """Return the scene with other parts."""
         return dataclasses.replace(self, **parts)
 
-    def description(self) -> list[str]:
-        """Return lines about the law, the body and its motion, and which effects are on and off."""
-        medium, body, motion = (part(type(x).__name__, x) for x in (self.medium, self.intruder, self.motion))
-        lines = [f"{self.name}: {body} of {self.count:,} {self.parts}", f"motion: {motion}", f"medium: {medium}"]
-        lines += self.effects_description()
-        inactive = [kind for kind in GROUND_EFFECTS if kind not in [e.kind for e in self.effects]]
-        return [*lines, "off, not evaluated: " + (", ".join(inactive) or "none")]
-
-    def effects_description(self) -> list[str]:
-        """Return a line for each effect, and one more for its assumptions."""
-        return describe_effects(self.effects)
-
     def weighed(self, force: np.ndarray) -> np.ndarray:
         """Return forces (T, k) along x, (y,) z with those of effects that are not the grains'."""
         x, z = weight(self.effects)
         if not (x or z):
             return force
         return force + np.array([x, *[0.0] * (force.shape[1] - 2), z])
-
-
-def describe_effects(effects) -> list[str]:
-    """Return a line for each effect on the ground, and one more for its assumptions."""
-    lines = []
-    for effect in effects:
-        lines.append(
-            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
-            f"gone at {effect.limit}, order {effect.order}"
-        )
-        if effect.assumes:
-            lines.append(f"     assumes {effect.assumes}")
-    return lines

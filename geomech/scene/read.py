@@ -80,8 +80,9 @@ def load(scene: str | Path) -> Scene | Any:
             instead=f"give a TOML file or one of {', '.join(names)}",
         ) from None
     result = parse(text, str(scene))
-    for line in getattr(getattr(result, "system", None), "assumed", ()):
-        note(line)
+    system = getattr(result, "system", None)
+    for line in getattr(system, "assumed", ()):
+        note(f"{system.file}: {line}")
     return result
 
 

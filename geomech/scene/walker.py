@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
-from geomech.core.summary import part
 from geomech.scene.intruder import OUTLINES
-from geomech.scene.intruding import describe_effects
 from geomech.scene.sections import Each, Keys, OneOf
 from geomech.scene.stress import SpatialKeys, StressKeys
 from rft.ground import GROUND_EFFECTS, GroundEffect
@@ -64,13 +62,6 @@ class WalkerScene:
     @property
     def walker(self) -> Walker:
         return Walker(self.robot, self.gait, self.medium, self.effects)
-
-    def description(self) -> list[str]:
-        """Return lines about the robot, its clock, the law and the engine, and which effects are on and off."""
-        robot, gait, medium = (part(type(x).__name__, x) for x in (self.robot, self.gait, self.medium))
-        lines = [f"{self.name}: {robot}", f"gait: {gait}", f"medium: {medium}", f"engine: {self.engine}"]
-        inactive = [kind for kind in sorted(KINDS) if kind not in [e.kind for e in self.effects]]
-        return [*lines, *describe_effects(self.effects), "off, not evaluated: " + (", ".join(inactive) or "none")]
 
 
 def spelled_out(tables: Mapping, name: str) -> dict:

@@ -56,10 +56,10 @@ def cheapest(
 
     sampled = np.unique(np.linspace(0, len(amplitudes) - 1, min(CHECKED, 9)).round().astype(int))
     phases = max(FEWEST_STEPS if system.traits.steps else 32, 8 * gait.harmonics)
-    if study.lookups:
+    plans = {m: plan for m in study.tiers if not (plan := study.plan(m, gait, amplitudes)).exact}
+    if plans:
         pilot, settings = _refined(scene, gait, amplitudes[sampled], tol / 4, phases, ask)
         phases = settings["phases"]
-    plans = {m: study.plan(m, gait, amplitudes) for m in study.lookups}
     balances = {m: cost.balances(plan, len(amplitudes), phases) for m, plan in plans.items()}
     enough = len(amplitudes) * solved_phases(system, gait, phases)  # of the system itself
     for method in sorted(plans, key=balances.get):

@@ -21,7 +21,7 @@ from geomech.scene.model import Scene
 from geomech.study import effort, estimate, uncertainty
 from geomech.systems.base import System
 from geomech.systems.capabilities import (
-    costed,
+    balance_size,
     gaits_per_batch,
     pieces_per_length,
     refined,
@@ -65,9 +65,8 @@ def price(jobs: Sequence[Job]) -> Cost:
             if solver_of(system) is None:
                 besides += CLOSED * job.count
             else:
-                seconds += assumed(
-                    job.weight * job.count, costed(system).evaluations, system.traits.linear, job.batches
-                )
+                points = balance_size(system).evaluations
+                seconds += assumed(job.weight * job.count, points, system.traits.linear, job.batches)
     return Cost(balances, seconds + besides, max((job.memory for job in jobs), default=BASE), besides, steps)
 
 
@@ -141,8 +140,9 @@ def direct(
     if checked:
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, gaits_per_batch(system, phases))
-    stored = group * (60 * costed(system).elements + costed(system).memory) if stepping else 0
-    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
+    size = balance_size(system)
+    stored_table = group * (60 * size.elements + size.memory) if stepping else 0
+    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored_table) + count * ROW
     solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)

@@ -16,7 +16,8 @@ from geomech.study.cost import connection, cycles_of, direct, price
 from geomech.study.question import Allow, Progress, Question
 from geomech.study.study import Study
 from geomech.systems.base import length_unit, shape_labels
-from geomech.systems.capabilities import Drawable, Stepped, capability, costed, settling
+from geomech.systems.capabilities import Drawable, Stepped, balance_size, capability, settling
+from geomech.tiers.path import PATH
 from rft.checks import is_whole
 from rft.premise import Premise
 from rft.refusal import Refusal, located
@@ -119,7 +120,7 @@ class Picture(Question):
 
     @property
     def _mapped(self) -> bool:
-        return self.scene.system.joints == 2 and self.study.has_connection
+        return self.scene.system.joints == 2 and PATH.is_offered(self.scene.system)
 
     def cost(self) -> Cost:
         costs = [cost(self.scene, self.cycles), *([price(connection(self.scene))] if self._mapped else [])]
@@ -172,7 +173,7 @@ def cost(scene: Scene, cycles: int = 1) -> Cost:
         times = (first_cycles + cycles_of(system) - 1 + cycles) / cycles_of(system)
         jobs = [job._replace(count=job.count * times, batches=job.batches * times) for job in jobs]
     total, rows = price(jobs), cycles * phases + 1
-    width = 2 * (costed(system).elements + 1) + system.joints + 5
+    width = 2 * (balance_size(system).elements + 1) + system.joints + 5
     memory = 8 * (4 * rows * (system.joints + 5) + 4 * min(rows * width, ROWS_TOGETHER + width))
     words = WORDS * rows * width
     return total._replace(seconds=total.seconds + words, memory=total.memory + memory, besides=total.besides + words)

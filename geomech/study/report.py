@@ -18,9 +18,9 @@ from geomech.study.cost import Job, of_even_part, of_metric, of_planes, price
 from geomech.study.cost import study as jobs
 from geomech.study.question import Allow, Progress, Question
 from geomech.study.study import Study
-from geomech.systems import Swimmer
 from geomech.systems.base import System, refuse_singular
 from geomech.systems.capabilities import near_gait
+from geomech.systems.swimmer import is_three_link
 from geomech.tiers.area import AREA
 from geomech.tiers.fitted import axes as field_axes
 from geomech.tiers.fitted import is_too_large
@@ -101,9 +101,8 @@ def cost(scene: Scene) -> Cost:
 
 def _gaits(scene: Scene) -> list[Gait]:
     """Return the scene's gait and, for the three-link swimmer, those of Fig. 11(e), at the same frequency."""
-    three_link = isinstance(scene.system, Swimmer) and scene.system.three_link
-    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency)) if three_link else ()
-    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait))]
+    more = (Circle(reverse=True, frequency=scene.frequency), Butterfly(frequency=scene.frequency))
+    return [scene.gait, *(g for g in more if type(g) is not type(scene.gait) and is_three_link(scene.system))]
 
 
 def reachable(scene: Scene, gait: Gait) -> list[float]:

@@ -19,10 +19,11 @@ from geomech.study.cost import Job, frame, harmonics, of_even_part, of_metric, o
 from geomech.study.cost import connection as fitted
 from geomech.study.effort import shared, why_none
 from geomech.study.question import Allow, Progress, Question
-from geomech.study.study import Study
+from geomech.study.study import Study, refuse_outside
 from geomech.systems.base import shape_labels
 from geomech.systems.capabilities import stored_table
-from geomech.tiers.fitted import finest_grid
+from geomech.tiers.fitted import finest_grid, refuse
+from geomech.tiers.harmonic import is_looked_up
 from rft.refusal import Refusal, located
 
 NO_MAP = "a body of one joint has no map, a loop of it encloses no area: give it one joint more, or drop the figure"
@@ -85,7 +86,7 @@ class ShapeSpace(Question):
 
     @property
     def _harmonics(self) -> bool:
-        return self.file and self.study.has_harmonics
+        return self.file and is_looked_up(self.scene.system)
 
     @cached_property
     def _at(self) -> list[tuple[tuple[int, int], np.ndarray]]:
@@ -104,11 +105,11 @@ class ShapeSpace(Question):
     def check(self) -> None:
         system, name = self.scene.system, self.scene.name
         with located(name):
-            self.study.refuse_connection()
+            refuse(system)
             if (self.map or self.planes) and system.joints == 1:
                 raise Refusal(NO_MAP)
             if self.gait:
-                self.study.refuse_outside()
+                refuse_outside(self.scene)
             if self.metric and (reason := why_none(system)):
                 raise Refusal(reason, where=name)
             if self.other_frame is not None and len(self._at) > 1:

@@ -34,8 +34,6 @@ from geomech.systems.framed import NAME as MINIMUM_PERTURBATION
 from geomech.systems.framed import in_frame
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan, Table, Tier, in_groups
-from geomech.tiers.harmonic import HARMONIC
-from geomech.tiers.path import PATH
 from rft.checks import real_array
 from rft.refusal import Refusal, located
 
@@ -44,7 +42,7 @@ SAMPLES = 64, 4096  # amplitudes and phases that `cost` checks; `study` checks a
 
 class Study(Extensible):
     """A scene and the tables computed for it so far, each stored under its name, the system and all other data that it
-    depends on. `with_numerics` returns a study with other numerics that shares them."""
+    depends on. `turned` returns a study with other numerics that shares them."""
 
     def __init__(self, scene: Scene, tables: dict | None = None):
         if not isinstance(scene, Scene):
@@ -60,7 +58,7 @@ class Study(Extensible):
         """Keys (name, system, key) of the tables computed so far."""
         return tuple(self._tables)
 
-    def with_numerics(self, **numerics) -> Study:
+    def turned(self, **numerics) -> Study:
         """Return the study with other [numerics] and the same stored tables; an entry given as None stays as it is."""
         return Study(self.scene.with_numerics(**numerics), self._tables)
 
@@ -75,12 +73,6 @@ class Study(Extensible):
 
     methods = property(lambda self: methods(self.scene.system))
     tiers = property(lambda self: tiers(self.scene.system))
-
-    @property
-    def lookups(self) -> tuple[str, ...]:
-        """Tiers that approximate the system's velocity, of those available."""
-        s = self.scene
-        return tuple(m for m in self.tiers if not TIERS[m].plan(s.system, s.numerics, s.gait, None).exact)
 
     def _stored(self, name: str, key: tuple, build: Callable):
         """Return the value of build(), the seconds that it took, and whether it was stored before."""
@@ -124,26 +116,13 @@ class Study(Extensible):
         with located(self.scene.name):
             return self._built(plan.table, progress)[0] if plan.table else None
 
-    def refuse_connection(self) -> None:
-        """Refuse a system without connection."""
-        with located(self.scene.name):
-            fitted.refuse(self.scene.system)
-
-    @property
-    def has_connection(self) -> bool:
-        """Whether the system has a connection, and few enough joints for a plain study to fit it."""
-        return PATH.is_offered(self.scene.system)
-
-    def compute_field(self, progress: Callable | None = None) -> None:
-        """Compute `fitted` now. progress: called with the fraction done."""
-        self._fitted(progress)
-
     @property
     def fitted(self) -> Connection:
         """Least-squares connection on the scene's grid."""
-        return self._fitted()
+        return self.compute_field()
 
-    def _fitted(self, progress: Callable | None = None) -> Connection:
+    def compute_field(self, progress: Callable | None = None) -> Connection:
+        """Return `fitted`. progress: called with the fraction done."""
         with located(self.scene.name):
             fitted.refuse(self.scene.system)
             return self._built(self._connection(), progress)[0]
@@ -156,13 +135,7 @@ class Study(Extensible):
     @property
     def harmonics(self) -> Harmonics | None:
         """Harmonics of the velocity in a plain study; None where it is linear, or has too many joints."""
-        return self.compute_harmonics() if self.has_harmonics else None
-
-    @property
-    def has_harmonics(self) -> bool:
-        """Whether there are `harmonics`."""
-        system = self.scene.system
-        return not system.traits.linear and HARMONIC.is_offered(system)
+        return self.compute_harmonics() if harmonic.is_looked_up(self.scene.system) else None
 
     def plane(self, pair: Sequence[int], at=None, progress: Callable | None = None) -> Plane:
         """Return a plane of shape space in which two joints move, counted from 0, through a shape or the gait's middle:
@@ -243,14 +216,6 @@ class Study(Extensible):
         plan = self.plan(method, gait, amplitudes)
         return plan.spread(self._table_of(plan), amplitudes)
 
-    def refuse_outside(self, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
-        """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
-        system, n, gait = self.scene.system, self.scene.numerics, self.scene.gait if gait is None else gait
-        field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
-        names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
-        shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
-        in_groups(shapes, chosen, gaits_per_batch(system, phases))
-
     def _refuse_singular(self, plan: Plan, gait: Gait, amplitudes, phases: int | None = None) -> None:
         """Refuse a gait, or a curve of the family of the table, that meets a singular shape."""
         system, phases = self.scene.system, phases or self.scene.numerics.phases
@@ -273,7 +238,7 @@ class Study(Extensible):
         call."""
         gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
         medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
-        seconds, stored = self._build_all(chosen, progress)
+        seconds, stored_table = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
@@ -295,13 +260,13 @@ class Study(Extensible):
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        facts = {"seconds": seconds, "kept": stored}
+        facts = {"seconds": seconds, "kept": stored_table}
         return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
 
     def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
         """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
         were stored."""
-        field, seconds, stored = self._connection(), {}, []
+        field, seconds, stored_table = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
         for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
@@ -309,8 +274,8 @@ class Study(Extensible):
             if name not in seconds:
                 with located(self.scene.name):
                     _, seconds[name], exists = self._built(tables[method], progress)
-                stored += [name] * exists
-        return seconds, stored
+                stored_table += [name] * exists
+        return seconds, stored_table
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
         """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see
@@ -342,8 +307,17 @@ class Study(Extensible):
                 chosen[tier.name] = plan = self._plan(tier, gait, amplitudes)
                 self._refuse_singular(plan, gait, sampled, phases)
             if any(plan.table and plan.table.axes for plan in chosen.values()):
-                self.refuse_outside(gait, sampled, phases)
+                refuse_outside(scene, gait, sampled, phases)
         return gait, amplitudes, chosen
+
+
+def refuse_outside(scene: Scene, gait: Gait | None = None, amplitudes=None, phases: int | None = None) -> None:
+    """Refuse a gait, or the scene's own, that leaves the field of the tables. phases: the scene's if None."""
+    system, n, gait = scene.system, scene.numerics, scene.gait if gait is None else gait
+    field, chosen = fitted.axes(system, n), gait.amplitude if amplitudes is None else amplitudes
+    names, phases = [name for name, _ in shape_labels(system)], phases or n.phases
+    shapes = lambda group: inside(field, gait.cycle(phases, group)[0], names)[:, 0]
+    in_groups(shapes, chosen, gaits_per_batch(system, phases))
 
 
 def _tier(name: str) -> Tier:

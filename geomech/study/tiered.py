@@ -16,7 +16,7 @@ from geomech.scene.model import Scene, checked_scene
 from geomech.study import cost as foretold
 from geomech.study import estimate
 from geomech.study.available import tiers
-from geomech.study.study import Study
+from geomech.study.study import Study, refuse_outside
 from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
 from geomech.tiers import TIERS, fitted, harmonic
 from geomech.tiers.base import Plan
@@ -62,7 +62,7 @@ class Settings:
         tables = [_plan(scene, knob.tier).table for knob in self.knobs()]
         if any(table and table.axes for table in tables):
             with located(scene.name):
-                Study(scene).refuse_outside()
+                refuse_outside(scene)
 
     def cost(self) -> Cost:
         scene = self.scene
@@ -121,7 +121,7 @@ class Settings:
         return {**entry, "buys": knob.buys}
 
     @property
-    def own_error(self) -> float:
+    def table_error(self) -> float:
         """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         return float(table_error(self.scene.system, *shapes)[..., 0].max())

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -40,13 +40,6 @@ class Refinable(Protocol):
     def refined(self) -> System | None:
         """Return the system with a velocity closer to the exact one, None where it is exact; its `run` takes ``start``,
         velocities nearby (..., N, 3)."""
-
-
-@runtime_checkable
-class Subdivided(Protocol):
-    """A body that effects which vary along an element cut into pieces; read by estimates of the error of that cut."""
-
-    cut: int  # pieces to a body length; 0 without such effects
 
 
 @runtime_checkable
@@ -109,17 +102,25 @@ class Stepped(Protocol):
         """Return poses (cycles N + 1, 3) of the frame, seen from the first, of a cycle (N, d) run so many times."""
 
 
+class BalanceSize(NamedTuple):
+    """The size of a balance of forces, of one velocity; the defaults are those of a system that solves none.
+
+    elements: straight parts of the body. evaluations: places at which forces are evaluated. pieces: to a body length, into
+    which effects that vary along elements cut these, 0 without such effects. memory: numbers that time stepping remembers.
+    batched: whether there is a parameter for each amplitude, so that gaits belong together."""
+
+    elements: int = 1
+    evaluations: int = 1
+    pieces: int = 0
+    memory: int = 0
+    batched: bool = False
+
+
 @runtime_checkable
-class Costed(Protocol):
+class Costed(System, Protocol):
     """A velocity that takes a balance of forces; read by `geomech.study.cost`."""
 
-    elements: int  # straight parts of the body
-    evaluations: int  # places at which forces are evaluated for one velocity
-    memory: int  # numbers that time stepping remembers for each sample
-    batched: bool  # whether it has a parameter for each amplitude, so that gaits belong together
-
-    def solved_phases(self, gait, phases: int) -> int:
-        """Return at how many phases of a gait a balance is solved; the others are images of these."""
+    balance_size: BalanceSize
 
 
 @runtime_checkable
@@ -180,8 +181,7 @@ def stored_table(system: System, name: str) -> Any:
 def pieces_per_length(system: System) -> int:
     """Return the pieces per body length into which effects that vary along elements cut the body; 0 without such
     effects."""
-    subdivided = capability(system, Subdivided)
-    return 0 if subdivided is None else subdivided.cut
+    return balance_size(system).pieces
 
 
 def refined(system: System) -> System | None:
@@ -219,18 +219,18 @@ def solver_of(system: System) -> Any:
 
 def with_solver(system: System, changes: Mapping[str, Any]) -> System:
     """Return a system with some of its own [numerics] changed."""
-    return system.with_solver(replace(system.solver, **changes)) if changes else system
+    return system.with_solver(replace(solver_of(system), **changes)) if changes else system
 
 
 def gaits_per_batch(system: System, phases: int) -> int:
     """Return how many amplitudes of a gait are run at a time, at least one: more take more memory and no less time."""
-    cost = costed(system)
-    if cost.batched:
+    size = balance_size(system)
+    if size.batched:
         return sys.maxsize
     if not system.traits.steps:
-        return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * cost.elements)))
+        return max(1, VALUES_TOGETHER // (phases * max(system.joints + 6, 2 * size.elements)))
     # Time stepping has some thirty arrays of elements beside what effects hold, where a gait has some ten of angles.
-    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * cost.elements + cost.memory // 8))
+    return max(1, STEPPED_TOGETHER // max(phases * (system.joints + 6), 4 * size.elements + size.memory // 8))
 
 
 def near_gait(system: System) -> str:
@@ -252,19 +252,7 @@ def is_closed(system: System) -> bool:
     return refinable is not None and refinable.closed
 
 
-@dataclass(frozen=True)
-class ClosedForm:
-    """The cost of a system that solves no balance."""
-
-    system: System
-    elements = evaluations = 1
-    memory = 0
-    batched = False
-
-    def solved_phases(self, gait, phases: int) -> int:
-        return phases
-
-
-def costed(system: System) -> Costed:
-    """Return what a system's velocity costs."""
-    return capability(system, Costed) or ClosedForm(system)
+def balance_size(system: System) -> BalanceSize:
+    """Return the size of the balance that a system's velocity takes."""
+    costed = capability(system, Costed)
+    return BalanceSize() if costed is None else costed.balance_size

@@ -24,7 +24,6 @@ from geomech.systems.capabilities import (
     Refinable,
     Stepped,
     Symbolic,
-    Tunable,
     capability,
     refined,
     stored_table,
@@ -64,7 +63,6 @@ class Framed:
     joints = property(lambda self: self.inner.joints)
     length = property(lambda self: self.inner.length)
     closed = property(lambda self: self.inner.closed)
-    solver = property(lambda self: self.inner.solver)
     settling = 0.0
 
     def capability(self, kind: type) -> Any:
@@ -72,7 +70,7 @@ class Framed:
         inner = capability(self.inner, kind)
         if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
             return self
-        carried_over = (Dissipative, Drawable, Refinable, Diagnosed, Tunable)
+        carried_over = (Dissipative, Drawable, Refinable, Diagnosed)
         return None if inner is None or kind is Symbolic else self if kind in carried_over else inner
 
     @property
@@ -111,7 +109,7 @@ class Framed:
         return self._frame_and_connection[1]
 
     def velocity(self, alpha, alphadot) -> np.ndarray:
-        """Return xi (..., 3) in the frame; ValueError outside its grid."""
+        """xi (..., 3) in the frame; ValueError outside its grid."""
         return change_velocity(self.inner.velocity(alpha, alphadot), *self.field(alpha, alphadot))
 
     def power(self, alpha, alphadot, xi) -> np.ndarray:
@@ -147,12 +145,11 @@ class Framed:
     def with_solver(self, solver) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(solver))
 
-    def in_frame(self, frame: str) -> System:
-        return self if frame == NAME else in_frame(self.inner, frame)
-
 
 def in_frame(system: System, frame: str) -> System:
     """Return a system in another of its frames; Refusal if it has none of that name."""
+    if isinstance(system, Framed):
+        return system if frame == NAME else in_frame(system.inner, frame)
     if method := getattr(system, "in_frame", None):
         return method(frame)
     if dataclasses.is_dataclass(system) and "frame" in {f.name for f in dataclasses.fields(system)}:

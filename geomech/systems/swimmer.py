@@ -11,16 +11,16 @@ import numpy as np
 
 import rft
 from geomech.core.work import iterate
-from geomech.geometry.images import cycle_images, solved_count
+from geomech.geometry.images import cycle_images
 from geomech.geometry.reconstruct import displacement, poses, repeated
 from geomech.geometry.traits import MEAN, Traits
-from geomech.systems.base import SYSTEMS, Cycle, refuse_mutable
-from geomech.systems.capabilities import Drawable, Part, Stepped, Uncertain
+from geomech.systems.base import SYSTEMS, Cycle, System, refuse_mutable
+from geomech.systems.capabilities import BalanceSize, Drawable, Part, Stepped, Uncertain
 from geomech.systems.premises import refuse
 from geomech.systems.solver import Solver
 from rft.bodies import BODIES
 from rft.bodies.base import checked_body, half_lengths, is_reversible, joint_speed
-from rft.contact import Assembly, assemble
+from rft.contact import assemble
 from rft.effects import EFFECTS
 from rft.laws import CATALOGUE, LAWS, is_closed, is_linear, is_mirror, is_rate_independent, speed_exponent
 from rft.laws.base import is_odd, require_law
@@ -83,7 +83,6 @@ class Swimmer:
     joints = property(lambda self: self.body.joints)
     length = property(lambda self: self.body.length)
     closed = property(lambda self: is_closed(self.medium))
-    memory = property(lambda self: sum(e.memory_size for e in self.effects))
 
     @cached_property
     def traits(self) -> Traits:
@@ -104,11 +103,12 @@ class Swimmer:
             frequency=next((e.frequency for e in effects if hasattr(e, "frequency")), None),
         )
 
-    def capability(self, kind: type) -> Swimmer | None:
+    def capability(self, kind: type) -> Any:
         """Return itself if it has the ability, which depends on its medium, its body and its effects."""
         medium = self.medium
+        if kind is Drawable:
+            return self.body if isinstance(self.body, Drawable) else None
         has = {
-            Drawable: hasattr(self.body, "points"),
             Uncertain: hasattr(medium, "uncertain") and getattr(medium, "covariance", None) is not None,
             Stepped: self.traits.steps,
         }
@@ -127,9 +127,6 @@ class Swimmer:
             "regularisation": float(self.solver.regularisation),
             "regularisation_unit": "body length rad-1",
         }
-
-    def points(self, alpha, pose) -> np.ndarray:
-        return self.body.points(alpha, pose)
 
     @property
     def covariance(self) -> tuple | None:
@@ -150,41 +147,20 @@ class Swimmer:
             ) from None
 
     @property
-    def three_link(self) -> bool:
-        """Whether the body is the three-link swimmer, for which the published gaits were made."""
-        return isinstance(self.body, rft.Chain) and len(self.body.lengths) == 3 and self.body.modes is None
-
-    @property
-    def engine(self) -> str:
-        """The cheapest of `rft.effects.ENGINES` that is right for the effects."""
-        return rft.effects.engine(self.effects)
-
-    @property
     def settling(self) -> float:
         place_matters = self.traits.lacks & Premise.SE2_SYMMETRIC
         runs_on = self.traits.steps and self.solver.cycles is None and not place_matters
         return max(e.drift_tolerance for e in self.effects) if runs_on else 0.0
 
     @property
-    def cut(self) -> int:
-        """Pieces per body length into which effects that vary along elements cut the body: as requested, or whole
-        elements where these are shorter; 0 without such effects."""
-        if not any(e.varies_along for e in self.effects):
-            return 0
-        return max(self.solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
-
-    @property
-    def elements(self) -> int:
-        """Straight elements of the body, as its effects cut it."""
-        return self._assembly.n_elements
-
-    @property
-    def evaluations(self) -> int:
-        return self._assembly.n_law_points
-
-    @property
-    def _assembly(self) -> Assembly:
-        return assemble(self.medium, self.body, self.effects, self.solver.loads, self.solver.pieces)
+    def balance_size(self) -> BalanceSize:
+        solver, effects, pieces = self.solver, self.effects, 0
+        assembly = assemble(self.medium, self.body, effects, solver.loads, solver.pieces)
+        if any(e.varies_along for e in effects):  # see elements that are shorter than a piece whole
+            pieces = max(solver.pieces, int(np.ceil(0.5 / half_lengths(self.body).max() - 1e-9)))
+        batched = any(np.ndim(getattr(e, name)) for e in effects for name in e.batched)
+        memory = sum(e.memory_size for e in effects)
+        return BalanceSize(assembly.n_elements, assembly.n_law_points, pieces, memory, batched)
 
     def with_solver(self, solver: Solver) -> Swimmer:
         return dataclasses.replace(self, solver=solver)
@@ -261,9 +237,6 @@ class Swimmer:
         to_come = steps.drift if self.settling else 0.0 * speed
         return Cycle(steps.xi, net, steps.residual, speed, steps.work, steps.cycles, to_come)
 
-    def solved_phases(self, gait, phases: int) -> int:
-        return solved_count(gait, phases, self.traits)
-
     def _for_gaits(self, count: int, phases: int) -> Swimmer:
         """Return the swimmer for ``count`` gaits of ``phases`` phases each, where effects have a parameter for each
         gait."""
@@ -287,11 +260,6 @@ class Swimmer:
         poses_after = steps.path[before * len(alpha) :]
         return rft.se2.compose(rft.se2.inverse(poses_after[:1]), poses_after)
 
-    @property
-    def batched(self) -> bool:
-        """Whether an effect has a parameter for each gait."""
-        return any(np.ndim(getattr(e, name)) for e in self.effects for name in e.batched)
-
     def refined(self) -> Swimmer | None:
         rule, count = rule_for(self.medium, self.solver.loads)
         finer = {} if rule == "exact" else {"loads": "exact" if self.closed else f"{rule}:{min(2 * count, 1000)}"}
@@ -309,6 +277,12 @@ def _has_joint_angles(body: rft.Body) -> bool:
     instead."""
     plain = isinstance(body, (rft.Chain, rft.Backbone)) and getattr(body, "bends", None) is None
     return plain and getattr(body, "modes", None) is None
+
+
+def is_three_link(system: System) -> bool:
+    """Return whether a system is the three-link swimmer, for which the published gaits were made."""
+    body = system.body if isinstance(system, Swimmer) else None
+    return isinstance(body, rft.Chain) and len(body.lengths) == 3 and body.modes is None
 
 
 def name_in(kinds: dict, part) -> str:

@@ -204,12 +204,7 @@ class Table:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Assumptions about facts that the file does not state, as notes."""
-        return tuple(f"{self.file}: {line}" for line in self.assumptions)
-
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """The lines of `assumed`, without the file's name."""
+        """Assumptions about facts that the file does not state, one a line."""
         return (
             self.stored.assumptions
             if self.stored.sized or self.body_length is not None

@@ -8,6 +8,7 @@ from geomech.gaits import KINDS as GAITS
 from geomech.scene.model import Scene, checked_scene
 from geomech.study.available import tiers
 from geomech.systems.premises import listed
+from geomech.text import grains
 from geomech.text.system import described, engine
 from geomech.tiers import TIERS
 from geomech.tiers.base import solved_phases
@@ -25,8 +26,8 @@ def explain(scene: Scene | Intruding | WalkerScene) -> str:
     """Return the system with its effects on and off, the engine and why, and the results that exist, as plain text.
 
     Of an intruder scene: its law, body and motion, and effects on and off; of a robot that walks its engine, too."""
-    if hasattr(scene, "description"):  # of bodies in grains, whose modules a swimmer does without
-        return printable("\n".join(scene.description()))
+    if not isinstance(scene, Scene) and hasattr(type(scene), "example"):  # of bodies in grains
+        return printable("\n".join(grains.described(scene)))
     system = checked_scene(scene).system
     first, *rest = described(system)
     gait = next((name for name, kind in GAITS.items() if type(scene.gait) is kind), type(scene.gait).__name__)

@@ -8,6 +8,7 @@ import numpy as np
 
 from geomech.core.variables import Result
 from geomech.study.intrusion import Estimate
+from geomech.text.grains import effect_lines
 
 UNITS = {"t": "s", "angle": "degrees", "x": "m", "y": "m", "z": "m"}
 
@@ -28,7 +29,7 @@ def text(result: Result) -> str:
     lines = [f"{scene.name}: {kinds[0]} of {scene.count:,} {scene.parts}, {kinds[1]} in {len(found.t)} steps"]
     if matched := getattr(scene, "matched", ""):
         lines.append(matched)
-    lines += scene.effects_description()
+    lines += effect_lines(scene.effects)
     place = "angle" if "angle" in columns else max((n for n in "xyz" if n in columns), key=lambda n: np.ptp(columns[n]))
     names = [n for n in columns if n.startswith(("force", "moment")) and not (n == "moment" and "moment_y" in columns)]
     for name in names:

@@ -101,6 +101,6 @@ def _table(system: Table) -> list[str]:
     lines.append(f"stored as {SIGNS[held.sign]}, arrays as {held.order}, lengths in {held.unit}, frame {held.frame}")
     return [
         *lines,
-        *system.assumptions,
+        *system.assumed,
         "its field has the grid of the file; [numerics] grid, extent and directions say nothing",
     ]

@@ -14,8 +14,9 @@ import numpy as np
 
 from geomech.core.knob import Knob
 from geomech.gaits import Gait
+from geomech.geometry.images import solved_count
 from geomech.systems.base import System, kind_of
-from geomech.systems.capabilities import costed, near_gait
+from geomech.systems.capabilities import Costed, capability, near_gait
 from geomech.systems.premises import refuse
 from rft.checks import Number, check_numbers, real_array
 from rft.premise import ALL, Premise
@@ -177,7 +178,8 @@ def solved_phases(system: System, gait: Gait, phases: int) -> int:
     """Return at how many phases of a gait the system's velocity is solved; the others are images of these."""
     if system.traits.steps or phases < max(4, 2 * gait.harmonics + 1):  # the least that show a gait
         return phases
-    return costed(system).solved_phases(gait, phases)
+    costed = capability(system, Costed)
+    return phases if costed is None else solved_count(gait, phases, costed.traits)
 
 
 def in_groups(f: Callable, amplitudes, size: int) -> np.ndarray:

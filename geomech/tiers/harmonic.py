@@ -95,3 +95,8 @@ HARMONIC = Tier(
         ),
     ),
 )
+
+
+def is_looked_up(system) -> bool:
+    """Return whether a plain study takes the harmonics of a system: where the velocity is not linear, and joints are few."""
+    return not system.traits.linear and HARMONIC.is_offered(system)

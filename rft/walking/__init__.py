@@ -4,10 +4,11 @@ from rft.walking.craft import Screws
 from rft.walking.engines import ENGINES, Fineness, Walker, engine
 from rft.walking.mjcf import Mjcf
 from rft.walking.robot import Rhex, Robot, Roller, Tripod
-from rft.walking.robots import ROBOTS
 from rft.walking.screws import Cruise, Turning, cruise, free_turning, turning
 from rft.walking.stride import Walk
 from rft.walking.wheel import Rolling, rolling
+
+ROBOTS: dict[str, type[Robot]] = {"rhex": Rhex, "wheel": Roller, "screws": Screws}  # by the name that scenes give
 
 __all__ = [
     "ENGINES",

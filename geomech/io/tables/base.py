@@ -99,7 +99,9 @@ def scaled(stored: Stored, factor: float) -> Stored:
     times = lambda x: x * by.reshape(3, *[1] * (x.ndim - 1))
     c, h = stored.connection, stored.harmonics
     size = {"unit": stored.unit, "length": stored.length}
-    size |= {"taylor": c.taylor.scaled(by)} if isinstance(c, Tube) else {}
+    if isinstance(c, Tube):
+        series = {name: times(getattr(c.taylor, name)) for name in ("A", "slope", "beyond", "standard_error")}
+        size["taylor"] = replace(c.taylor, errors=c.taylor.errors * by[:, None, None, None], **series)
     c = type(c)(c.axes, times(c.A), times(c.residual), times(c.speed), c.degree, **size)
     h = h and Harmonics(h.axes, times(h.coefficients), times(h.residual), h.degree)
     even, error = (x if x is None else times(x) for x in (stored.even, stored.A_error))

@@ -1,0 +1,45 @@
+"""Scenes of bodies in grains, in lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from geomech.core.summary import part
+from rft.ground import GROUND_EFFECTS, GroundEffect
+from rft.premise import negated
+
+if TYPE_CHECKING:
+    from geomech.scene.intruding import Intruding
+    from geomech.scene.walker import WalkerScene
+
+
+def described(scene: Intruding | WalkerScene) -> list[str]:
+    """Return lines on the law, the body and its motion, or the robot, its clock and the engine, and which effects are on and
+    off."""
+    walks = hasattr(scene, "robot")
+    body, motion = (scene.robot, scene.gait) if walks else (scene.intruder, scene.motion)
+    body, moves, medium = (part(type(x).__name__, x) for x in (body, motion, scene.medium))
+    lines = [f"gait: {moves}" if walks else f"motion: {moves}", f"medium: {medium}"]
+    lines += [f"engine: {scene.engine}"] if walks else []
+    known = sorted(kind for kind, effect in GROUND_EFFECTS.items() if effect.walks) if walks else GROUND_EFFECTS
+    off = [kind for kind in known if kind not in [e.kind for e in scene.effects]]
+    return [
+        f"{scene.name}: {body}" + ("" if walks else f" of {scene.count:,} {scene.parts}"),
+        *lines,
+        *effect_lines(scene.effects),
+        "off, not evaluated: " + (", ".join(off) or "none"),
+    ]
+
+
+def effect_lines(effects: Sequence[GroundEffect]) -> list[str]:
+    """Return a line for each effect on the ground, and one more for what it assumes."""
+    lines = []
+    for effect in effects:
+        lines.append(
+            f"on:  {part(effect.kind, effect)}; {negated(effect.breaks) or 'keeps every premise'}; costs {effect.cost}; "
+            f"gone at {effect.limit}, order {effect.order}"
+        )
+        if effect.assumes:
+            lines.append(f"     assumes {effect.assumes}")
+    return lines
