@@ -16,7 +16,7 @@ law, stress, leg = CATALOGUE["glass-0.3mm-loose"].medium, VERTICAL["generic"].st
 with preferring("numba"):
     body_velocity(law, Chain(), (1.0, 1.0), (1.0, 1.0))
     loads(stress, leg.outline(8), (0.0, -0.1, 0.0), (1.0, 0.0, 0.0))
-    engine("planar").step_cost(Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress), Fineness(), 0.0)
+    engine("planar").step_cost([Walker(Rhex(0.1, 0.1, 0.02, 0.05, leg, (0.0,)), Tripod(1.0), stress)], Fineness(), 0.0)
 
 from rft.balance.compiled import kernel  # noqa: E402  # after the check, for the import loads numba
 

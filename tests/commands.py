@@ -44,7 +44,7 @@ def geomech(*args, cwd="."):
 def own_parts():
     """Parts of one's own, and the modules they came in, are forgotten at the end."""
     before, modules = {group: dict(registry) for group, registry in REGISTRIES.items()}, set(sys.modules)
-    with mock.patch.multiple(kinds, _code={}, _files={}):
+    with mock.patch.multiple(kinds, _texts={}, _files={}):
         yield
     for group, registry in REGISTRIES.items():
         registry.restore(before.get(group, registry))

@@ -108,6 +108,7 @@ def test_a_field_of_four_joints_is_written(large, monkeypatch):
     np.testing.assert_allclose(A[:, :, 3, 0, 2, 1], wanted, atol=1e-12)
 
 
+@pytest.mark.usefixtures("fastest")
 def test_pieces_change_no_numbers(monkeypatch):
     """What is computed in groups is what it is at once."""
     scene = GLASS.with_numerics(grid=7, phases=48, harmonics=5)

@@ -1,5 +1,7 @@
 """Counted beforehand: the force balances of every tier, table, error, motion and sweep are those that are solved."""
 
+import dataclasses
+
 import pytest
 
 from geomech import scene as scenes
@@ -34,6 +36,8 @@ def solved():
 SKIN = GLASS.changed(effects=(SkinFriction(0.109, 0.137, 1.0),)).with_numerics(grid=7, pieces=5)
 SNAKE = scenes.load("shovel-nosed-snake").with_numerics(phases=64)
 FIFTH = Fourier(cos=((0.6, 0, 0.1, 0, 0.05), (0,) * 5), sin=((0,) * 5, (0.6, 0, -0.1, 0, 0.05)))
+UNSURE = dataclasses.replace(GLASS.system.medium, covariance=((0.01, 0.0), (0.0, 4e-4)))
+FRAMED = Study(GLASS.with_numerics(grid=7).changed(medium=UNSURE)).in_frame("minimum-perturbation").scene
 FOUND = {
     "tables": (GLASS.with_numerics(grid=9), ("area", "path", "harmonic", "direct")),
     "no shape in the middle": (GLASS.with_numerics(grid=8), ("area", "path", "harmonic", "direct")),
@@ -48,6 +52,7 @@ FOUND = {
     "pieces": (SKIN, ("area", "path", "harmonic", "direct")),
     "a backbone": (SNAKE, ("direct",)),
     "a frame": (Study(GLASS.with_numerics(grid=9)).in_frame("minimum-perturbation").scene, ("harmonic", "direct")),
+    "a frame in sand that is not known": (FRAMED, ("direct",)),
     "time stepping": (SLOPING.with_numerics(phases=32, cycles=2), ("direct",)),
     "place": (GLASS.changed(effects=(Slope(0.3, 2.0, 0.6, 0.3),)).with_numerics(phases=32), ("direct",)),
 }

@@ -29,11 +29,11 @@ def test_seconds_are_assumed_for_places_of_the_body_and_for_batches():
         )
         assert places == pytest.approx(10 * one) and run_cost.assumed(1e6, 3, True, 0) == pytest.approx(one / 10)
         assert run_cost.assumed(1e6, 3, False, 1e3) == pytest.approx(one + batches)
-    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (100, 1000))  # each medium is a batch
+    few, many = ({"medium.ratio": np.linspace(1, 3, n).tolist()} for n in (20, 200))  # each medium is a batch
     assert sweep.Sweep(VISCOUS, many).cost().seconds == pytest.approx(
         10 * sweep.Sweep(VISCOUS, few).cost().seconds, rel=0.01
     )
-    together = {"medium.ratio": many["medium.ratio"][:100], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
+    together = {"medium.ratio": many["medium.ratio"][:20], "gait.amplitude": np.linspace(0.1, 1, 10).tolist()}
     assert sweep.Sweep(VISCOUS, together).cost().seconds < 0.4 * sweep.Sweep(VISCOUS, many).cost().seconds
 
 
@@ -103,7 +103,7 @@ def test_a_step_of_time_weighs_as_much_as_many_balances_of_a_batch():
     assert Study(scenes.load("three-link-glass")).cost([0.2], ["direct"]).steps == 0
 
 
-@pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 700.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
+@pytest.mark.parametrize("cost", [(1, 2.0, 1e8), (10**9, 301.0, 1e8), (10**6, 30.0, 3e9), (0, 70.0, 1e8, 70.0)])
 def test_what_is_sure_is_decided_at_once(cost, clock):
     """Little, very much, much memory, or much that is no balances."""
     judged = []

@@ -7,6 +7,7 @@ import json
 import math
 import pathlib
 import re
+import subprocess
 import sys
 from dataclasses import dataclass
 
@@ -336,20 +337,86 @@ def test_names_of_no_python_file_are_refused(tmp_path):
             load_file(tmp_path / "own.py")
 
 
-def test_digests_of_own_code_cover_its_sources(tmp_path, monkeypatch):
+IMPORTS = {  # of a module beside that of a law
+    "a function": "from thick_factor import times",
+    "a constant": "from thick_factor import FACTOR",
+    "the module": "import thick_factor",
+    "by another": "from thick_many import MANY",
+    "a package": "import thick_package.inner",
+    "from a package": "from thick_package import inner",
+    "when it is called": "def later():\n    import thick_factor",
+}
+
+
+@pytest.mark.parametrize("name", IMPORTS)
+def test_digests_of_own_code_cover_its_sources(name, tmp_path, monkeypatch):
     """Of a file that is edited and loaded again, and of a module beside it from which it takes something."""
     monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "thick_package").mkdir()
+    (tmp_path / "thick_package" / "__init__.py").write_text("")
+    (tmp_path / "thick_package" / "inner.py").write_text("def never():\n    from .. import none\nfrom . import leaf")
+    (tmp_path / "thick_package" / "leaf.py").write_text("from thick_factor import FACTOR")
+    (tmp_path / "thick_many.py").write_text(
+        "import functools, thick_factor\nMANY = [functools.partial(thick_factor.times)]"
+    )
     found = []
     for law, factor in ((LAW, 1), (LAW.replace("2.5", "2.6"), 1), (LAW, 2), (LAW, 1)):
-        (tmp_path / "thick.py").write_text(f"from thick_factor import FACTOR, times\n{law}")
+        (tmp_path / "thick.py").write_text(
+            f"{law}{IMPORTS[name]}\n" if "def" in IMPORTS[name] else f"{IMPORTS[name]}\n{law}"
+        )
         (tmp_path / "thick_factor.py").write_text(f"FACTOR = {factor}\ndef times(x):\n    return FACTOR * x\n")
-        monkeypatch.delitem(sys.modules, "thick_factor", raising=False)
-        monkeypatch.setattr(kinds, "_code", {})
+        for module in [module for module in sys.modules if module.startswith("thick_")]:
+            monkeypatch.delitem(sys.modules, module)
+        monkeypatch.setattr(kinds, "_texts", {})
         importlib.invalidate_caches()
         load_file(tmp_path / "thick.py")
         found.append(kinds.code())
-    assert all({name.partition("_plugin")[0] for name in one} == {"geomech", "thick_factor"} for one in found)
+    assert all("thick_factor" in one for one in found) and len({len(one) for one in found}) == 1
     assert found[0] == found[3] and len({tuple(one.items()) for one in found}) == 3
+
+
+SCRIPT = """
+import sys
+import numpy as np
+from geomech.gaits import Circle
+from geomech.scene import Scene, kinds
+from geomech.study import cycles, sweep
+from geomech.systems import SYSTEMS
+
+def drift(alpha, alphadot):
+    a, rates = np.broadcast_arrays(alpha, alphadot)
+    return 1.0 * np.stack([a[..., 0] * rates[..., 1], rates[..., 0], 0.0 * a[..., 0]], -1)
+
+def interrupted(*batch):
+    cycles._rows = interrupt
+    return rows(*batch)
+
+def interrupt(*batch):
+    raise KeyboardInterrupt
+
+kinds.register(drift, joints=2)
+cycles.SAMPLES_TOGETHER = 1
+if sys.argv[1:]:
+    rows, cycles._rows = cycles._rows, interrupted
+found = sweep.sweep(Scene(SYSTEMS["drift"](), Circle()), {"gait.amplitude": [0.5, 1.0]}, ".kept")
+print(*found["displacement"][:, 0].round(9))
+"""
+
+
+def test_an_edited_script_resumes_nothing(tmp_path):
+    """Which is stopped half way, and computes by the function that it has then."""
+
+    def run(text, *arguments):
+        (tmp_path / "script.py").write_text(text)
+        return subprocess.run(
+            [sys.executable, "-B", "script.py", *arguments], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+
+    assert (
+        run(SCRIPT, "stop").stderr.endswith("the same command goes on from there\n") and (tmp_path / ".kept").exists()
+    )
+    small, large = map(float, run(SCRIPT.replace("1.0 * np", "2.0 * np")).stdout.split())
+    assert (small, large) == pytest.approx((2 * np.pi * 0.5**2, 2 * np.pi))
 
 
 @pytest.fixture

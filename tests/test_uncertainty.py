@@ -65,6 +65,22 @@ def test_media_drawn_from_the_covariance_scatter_as_told(monkeypatch):
     assert (scatter > 1e-4).all()  # of every quantity there is something to see
 
 
+def test_in_a_frame_that_depends_on_the_medium_media_have_their_own(monkeypatch):
+    monkeypatch.setattr(uncertainty, "PHASES", 16)
+    sand, amplitudes = scene(granular()).with_numerics(grid=7), np.array([0.7, 1.2])
+    in_frame = lambda system: Study(sand.changed(system=system)).in_frame("minimum-perturbation").scene
+    told = uncertainty.of_medium(in_frame(sand.system), GAIT, amplitudes)
+    media = whitened(40, 2, seed=2) @ uncertainty.root(COVARIANCE).T
+    at = lambda d: (
+        in_frame(Swimmer(Granular(1.49 + d[0], 0.22 + d[1]), BODY)).system.run(*GAIT.cycle(16, amplitudes)).net
+    )
+    nets = np.stack([np.stack(list(of_pose(at(d)).values()), -1) for d in [[0.0, 0.0], *media, *-media]])
+    for k, quantity in enumerate(QUANTITIES):
+        scatter, shift = nets[1:, :, k].std(0), nets[1:, :, k].mean(0) - nets[0, :, k]
+        np.testing.assert_allclose(told[quantity], scatter, rtol=0.03)
+        np.testing.assert_allclose(told["shift"][quantity] / scatter, shift / scatter, atol=0.03)
+
+
 def test_the_second_order_of_a_quadratic_is_exact(monkeypatch):
     """For a displacement quadratic in the parameters, y = a + b z + z C z / 2: variance |b|^2 + tr(C^2) / 2 over normal z."""
     bend, slope = np.array([[3.0, 1.0], [1.0, -2.0]]), np.array([0.4, -0.3])

@@ -9,9 +9,9 @@ import typer
 
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
-    BesideOption,
     ExtentOption,
     GridOption,
+    OtherFrameOption,
     PairOption,
     SceneArgument,
     SliceOption,
@@ -35,7 +35,7 @@ def ccf(
     ] = False,
     pair: PairOption = None,
     slice_: SliceOption = None,
-    beside: BesideOption = None,
+    other_frame: OtherFrameOption = None,
     yes: YesOption = False,
 ):
     """Draw the CCF map with the scene's gait on it. Of three and more joints: a slice for each pair, or for one, with the
@@ -44,6 +44,6 @@ def ccf(
     from geomech.study.shape_space import ccf
 
     scene = load_scene(name, grid, extent)
-    drawn = pictures.Ccf(style, metric, stretch, beside)
-    question = ccf(scene, pair, angles(scene, "--slice", slice_), beside, metric, stretch)
+    drawn = pictures.Ccf(style, metric, stretch, other_frame)
+    question = ccf(scene, pair, angles(scene, "--slice", slice_), other_frame, metric, stretch)
     execute(question, Output(plot, drawn, pictures.check), yes=yes, silent=True)

@@ -10,9 +10,9 @@ import typer
 from geomech.commands import formats
 from geomech.commands.loading import load_scene
 from geomech.commands.options import (
-    BesideOption,
     ExtentOption,
     GridOption,
+    OtherFrameOption,
     PairOption,
     PlotOption,
     SceneArgument,
@@ -36,7 +36,7 @@ def connection(
     style: Annotated[Optional[str], typer.Option(help="of the plot: quiver or streamlines")] = None,
     pair: PairOption = None,
     slice_: SliceOption = None,
-    beside: BesideOption = None,
+    other_frame: OtherFrameOption = None,
     yes: YesOption = False,
 ):
     """Write the local connection on a grid, with its fit residual and CCF, as NetCDF; or A alone in sysplotter's layout, as
@@ -45,8 +45,8 @@ def connection(
     from geomech.study.shape_space import connection
 
     file = parts.Connection(out.suffix, sign, order)
-    drawn = pictures.Connection(style, plot, pair, slice_, beside)
+    drawn = pictures.Connection(style, plot, pair, slice_, other_frame)
     scene = load_scene(name, grid, extent)
-    question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), beside)
+    question = connection(scene, file.matlab, plot is not None, pair, angles(scene, "--slice", slice_), other_frame)
     outputs = Output(out, file, formats.netcdf_or_matlab), Output(plot, drawn, pictures.check)
     execute(question, *outputs, yes=yes, silent=True)

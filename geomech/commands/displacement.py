@@ -18,7 +18,7 @@ from geomech.commands.options import (
     spread,
     with_workers,
 )
-from geomech.commands.pipeline import Output, execute
+from geomech.commands.pipeline import Output, drawing, execute
 
 
 @with_workers
@@ -35,10 +35,11 @@ def displacement(
     yes: YesOption = False,
 ):
     """Compute the net displacement per cycle (x, y, theta), from phase t = 0, by each tier, with an estimate of its error."""
-    from geomech.output import pictures
     from geomech.study.displacement import displacement
 
     scene = load_scene(name, grid, extent)
     values = spread("--amplitudes", amplitudes, amplitude_kind(scene))
     question = displacement(scene, values, methods, tol, effort)
-    execute(question, Output(plot, pictures.displacement, pictures.check), as_json=as_json, yes=yes)
+    execute(
+        question, Output(plot, drawing("pictures.displacement"), drawing("pictures.check")), as_json=as_json, yes=yes
+    )

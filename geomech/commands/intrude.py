@@ -10,7 +10,7 @@ import typer
 from geomech.commands import formats
 from geomech.commands.loading import load_intruder
 from geomech.commands.options import IntruderArgument, JsonOption, PlotOption
-from geomech.commands.pipeline import Output, execute
+from geomech.commands.pipeline import Output, drawing, execute
 
 
 def intrude(
@@ -22,9 +22,8 @@ def intrude(
     """Compute force and moment of the grains on a body, an outline in the vertical plane or a mesh, along its motion. SI
     units."""
     from geomech.io.results import write_csv
-    from geomech.output import pictures
     from geomech.study.intrusion import Intrusion
 
     table = Output(out, lambda result, path: write_csv(path, result), formats.csv)
-    figure = Output(plot, pictures.intrusion, pictures.check)
+    figure = Output(plot, drawing("pictures.intrusion"), drawing("pictures.check"))
     execute(Intrusion(load_intruder(name)), table, figure, as_json=as_json, yes=True)

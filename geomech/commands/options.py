@@ -50,7 +50,7 @@ CyclesOption = Annotated[int, typer.Option("--cycles", metavar="N", help="cycles
 YesOption = Annotated[bool, typer.Option("--yes", help="compute even for more than a minute, or in more than 2 GB")]
 
 
-BesideOption = Annotated[
+OtherFrameOption = Annotated[
     Optional[str], typer.Option("--beside", metavar="FRAME", help="draw another body frame below, on the same scales")
 ]
 PairOption = Annotated[

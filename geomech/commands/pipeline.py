@@ -7,6 +7,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,17 @@ class Output:
     check: Callable[[Path], Any] = lambda path: None
     message: Callable[[Result, Path], str] | None = None
     folder: bool = False
+
+
+def drawing(function: str) -> Callable:
+    """Return a function of a module of `geomech.output`, such as "pictures.sweep", imported at its first call: a command
+    without pictures loads nothing that draws."""
+    module, name = function.split(".")
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(f"geomech.output.{module}"), name)(*arguments)
+
+    return call
 
 
 def execute(

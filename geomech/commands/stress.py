@@ -8,7 +8,7 @@ import typer
 
 from geomech.commands.names import medium_names
 from geomech.commands.options import JsonOption, PlotOption
-from geomech.commands.pipeline import Output, execute
+from geomech.commands.pipeline import Output, drawing, execute
 
 
 def stress(
@@ -27,8 +27,7 @@ def stress(
 ):
     """Compute the stress of the grains on a plate per unit depth, N/cm^3: backwards (alpha_x) and upwards (alpha_z) (Fig.
     7)."""
-    from geomech.output import pictures
     from geomech.study.stress import Stress
 
-    figure = Output(plot, pictures.stress, pictures.check)
+    figure = Output(plot, drawing("pictures.stress"), drawing("pictures.check"))
     execute(Stress(medium, beta, gamma, plot is not None), figure, as_json=as_json)

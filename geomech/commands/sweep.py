@@ -10,7 +10,7 @@ import typer
 from geomech.commands import formats
 from geomech.commands.loading import load_moving
 from geomech.commands.options import PlotOption, SceneArgument, YesOption, parameters, with_workers
-from geomech.commands.pipeline import Output, execute, path_message
+from geomech.commands.pipeline import Output, drawing, execute, path_message
 
 
 @with_workers
@@ -24,7 +24,6 @@ def sweep(
     """Compute the net displacement, or the speed of a robot that walks, over a grid of the scene's parameters. A repeated
     command resumes an interrupted one."""
     from geomech.io.results import write_netcdf
-    from geomech.output import pictures
     from geomech.study.sweep import Sweep, as_stored
 
     scene = load_moving(name)
@@ -32,4 +31,4 @@ def sweep(
     file = Output(
         out, lambda result, path: write_netcdf(path, as_stored(result)), formats.netcdf, path_message("results in")
     )
-    execute(Sweep(scene, axes), file, Output(plot, pictures.sweep, pictures.check), yes=yes)
+    execute(Sweep(scene, axes), file, Output(plot, drawing("pictures.sweep"), drawing("pictures.check")), yes=yes)

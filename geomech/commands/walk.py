@@ -9,7 +9,7 @@ import typer
 
 from geomech.commands.loading import load_walker
 from geomech.commands.options import JsonOption, WalkerArgument, YesOption, folder
-from geomech.commands.pipeline import Output, execute
+from geomech.commands.pipeline import Output, drawing, execute
 
 
 def walk(
@@ -28,10 +28,9 @@ def walk(
 ):
     """Compute how a robot walks on grains: mean speed with its error, and its motion from rest. SI units, pitch in rad, nose
     down."""
-    from geomech.output import animate as film
-    from geomech.output import walks
     from geomech.study.walking import Walking
 
     question = Walking(load_walker(name), engine, limited=not yes)
-    results, picture = Output(out, walks.write, folder=True), Output(animate, walks.film, film.check_format)
+    results = Output(out, drawing("walks.write"), folder=True)
+    picture = Output(animate, drawing("walks.film"), drawing("animate.check_format"))
     execute(question, results, picture, as_json=as_json, yes=yes)

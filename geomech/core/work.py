@@ -51,6 +51,9 @@ def iterate(step: Callable, state: Any, count: int, context: tuple, row: Any = A
     context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
     of a row.
 
+    context: everything besides the state on which steps depend; the state consists of arrays and numbers. row: the type
+    of a row.
+
     of: all that steps follow from besides the state, which consists of arrays and numbers. row: the type of a row."""
     return _worker.get().iterate(step, state, count, context, row)
 

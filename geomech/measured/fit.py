@@ -174,7 +174,7 @@ def _regressed(log, loop: Loop, phase, count, joints, pose, combined, level, har
     square = (_net(known)[0] - mean) ** 2 - mean_error**2  # less the error of the mean
     beyond = SAFETY * np.sqrt(np.maximum(square, 0.0))
     residual = residual_of(known, samples, varies)
-    known = replace(known, beyond=beyond, standard_error=residual.off)
+    known = replace(known, beyond=beyond, standard_error=residual.standard_error)
     frequency = (len(times) - 1) / (times[-1] - times[0])
     uniform = np.interp(log.t, times, np.interp(times, log.t, phase))
     return Fitted(

@@ -32,11 +32,11 @@ class Residual(NamedTuple):
     """Misfit of a fit.
 
     residual: (3,), rms misfit of xi, over that of the joint rates. explained: (3,), share of the squares of xi that the
-    fit explains. off: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.TaylorSeries`."""
+    fit explains. standard_error: (3, 2, PLACES), errors of A as in `geomech.geometry.tube.TaylorSeries`."""
 
     residual: np.ndarray
     explained: np.ndarray
-    off: np.ndarray
+    standard_error: np.ndarray
 
 
 def residual_of(known: TaylorSeries, samples: Samples, varies: int) -> Residual:

@@ -44,20 +44,20 @@ def limiting(optimum: Optimum, field: Field | None) -> np.ndarray:
     where ``field`` is None."""
     alpha = optimum.gait.shape(np.linspace(0, 2 * np.pi, PHASES))
     rest = "length" if optimum.request.aim.name == "efficiency" else "else"
-    found = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
+    causes = np.full(PHASES, rest if field is not None else "loop", dtype="<U8")
     if field is not None:
         value = np.abs(_nearest_values(field, alpha))
         inside = [(a >= lo) & (a <= hi) for a, lo, hi in zip(field.axes, alpha.min(0), alpha.max(0))]
         around = np.abs(field.values[0][np.ix_(*inside)])
         # next to singular shapes the largest value may be any
         top = np.nanmedian(around) if field.masked else around.max(initial=value.max())
-        found = np.where(value <= NEAR_ZERO * top, "zero", found)
+        causes = np.where(value <= NEAR_ZERO * top, "zero", causes)
     if "singular shapes" in optimum.active:
         distance = np.abs(optimum.scene.system.traits.singularity(alpha))
-        found = np.where(distance <= distance.min() * (1 + NEAR_SINGULAR), "singular", found)
+        causes = np.where(distance <= distance.min() * (1 + NEAR_SINGULAR), "singular", causes)
     box = getattr(optimum.request.loops, "box", np.array([[-np.inf], [np.inf]]))
     near = TOUCHING * (box[1] - box[0]) / 2 if np.isfinite(box).all() else 0.0
-    return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", found)
+    return np.where(((alpha <= box[0] + near) | (alpha >= box[1] - near)).any(-1), "limit", causes)
 
 
 def _nearest_values(field: Field, alpha) -> np.ndarray:

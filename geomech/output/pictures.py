@@ -8,7 +8,6 @@ from typing import Any
 
 from geomech.core.errors import choose
 from geomech.core.variables import Result
-from geomech.geometry import stretch
 from geomech.output import plots
 from geomech.study import tables
 from geomech.study.shape_space import Space
@@ -79,10 +78,10 @@ class Connection:
     plot: Path | None
     pair: str | None
     slice_: str | None
-    beside: str | None
+    other_frame: str | None
 
     def __post_init__(self) -> None:
-        if self.plot is None and not (self.style, self.pair, self.slice_, self.beside) == (None,) * 4:
+        if self.plot is None and not (self.style, self.pair, self.slice_, self.other_frame) == (None,) * 4:
             raise Refusal("--style, --pair, --slice and --beside are those of a figure", instead="say --plot FILE")
         if self.style is not None:
             choose("--style", self.style, plots.CONNECTION_STYLES)
@@ -95,7 +94,7 @@ class Connection:
             plots.save(plots.plane_connection_figure(space.planes, **options), path)
             return
         if space.other:
-            options |= {"beside": space.other.fitted, "names": [scene.frame, self.beside]}
+            options |= {"beside": space.other.fitted, "names": [scene.frame, self.other_frame]}
         plots.save(plots.connection_figure(space.study.fitted, **options), path)
 
 
@@ -106,12 +105,12 @@ class Ccf:
     style: str | None
     metric: bool
     stretch: bool
-    beside: str | None
+    other_frame: str | None
 
     def __post_init__(self) -> None:
         if self.style is not None:
             choose("--style", self.style, plots.CCF_STYLES)
-        if self.stretch and (self.metric or self.beside or self.style not in (None, "map")):
+        if self.stretch and (self.metric or self.other_frame or self.style not in (None, "map")):
             raise Refusal("--stretch is a map of its own", instead="drop --style, --metric and --beside")
         if self.metric and self.style not in (None, "map"):
             raise Refusal("--metric draws on a map", instead=f"drop --style {self.style}")
@@ -123,7 +122,7 @@ class Ccf:
     def _slices(self, space: Space) -> Any:
         scene, options = space.study.scene, {"style": self.style or "map"}
         if space.other_planes:
-            options |= {"beside": space.other_planes[0], "names": [scene.frame, self.beside]}
+            options |= {"beside": space.other_planes[0], "names": [scene.frame, self.other_frame]}
         return plots.planes_figure(space.planes, scene.gait, labels=shape_labels(scene.system), **options)
 
     def _map(self, space: Space) -> Any:
@@ -135,8 +134,8 @@ class Ccf:
         }
         if self.stretch:
             effort = "BL" if scene.system.traits.power_degree == 1 else "path length"
-            return plots.stretched_figure(study.curvature, stretch.stretch(study.metric), **options, effort=effort)
+            return plots.stretched_figure(study.curvature, space.stretch, **options, effort=effort)
         options |= {"style": self.style or "map", "metric": study.metric if self.metric else None}
         if other:
-            options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.beside]}
+            options |= {"beside": (other.curvature, other.curvature_error), "names": [scene.frame, self.other_frame]}
         return plots.ccf_figure(study.curvature, **options)

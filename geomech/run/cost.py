@@ -18,7 +18,7 @@ LONGEST = 60.0  # s of computing that a command begins without consent
 LARGEST = 2e9  # bytes of memory, likewise
 WORTH_SAYING = 5.0  # s
 BASE = 1.6e8  # bytes: Python, its libraries, and a batch of the solver
-SURE = 10.0  # factor by which the assumed seconds may be wrong
+SLOW, FAST = 10.0, 5.0  # most and one over the least that balances may take, over the assumed seconds
 ENOUGH, FEWEST = 0.25, 3  # s of computing, and batches of balances, that suffice to time them
 LOADING = 20.0  # times the median: a batch that takes longer has loaded or compiled code
 
@@ -46,7 +46,7 @@ class Cost(NamedTuple):
 
     def __str__(self) -> str:
         balances = f"{self.balances:,} force balances"
-        return f"{balances}, about {_duration(self.seconds)} of computing and {_size(self.memory)} of memory"
+        return f"{balances}, about {duration(self.seconds)} of computing and {_size(self.memory)} of memory"
 
     @property
     def as_balances(self) -> float:
@@ -65,7 +65,7 @@ class Cost(NamedTuple):
     def check(self, place: str, yes: bool, less: str = "ask for less") -> None:
         """Raise `TooLong` beyond the limits unless ``yes``. less: advice on a smaller request."""
         if not yes and (self.seconds > LONGEST or self.memory > LARGEST):
-            limits = f"{_duration(LONGEST)} or {_size(LARGEST)}"
+            limits = f"{duration(LONGEST)} or {_size(LARGEST)}"
             raise TooLong(str(self), where=place, instead=f"to compute for more than {limits} say --yes, or {less}")
 
 
@@ -79,7 +79,7 @@ def decide(cost: Cost, judge: Callable[[Cost], None]) -> None:
     """Call judge(cost) at once where the assumed seconds decide, else once the first balances have been timed; an
     exception from it ends the request."""
     of_balances = cost.seconds - cost.besides
-    is_clear = of_balances > SURE * LONGEST or cost.seconds < LONGEST / SURE or cost.besides > LONGEST
+    is_clear = of_balances > FAST * LONGEST or cost.seconds < LONGEST / SLOW or cost.besides > LONGEST
     decided = is_clear or cost.memory > LARGEST
     listen(
         nobody if decided else _Watch(cost, judge)
@@ -121,7 +121,8 @@ class _Watch:
         return took / expected
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a time in words, at least a second, in the largest unit that makes a few of it."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}" if seconds < 100 * size else f"{seconds / size:,.0f} {unit}"

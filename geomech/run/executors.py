@@ -188,7 +188,7 @@ class Cluster:
         return max(2, AHEAD * self._count())
 
     def look(self, future: Future) -> None:
-        """Say, once, that all workers are gone; others may come."""
+        """Note, once, that all workers are gone; others may come."""
         if not future.done() and not self._count() and not self.waited:
             note(f"{self.place}: no workers are left: waiting for others ('dask worker {self.address}')")
             self.waited = True

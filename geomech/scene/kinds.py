@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
-import secrets
 import sys
-import sysconfig
 import types
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +17,7 @@ from typing import Any, TypeVar
 
 from geomech import gaits, systems, tiers  # noqa: F401  which have registries
 from geomech.io.files import read_text
+from geomech.scene import sources
 from geomech.systems.functions import class_from_function
 from rft.refusal import Refusal, formatted, located
 from rft.registry import REGISTRIES, Registry, home, place
@@ -27,9 +25,8 @@ from rft.registry import REGISTRIES, Registry, home, place
 LARGEST = 1_000_000  # bytes of a file of one's own
 PLUGIN = "geomech_plugin_"  # begins the names of modules made of such files
 Part = TypeVar("Part")
-_code: dict[str, str] = {}  # digests of sources, by module
+_texts: dict[str, bytes] = {}  # sources, by module
 _files: dict[str, str] = {}  # file of one's own: its text
-INSTALLED = tuple({sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib", "purelib", "platlib")})
 
 
 def register(part: Any = None, /, **members: Any) -> Any:
@@ -107,7 +104,7 @@ def _load(path: Path, full_name: str, text: str) -> list[str]:
         ]
         if not registered_names:
             raise Refusal('no class in it has a law = "..." (a force law) or kind = "..." (all else)', where=place)
-    _code[name], _files[full_name] = hashlib.sha256(text.encode()).hexdigest(), text
+    _texts[name], _files[full_name] = text.encode(), text
     return sorted(registered_names)
 
 
@@ -149,32 +146,7 @@ def _frames(error: BaseException):
 def code() -> dict[str, str]:
     """Return digests of the sources of custom classes, by module, and of modules that these use. Results computed by
     other code are not resumed."""
-    digests, modules = {}, {home(part) for part in _custom_parts()}
-    packages = {name.partition(".")[0] for name in modules}
-    while pending := sorted(modules - {*digests}):
-        for name in pending:
-            digests[name] = _code.setdefault(name, _source(name))
-            values = vars(sys.modules[name]).values() if name in sys.modules else ()
-            used = {x.__name__ if isinstance(x, types.ModuleType) else getattr(x, "__module__", None) for x in values}
-            modules |= {other for other in used if isinstance(other, str) and _is_custom_code(other, packages)}
-    return digests
-
-
-def _source(module: str) -> str:
-    """Return a digest of a module's file; for a module without a file a number that no other process has."""
-    file = getattr(sys.modules.get(module), "__file__", None)
-    try:
-        return hashlib.sha256(Path(file or "").read_bytes()).hexdigest()
-    except OSError:
-        return secrets.token_hex()
-
-
-def _is_custom_code(module: str, packages: set[str]) -> bool:
-    """Return whether a module is of the same packages, or of no installed one."""
-    if module.partition(".")[0] in ("rft", "geomech") or module not in sys.modules:
-        return False
-    file = getattr(sys.modules[module], "__file__", None)
-    return module.partition(".")[0] in packages or bool(file and not file.startswith(INSTALLED))
+    return sources.digests({home(part) for part in _custom_parts()}, _texts)
 
 
 def files() -> tuple[tuple[str, str], ...]:

@@ -178,6 +178,8 @@ def build(
 
     inner: fields that are already read. label: how the table names the class.
 
+    inner: fields that are already read. label: how the table names the class.
+
     inner: fields that are read already. label: how the table names the class."""
     _check_keys(place, table, kind, label)
     values: dict[str, Any] = {}

@@ -44,8 +44,8 @@ def rod_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: float
     rows, over = ("component", "row"), ("parameter",)
     variables = (
         Variable("parameter", over, np.array([_in_degrees(name) for name in f.names])),
-        Variable("value", over, _shown(f, f.values), error=_shown(f, f.errors)),
-        Variable("interval", (*over, "bound"), _shown(f, f.intervals), label="with 95 %"),
+        Variable("value", over, _displayed(f, f.values), error=_displayed(f, f.errors)),
+        Variable("interval", (*over, "bound"), _displayed(f, f.intervals), label="with 95 %"),
         Variable("component", ("component",), np.array(["parallel", "perpendicular"])),
         Variable("psi", ("row",), measured.rows[0], "degrees", "attack angle"),
         Variable(
@@ -69,7 +69,7 @@ def _medium(f: Fit) -> dict:
     return {"law": f.law, **{k: x for k, x in values.items() if x is not None}}
 
 
-def _shown(f: Fit, values: np.ndarray) -> np.ndarray:
+def _displayed(f: Fit, values: np.ndarray) -> np.ndarray:
     """Return values (n, ...) of the parameters with gamma0 in degrees."""
     return np.array([np.degrees(x) if name == "gamma0" else x for name, x in zip(f.names, values)])
 

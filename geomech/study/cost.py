@@ -125,8 +125,8 @@ def of_medium(scene: Scene, gait: Gait, count: int, together: int = sys.maxsize)
     in a batch."""
     if not uncertainty.uncertain(scene.system):
         return []
-    phases = max(uncertainty.PHASES, 8 * gait.harmonics)
-    return uncertainty.points(scene.system) * direct(scene, gait, count, phases, together, checked=False)
+    phases, points = max(uncertainty.PHASES, 8 * gait.harmonics), uncertainty.points(scene.system)
+    return points * direct(scene, gait, count, phases, together, checked=False) + (points - 1) * frame(scene)
 
 
 def direct(
@@ -141,8 +141,8 @@ def direct(
         phases = max(estimate.FEWEST_STEPS if stepping else 32, 8 * -(-phases // 8))
     group = min(max(1, count), together, gaits_per_batch(system, phases))
     size = balance_size(system)
-    stored_table = group * (60 * size.elements + size.memory) if stepping else 0
-    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored_table) + count * ROW
+    stored = group * (60 * size.elements + size.memory) if stepping else 0
+    memory = BASE + 8 * (COPIES * group * phases * (system.joints + 6) + stored) + count * ROW
     solves = (lambda n: n) if all_phases else (lambda n: solved_phases(system, gait, n))
     runs = _runs(scene, phases) if checked else [(phases, 1.0)]
     groups, cycles = -(-count // group), cycles_of(system)

@@ -12,6 +12,8 @@ import numpy as np
 
 from geomech.core.variables import Result, Variable
 from geomech.geometry.plane import Plane
+from geomech.geometry.stretch import Stretch
+from geomech.geometry.stretch import stretch as stretch_to_metric
 from geomech.run.cost import Cost
 from geomech.scene.model import Scene
 from geomech.study import fields
@@ -31,22 +33,25 @@ MOST_PAIRS = 10  # of joints in a figure: as many as five joints have
 
 
 class Space(NamedTuple):
-    """Subject of pictures of shape space. other, other_planes: the study and its planes in another body frame."""
+    """Subject of pictures of shape space. other, other_planes: the study and its planes in another body frame. stretch: of
+    shape space, to equal effort."""
 
     study: Study
     other: Study | None = None
     planes: tuple[Plane, ...] = ()
     other_planes: tuple[Plane, ...] = ()
+    stretch: Stretch | None = None
 
 
 @dataclass(frozen=True)
 class ShapeSpace(Question):
     """The connection or the CCF of a scene.
 
-    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's
-    grid. map: drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs;
-    slice_angles: angles of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape.
-    gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame, drawn beside it."""
+    file: with all data of a file, metric and harmonics included; else the CCF alone. field: computed on the scene's grid. map:
+    drawn on that grid. planes: drawn where two joints move, of ``pair``, such as "1,3", or of all pairs; slice_angles: angles
+    of the other joints, rad, the gait's middle if None. metric: with the cost of changes of shape. stretch: with shape space
+    stretched to that cost. gait: the scene's gait is drawn, and must lie within. other_frame: name of another body frame,
+    drawn below."""
 
     scene: Scene
     file: bool = False
@@ -56,6 +61,7 @@ class ShapeSpace(Question):
     pair: str | None = None
     slice_angles: tuple[float, ...] | None = None
     metric: bool = False
+    stretch: bool = False
     gait: bool = False
     other_frame: str | None = None
 
@@ -136,7 +142,9 @@ class ShapeSpace(Question):
         study, parts = self.study, self._parts()
         values = [part(lambda done, k=k: progress((k + done) / len(parts))) for k, part in enumerate(parts)]
         count = len(self._at)
-        space = Space(study, self.other, tuple(values[:count]), tuple(values[count : 2 * count]) if self.other else ())
+        other_planes = tuple(values[count : 2 * count]) if self.other else ()
+        stretched = stretch_to_metric(study.metric) if self.stretch else None
+        space = Space(study, self.other, tuple(values[:count]), other_planes, stretched)
         if self.file:
             file = fields.of_study(study)
             return Result(file.kind, file.variables, file.attributes, space)
@@ -222,7 +230,7 @@ def ccf(
         return ShapeSpace(
             scene, field=False, planes=True, pair=pair, slice_angles=slice_angles, other_frame=other_frame
         )
-    return ShapeSpace(scene, map=True, gait=True, metric=metric or stretch, other_frame=other_frame)
+    return ShapeSpace(scene, map=True, gait=True, metric=metric or stretch, stretch=stretch, other_frame=other_frame)
 
 
 def connection(

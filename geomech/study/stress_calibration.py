@@ -35,10 +35,10 @@ def plate_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: flo
         "rms": _rms(f.residuals),
         "notes": _lacking(name, f, undetermined),
     }
-    whole = survey(f.stress)
-    facts["map"] = whole.description()
-    if whole.pushing:
-        facts["notes"].append(f"{name}: the fitted map {whole.description()}")
+    overview = survey(f.stress)
+    facts["map"] = overview.description()
+    if overview.pushing:
+        facts["notes"].append(f"{name}: the fitted map {overview.description()}")
     over, rows = ("coefficient",), ("component", "row")
     variables = (
         Variable("coefficient", over, np.array(KEYS)),
@@ -116,13 +116,13 @@ def _refuse(law: str, sizes: Mapping[str, float], end_caps, known: tuple[str, ..
 def law_of(source: str) -> str:
     """Return the law that the columns of a file determine; "granular" for a file that cannot be read."""
     try:
-        there = read_rows(source, LARGEST_FILE, "").header[1]
+        header = read_rows(source, LARGEST_FILE, "").header[1]
     except ValueError:
         return "granular"
-    begins = lambda *words: any(word.startswith(words) for word in there)
+    begins = lambda *words: any(word.startswith(words) for word in header)
     if begins("psi"):
         return "granular"
     if begins("alpha_", "beta"):
         return "stress-map"
-    found = {named[0] for word in there if (named := penetration.quantity(word))}
-    return "zeta" if begins("depth") or {"depth", "force"} <= found else "granular"
+    quantities = {named[0] for word in header if (named := penetration.quantity(word))}
+    return "zeta" if begins("depth") or {"depth", "force"} <= quantities else "granular"

@@ -238,7 +238,7 @@ class Study(Extensible):
         call."""
         gait, amplitudes, chosen = self._checked(gait, amplitudes, methods)
         medium, took = timed(lambda: uncertainty.of_medium(self.scene, gait, amplitudes))  # first, as it may refuse
-        seconds, stored_table = self._build_all(chosen, progress)
+        seconds, stored = self._build_all(chosen, progress)
         if medium:
             seconds["medium"] = took
         poses, errors, spreads, reference = {}, {}, {}, None
@@ -260,13 +260,13 @@ class Study(Extensible):
                 if reference is None:
                     seconds["errors"] = seconds.get("errors", 0.0) + took
         poses, errors = ({m: x[m] for m in methods} for x in (poses, errors))
-        facts = {"seconds": seconds, "kept": stored_table}
+        facts = {"seconds": seconds, "kept": stored}
         return Displacements(tables.result(self.scene, gait, amplitudes, poses, errors, medium, spreads, **facts))
 
     def _build_all(self, chosen: dict[str, Plan], progress) -> tuple[dict[str, float], list[str]]:
         """Build the tables of tiers; return the seconds that each took, even if before, and the names of those that
         were stored."""
-        field, seconds, stored_table = self._connection(), {}, []
+        field, seconds, stored = self._connection(), {}, []
         tables = {m: plan.table for m, plan in chosen.items() if plan.table}
         of_field = lambda m: tables[m].name == field.name
         for method in sorted(tables, key=of_field, reverse=True):  # the field first, as it is also drawn
@@ -274,8 +274,8 @@ class Study(Extensible):
             if name not in seconds:
                 with located(self.scene.name):
                     _, seconds[name], exists = self._built(tables[method], progress)
-                stored_table += [name] * exists
-        return seconds, stored_table
+                stored += [name] * exists
+        return seconds, stored
 
     def cost(self, amplitudes: Sequence[float], methods: Sequence[str], gait: Gait | None = None, more=()) -> cost.Cost:
         """Return the cost of `study`, and of ``more`` jobs: force balances, seconds on this machine and memory; see

@@ -18,7 +18,7 @@ from geomech.study import estimate
 from geomech.study.available import tiers
 from geomech.study.study import Study, refuse_outside
 from geomech.systems.capabilities import is_closed, pieces_per_length, solver_of, stored_table, table_error
-from geomech.tiers import TIERS, fitted, harmonic
+from geomech.tiers import TIERS
 from geomech.tiers.base import Plan
 from geomech.tiers.direct import DIRECT
 from rft.refusal import Refusal, located
@@ -121,7 +121,7 @@ class Settings:
         return {**entry, "buys": knob.buys}
 
     @property
-    def table_error(self) -> float:
+    def own_error(self) -> float:
         """Largest error of the system itself, body lengths, which no setting reduces; the cheapest settings include it."""
         shapes = self.scene.gait.cycle(self.scene.numerics.phases, self.amplitudes)
         return float(table_error(self.scene.system, *shapes)[..., 0].max())
@@ -143,11 +143,12 @@ def applies(knob: Knob, scene: Scene) -> bool:
         return False
     if setting == "regularisation" and solver_of(system) is None:
         return False
-    of_a_field = setting in (*fitted.DEPENDS_ON, *harmonic.DEPENDS_ON)
-    if of_a_field and (stored_table(system, "connection") or system.joints > 2):  # from 7 to 61 points per joint: hours
+    if knob.tier not in tiers(system):
         return False
-    if knob.tier not in tiers(system) or (knob.tier != DIRECT.name and _plan(scene, knob.tier).exact):
-        return False
+    if knob.tier != DIRECT.name:
+        of_a_field = TIERS[knob.tier].common and (stored_table(system, "connection") or system.joints > 2)
+        if of_a_field or _plan(scene, knob.tier).exact:  # from 7 to 61 points per joint: hours
+            return False
     return setting != "pieces" or pieces_per_length(system) > 0
 
 

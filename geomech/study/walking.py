@@ -17,8 +17,8 @@ from geomech.core.knob import Knob
 from geomech.core.summary import span
 from geomech.core.variables import Result, Variable
 from geomech.run import jobs
-from geomech.run.backend import preferred, suiting
-from geomech.run.cost import BASE, LONGEST, Cost
+from geomech.run.backend import suiting
+from geomech.run.cost import BASE, LONGEST, Cost, duration
 from geomech.scene import write as written
 from geomech.scene.walker import WalkerScene
 from geomech.study.grid import Grid
@@ -33,11 +33,7 @@ PILOT = 0.05  # s of time steps that are timed
 STATUSES = ("walking", "stuck", "sunk", "flipped", "airborne")
 TOGETHER = 32  # robots in a batch
 SETTLING = 3  # cycles from rest in a sweep, before the limit cycle is looked for
-PER_STEP = {"numpy": 2.2e-3, "numba": 2e-4}  # s of computing, for a robot by itself,
-MORE = {"numpy": 0.23, "numba": 1.0}  # of that for each further one of a batch, measured
 STEP = 200.0  # balances that take NumPy as long as a time step
-ALONE = 5e-3  # s, in three dimensions,
-OWN = 3e-2  # and of a custom machine, whose wheels stick and slip: 5e-3 to 5e-2 measured
 HARD = 30.0  # evaluations of forces in a step; the first steps of the built-in robots take 7 to 14
 PUSHED = 0.2  # acceleration of a body by much faster legs over gravity, measured
 IN_VAIN = 40  # cycles of a failing search for a limit cycle with its errors, many at once
@@ -176,7 +172,7 @@ class Steps(Cost):
         return STEP * self.balances
 
     def __str__(self) -> str:
-        return f"{self.balances:,} time steps, about {max(1.0, self.seconds):.0f} s of computing"
+        return f"{self.balances:,} time steps, about {duration(self.seconds)} of computing"
 
 
 def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | None = None) -> Steps:
@@ -186,20 +182,17 @@ def price(scene: WalkerScene, count: int = 1, settling: bool = False, by: str | 
     step, the search for a limit cycle is assumed to fail."""
     numerics, engine_name = scene.numerics, by or scene.engine
     planar = engine_name == "planar"
-    together = TOGETHER if planar else 1
+    together = min(count, TOGETHER if planar else 1)
     own = isinstance(scene.robot, Mjcf)  # custom machines may have no limit cycle
     most = SETTLING if settling else numerics.duration * scene.gait.frequency
     cycles = min(most, 2 * LIMIT + _speeding_up(scene))
     least = (cycles + 2.75 * LIMIT) * numerics.steps * count
     with located(scene.name), suiting(STEP * least if planar else 0.0):
-        per_step, more = PER_STEP[preferred()], MORE[preferred()]
-        usual = (OWN if own else per_step if planar else ALONE) * (0.5 + numerics.elements / 32)
-        step_seconds, tries = engine(engine_name).step_cost(scene.walker, numerics, PILOT)
+        step_seconds, tries = engine(engine_name).step_cost([scene.walker] * together, numerics, PILOT)
     vain = IN_VAIN if tries > HARD else MOST_STRIDES if own else 0
     cycles = most + vain if vain else cycles
-    steps, batches = (cycles + 2.75 * LIMIT) * numerics.steps, -(-count // together)
-    each = usual if together > 1 and tries <= HARD else max(step_seconds, usual)
-    seconds = each * steps * (batches + (count - batches) * more)
+    steps = (cycles + 2.75 * LIMIT) * numerics.steps
+    seconds = step_seconds * steps * -(-count // together)
     return Steps(round(steps * count), seconds, BASE, seconds)
 
 

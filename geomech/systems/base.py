@@ -76,6 +76,8 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 
     Refusal at a singular shape.
 
+    Refusal at a singular shape.
+
     ValueError at a singular shape."""
     refuse_singular(system, alpha)
     xi, speed = evaluate(system.velocity, alpha, alphadot), np.sqrt((alphadot**2).sum(-1)).mean(-1)
@@ -85,6 +87,8 @@ def integrated(system: System, alpha, alphadot, work: bool = False) -> Cycle:
 @dataclass(frozen=True)
 class WrappedSystem:
     """A system made by `as_system` from a velocity alone, or from an object that lacks some of the five members.
+
+    wrapped: the function, or the object. joints, length, traits: as of `System`.
 
     wrapped: the function, or the object. joints, length, traits: as of `System`.
 

@@ -24,6 +24,7 @@ from geomech.systems.capabilities import (
     Refinable,
     Stepped,
     Symbolic,
+    Uncertain,
     capability,
     refined,
     stored_table,
@@ -70,7 +71,7 @@ class Framed:
         inner = capability(self.inner, kind)
         if kind is Stepped:  # its frame turns with the shape: poses are carried over, not integrated
             return self
-        carried_over = (Dissipative, Drawable, Refinable, Diagnosed)
+        carried_over = (Dissipative, Drawable, Refinable, Diagnosed, Uncertain)
         return None if inner is None or kind is Symbolic else self if kind in carried_over else inner
 
     @property
@@ -141,6 +142,14 @@ class Framed:
     def refined(self) -> System | None:
         inner = refined(self.inner)
         return None if inner is None else dataclasses.replace(self, inner=inner)
+
+    @property
+    def covariance(self) -> Any:
+        return capability(self.inner, Uncertain).covariance
+
+    def varied(self, step) -> Framed:
+        # With a frame of its own, as the system would have if its parameters were these.
+        return dataclasses.replace(self, inner=capability(self.inner, Uncertain).varied(step))
 
     def with_solver(self, solver) -> Framed:
         return dataclasses.replace(self, inner=self.inner.with_solver(solver))

@@ -121,6 +121,8 @@ def plane(system: System, numerics: Numerics, pair: tuple[int, int], at, progres
 
     Refusal if there is no connection, or if the plane lies outside the field.
 
+    Refusal if there is no connection, or if the plane lies outside the field.
+
     ValueError if there is no connection, or if the plane lies outside the field."""
     refuse(system)
     if stored := stored_table(system, "connection"):

@@ -105,9 +105,9 @@ class Engine(Protocol):
         cycle change; others are computed from rest."""
         ...
 
-    def step_cost(self, walker: Walker, numerics: Fineness, seconds: float) -> tuple[float, float]:
-        """Return s of computing and number of evaluations of forces in a time step, from the first steps of a walk: those of
-        a stride, or as many as ``seconds`` s of computing allow."""
+    def step_cost(self, walkers: Sequence[Walker], numerics: Fineness, seconds: float) -> tuple[float, float]:
+        """Return s of computing in a time step of equal walkers side by side, and number of evaluations of forces for one,
+        from the first steps of their walks: those of a stride, or as many as ``seconds`` s of computing allow."""
         ...
 
 

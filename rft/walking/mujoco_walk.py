@@ -85,8 +85,9 @@ def rerun(
     return others
 
 
-def step_cost(walker: Walker, numerics: Fineness, seconds: float) -> tuple[float, float]:
+def step_cost(walkers: Sequence[Walker], numerics: Fineness, seconds: float) -> tuple[float, float]:
     """Return the cost of a time step; see `rft.walking.engines.Engine.step_cost`."""
+    (walker,) = walkers
     body, h = Simulation(walker, numerics).body, 1 / (walker.gait.frequency * numerics.steps)
     begin, elapsed, steps = time.process_time(), 0.0, 0
     while steps < numerics.steps and elapsed < seconds:

@@ -165,19 +165,20 @@ def rerun(
     return others
 
 
-def step_cost(walker: Walker, numerics: Fineness, seconds: float) -> tuple[float, float]:
+def step_cost(walkers: Sequence[Walker], numerics: Fineness, seconds: float) -> tuple[float, float]:
     """Return the cost of a time step; see `rft.walking.engines.Engine.step_cost`."""
-    strides, robot = _strides([walker], numerics), np.zeros(1, int)
-    ends, state, tries = (strides.top, strides.out_of_reach), strides.robots.start(), 0
+    strides, robots = _strides(walkers, numerics), np.arange(len(walkers))
+    ends, state, done, tries = (strides.top, strides.out_of_reach), strides.robots.start(), 0, 0
 
-    def step(k, state):
-        return march(strides.robots, robot, state, strides.phases[k : k + 2], strides.rate_phases[k : k + 1], ends)
+    def steps(begin, count):
+        phases, rate_phases = strides.phases[begin : begin + count + 1], strides.rate_phases[begin : begin + count]
+        return march(strides.robots, robots, state, phases, rate_phases, ends)
 
-    step(0, state)  # compiled code is loaded
+    steps(0, 1)  # compiled code is loaded
     begin = time.process_time()
-    for k in range(len(strides.rate_phases)):
-        states, evaluations = step(k, state)
-        state, tries = states.take(0), tries + int(evaluations[0])
-        if time.process_time() - begin >= seconds or strides.end_status(state, robot)[0]:
+    while done < len(strides.rate_phases):
+        states, evaluations = steps(done, max(1, done))  # one by one they take longer
+        state, tries, done = states.take(-1), tries + int(evaluations[0]), done + len(states.pose)
+        if time.process_time() - begin >= seconds or strides.end_status(state, robots)[0]:
             break
-    return (time.process_time() - begin) / (k + 1), tries / (k + 1)
+    return (time.process_time() - begin) / done, tries / done

@@ -128,11 +128,11 @@ def clock(motion: Motion, row: int) -> str:
 def stage(motion: Motion, rows, field: Field | None = None, error: Field | None = None):
     """Return (Figure, function that moves its artists to a row and returns them): the world next to the shapes."""
     fig, axes = figure(8.0, 3.6, 2, width_ratios=[1.25, 1.0])
-    left, right = axes[0]
+    track_ax, shape_ax = axes[0]
     if motion.scene.system.joints != 2:
-        right.set_box_aspect(0.8)
-    move_body, move_shape = world(left, motion, rows), shape(right, motion, field, error)
-    text = left.set_title("", loc="left")
+        shape_ax.set_box_aspect(0.8)
+    move_body, move_shape = world(track_ax, motion, rows), shape(shape_ax, motion, field, error)
+    text = track_ax.set_title("", loc="left")
 
     def update(row: int):
         text.set_text(clock(motion, row))
@@ -152,8 +152,8 @@ def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = 
     lines = -(-pictures // columns)
     height = float(np.clip(lines * (tall * (3.9 / columns - 0.15) + 0.3) + 0.45, MAP, 8.0))
     fig = blank(7.2, height)
-    left, right = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
-    axes = left.subgridspec(lines, columns).subplots(squeeze=False, sharex=True, sharey=True)
+    strip_cell, shape_cell = fig.add_gridspec(1, 2, width_ratios=[4.2, 3.0])
+    axes = strip_cell.subgridspec(lines, columns).subplots(squeeze=False, sharex=True, sharey=True)
     for ax in axes.flat[pictures:]:
         ax.remove()
     for k, (ax, row) in enumerate(zip(axes.flat, rows)):
@@ -161,7 +161,7 @@ def filmstrip(motion: Motion, field: Field | None = None, error: Field | None = 
         ax.set_title(rf"$\bf{{{k + 1}}}$  {clock(motion, row)}", loc="left", fontsize=8)
         ax.label_outer()
     around = max(1e-3, (height - MAP) / 2)
-    panel = fig.add_subplot(right.subgridspec(3, 1, height_ratios=[around, MAP, around])[1])
+    panel = fig.add_subplot(shape_cell.subgridspec(3, 1, height_ratios=[around, MAP, around])[1])
     shape(panel, motion, field, error)
     _numbers(panel, motion, rows)
     return fig
