@@ -79,8 +79,7 @@ class Scene(Displayed):
     frequency = property(lambda self: frequency_of(self.system, self.gait), doc="Hz; None where nothing says one.")
 
     def with_numerics(self, **changes) -> Scene:
-        """Return the scene with some of its [numerics] changed, the system's own among them; an entry given as None is
-        unchanged."""
+        """Return the scene with some of its [numerics], or of its system's, changed; None leaves an entry."""
         own_keys = {f.name for f in _fields(solver_of(self.system))}
         changes = {k: v for k, v in changes.items() if v is not None}
         with located(self.name):
