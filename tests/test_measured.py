@@ -202,7 +202,9 @@ def test_where_A_jumps_its_error_is_told():
     t = 2 * np.pi * np.arange(128) / 128
     found, told_off = f.along(t)
     off = np.abs(found - true_A(f, corner, t))[:, 2, 1]
-    scatter = dataclasses.replace(f.known, standard_error=0 * f.known.standard_error).error_at(t)
+    scatter = dataclasses.replace(
+        f, known=dataclasses.replace(f.known, standard_error=0 * f.known.standard_error)
+    ).along(t)[1]
     assert np.mean(off <= told_off[:, 2, 1]) > 0.92 > 0.82 > np.mean(off <= scatter[:, 2, 1])
     wider = (told_off - scatter).max(0)
     assert wider[2, 1] > 0.05 and wider[0].max() < 0.01  # which does not jump

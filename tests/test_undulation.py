@@ -421,7 +421,7 @@ def test_the_speed_ratio_converges():
 def test_fig10(tmp_path):
     """The wave of activation outruns that of curvature, the less the more waves the body has (0.5 to 1.8), and is ahead
     of it ever more towards the tail."""
-    numbers = fig10_neuromechanics.compute(fig10_neuromechanics.SHOWN, elements=50, phases=64)
+    numbers = fig10_neuromechanics.compute(fig10_neuromechanics.SELECTED, elements=50, phases=64)
     lines, harmonic, lag = np.array(list(ACTIVATION.values())).T
     np.testing.assert_allclose(numbers["waves"], list(ACTIVATION))
     np.testing.assert_allclose(numbers["speed"], lines, rtol=0.015)

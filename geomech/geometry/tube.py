@@ -160,15 +160,10 @@ class TaylorSeries:
         return _between(self.spread, t)
 
     def standard_error_at(self, t) -> np.ndarray:
-        """(..., 3, d): standard errors of A at phases t (...), as `off`."""
+        """Return the standard errors (..., 3, d) of A at phases t (...), as `standard_error`."""
         rate = self.loop.shape(t, 1)
         along = rate**2 / (rate**2).sum(-1, keepdims=True)
         return np.sqrt(_between(self.standard_error**2, t) @ np.stack([along, 1 - along], -2))
-
-    def error_at(self, t) -> np.ndarray:
-        """Return the errors (..., 3, d) of A at phases t (...) of the gait."""
-        squares = (series(self.errors[:, :, :, 0], t) ** 2).sum(-3)
-        return self.factor * np.sqrt(squares + self.standard_error_at(t) ** 2)
 
     def reach(self, alpha) -> np.ndarray:
         """Return the distances (...,) of shapes (..., d) from the gait, 1 where the data end."""

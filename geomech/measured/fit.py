@@ -87,7 +87,9 @@ class Fitted:
 
     def along(self, t) -> tuple[np.ndarray, np.ndarray]:
         """Return A (T, 3, d) at phases t of the mean gait, and half widths of its interval."""
-        return series(self.known.A, t), self.known.error_at(t)
+        known = self.known
+        variance = (series(known.errors[:, :, :, 0], t) ** 2).sum(-3) + known.off_at(t) ** 2
+        return series(known.A, t), known.factor * np.sqrt(variance)
 
     @property
     def misfit(self) -> np.ndarray:
