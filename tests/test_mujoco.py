@@ -274,7 +274,7 @@ def test_the_figure_compares_steps_and_engines(monkeypatch):
 
     coarse = dataclasses.replace(XPLORER, numerics=dataclasses.replace(QUICK, elements=4))
     monkeypatch.setattr(walking_mujoco, "load", lambda name: coarse)
-    monkeypatch.setattr(walking_mujoco, "SETTLED", 1)
+    monkeypatch.setattr(walking_mujoco, "MOST_STRIDES", 1)
     numbers = walking_mujoco.compute({"implicit": (12,), "held": (12,)}, 24, {"SandBot": ()})
     (_, implicit), (_, held) = numbers["steps"].values()
     assert implicit.max() < 0.2 < held[0]
