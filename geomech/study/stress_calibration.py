@@ -29,16 +29,16 @@ def plate_drags(law: str, source: str, sizes: Mapping[str, float], end_caps: flo
     with located(name):
         f = fit_stress(np.radians(beta), np.radians(gamma), *alpha)
     undetermined = [KEYS[COEFFICIENTS.index(name)] for name in f.undetermined]
+    overview, notes = survey(f.stress), _lacking(name, f, undetermined)
+    if overview.pushing:
+        notes.append(f"{name}: the fitted map {overview.description()}")
     facts = {
         "name": name,
         "undetermined": undetermined,
         "rms": _rms(f.residuals),
-        "notes": _lacking(name, f, undetermined),
+        "map": overview.description(),
+        "notes": notes,
     }
-    overview = survey(f.stress)
-    facts["map"] = overview.description()
-    if overview.pushing:
-        facts["notes"].append(f"{name}: the fitted map {overview.description()}")
     over, rows = ("coefficient",), ("component", "row")
     variables = (
         Variable("coefficient", over, np.array(KEYS)),
